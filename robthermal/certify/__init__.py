@@ -1,0 +1,11 @@
+"""Certificates of thermal systems: contraction in a box, current limits, box invariance, runaway, large networks."""
+
+from ._contraction import contraction as contraction
+from ._invariance import invariance as invariance
+from ._limits import CurrentLimit as CurrentLimit
+from ._limits import largest_current as largest_current
+from ._network import network as network
+from ._runaway import Runaway as Runaway
+from ._runaway import runaway as runaway
+
+__all__ = ["CurrentLimit", "Runaway", "contraction", "invariance", "largest_current", "network", "runaway"]

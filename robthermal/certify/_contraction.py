@@ -1,0 +1,99 @@
+"""Contraction of the network with given currents, in a box: one norm in which any two trajectories approach."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import InputError
+from ..thermal import System
+from ..verification import Certificate, establish, not_certified
+from ._energy import energy_rate
+from ._jacobian import box_jacobian
+from ._sections import Currents, Temperatures, made_by, region_section, system_section
+from ._weights import best_weights
+
+Method = Literal["energy", "sum", "max"]
+METHODS = ("energy", "sum", "max")
+_SLACK = (1e-6, 1e-4, 1e-2, 0.1, 0.5)  # share of the rate given up when a proof fails, tried in turn
+_SMALLEST = 1e-12  # 1/s: a rate below this is not claimed
+_SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "HiGHS linear program", "max": "HiGHS linear program"}
+
+
+def contraction(system: System, *, current: Currents, temperature: Temperatures, method: Method = "energy") -> Certificate:
+    """Certify that a network contracts for every temperature and current in a box.
+
+    Parameters
+    ----------
+    system : System
+        Network with its modules.
+    current : mapping
+        {module: (lower, upper)} [A], every module; modules vary independently.
+    temperature : tuple or mapping
+        (lower, upper) for every lump independently, or {lump: (lower, upper)} [K].
+    method : {"energy", "sum", "max"}
+        Norm: V = eᵀEe, weighted l₁ (cᵀJ < 0), weighted l∞ (J d < 0).
+
+    Returns
+    -------
+    Certificate
+        `holds` tells whether it is proven; if not, `reason` tells why. "Not certified" is a result, not an error.
+
+    Raises
+    ------
+    InputError
+        Boxes that do not fit the system, Celsius, unknown method.
+
+    References
+    ----------
+    Lohmiller and Slotine, "On contraction analysis for nonlinear systems", Automatica 34 (1998); errata of Evers (2021),
+    "Thermal runaway".
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> box = {"m1": (-1.0, 1.5), "m2": (-1.0, 1.5)}
+    >>> cert = rt.certify.contraction(rt.systems.two_module(), current=box, temperature=(278.15, 358.15), method="sum")
+    >>> cert.holds, rt.verify(cert).valid
+    (True, True)
+    """
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}", where="argument method", expected='"energy", "sum" or "max"')
+    system_part = system_section(system)
+    region = region_section(system, current, temperature)
+    parts: dict[str, Any] = {"system": system_part, "region": region}
+    box = box_jacobian(system, region)
+    if method == "energy":
+        rate, weights = energy_rate(box), None
+    else:
+        found = best_weights(box, method)
+        weights, rate = found if found is not None else (None, -np.inf)
+    if not rate > _SMALLEST:
+        return not_certified("contraction", **parts, evidence={"method": method}, made_by=made_by(_SOLVERS[method], "none"),
+                             reason=_why_not(method, rate))
+    for slack in _SLACK:
+        evidence: dict[str, Any] = {"method": method, "rate": _short(rate * (1 - slack))}
+        if weights is not None:
+            evidence["weights"] = [_short(w) for w in weights / weights.max()]
+        cert = establish("contraction", **parts, evidence=evidence, made_by=made_by(_SOLVERS[method], "found"))
+        if cert.holds:
+            return cert
+    return cert
+
+
+def _why_not(method: str, rate: float) -> str:
+    if method == "energy":
+        return (f"at some vertex of the box the symmetric part of the Jacobian grows at {-rate:.3g} 1/s: V = eᵀEe does not "
+                "decay there. Narrow the current or temperature range (rt.certify.largest_current tells how far).")
+    norm = "column" if method == "sum" else "row"
+    return (f"the linear program finds no positive weights for which every {norm} sum is negative over the box. Narrow the "
+            "current or temperature range (rt.certify.largest_current tells how far), or try another method.")
+
+
+def _short(value: float) -> float:
+    """Six digits, rounded towards zero: short to read, and slack is not eaten by the rounding."""
+    if value == 0.0:
+        return 0.0
+    digits = 11 - int(np.floor(np.log10(abs(value)))) - 1
+    return float(np.trunc(value * 10.0**digits) / 10.0**digits) if abs(digits) < 300 else value

@@ -1,0 +1,110 @@
+"""Floating-point picture of the Jacobian over a box: a base network plus a few 2x2 blocks with vertices.
+
+Used to *find* certificates; the proof is the checker's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from ..thermal import Equations, System
+
+_CURRENTS = 9  # samples of a current range where the blocks are not convex in it
+
+
+@dataclass(frozen=True)
+class Block:
+    """Entries [[aa, ab], [ba, bb]] of one module or nonlinear link at its vertices; b is -1 for an ambient.
+
+    Parameters
+    ----------
+    a, b : int
+        Lumps.
+    vertices : ndarray, shape (n_vertices, 2, 2)
+        ∂(heat into row lump)/∂(column temperature) [W/K].
+    """
+
+    a: int
+    b: int
+    vertices: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BoxJacobian:
+    """J = base + blocks; E ẋ = f.
+
+    Parameters
+    ----------
+    capacity : ndarray, shape (n,)
+        [J/K].
+    base : csr_array, shape (n, n)
+        Linear links.
+    blocks : tuple of Block
+        Modules (with all of their conductance) and nonlinear links.
+    """
+
+    capacity: NDArray[np.float64]
+    base: csr_array
+    blocks: tuple[Block, ...]
+
+
+def box_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian:
+    """Picture of a system over the box of a certificate's region."""
+    eq = Equations(system)
+    index = {name: i for i, name in enumerate(system.lumps)}
+    box = region["temperature"]
+    ranges = {name: box[name] if isinstance(box, Mapping) else box for name in system.lumps}
+    nominal = {name: [a.temperature] * 2 for name, a in system.ambients.items()}
+    base = eq.A.tolil()
+    blocks: list[Block] = []
+    for name, module in system.modules.items():
+        h, c, K = index[module.hot], index[module.cold], module.conductance.value
+        base[h, h] += K
+        base[c, c] += K
+        base[h, c] -= K
+        base[c, h] -= K
+        vertices = _module_vertices(module, ranges[module.hot], ranges[module.cold], region["current"][name])
+        blocks.append(Block(h, c, vertices))
+    for link in system.links:
+        if link.natural is not None or link.radiation is not None:
+            a, b = link.between
+            if a not in index:
+                a, b = b, a
+            ends = [ranges.get(a, nominal.get(a)), ranges.get(b, nominal.get(b))]
+            blocks.append(Block(index[a], index.get(b, -1), _link_vertices(link, *ends, ambient=b not in index)))
+    return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
+
+
+def _module_vertices(module: Any, hot: list[float], cold: list[float], current: list[float]) -> NDArray[np.float64]:
+    concave = module.resistance.slope < 0
+    currents = np.linspace(*current, _CURRENTS) if concave else np.unique([*current, np.clip(0.0, *current)])
+    Th, Tc, I = (g.ravel() for g in np.meshgrid(np.unique(hot), np.unique(cold), currents, indexing="ij"))
+    dT = 0.5 * (Th + Tc) - module.reference_temperature
+    S, dS = module.seebeck.value + module.seebeck.slope * dT, module.seebeck.slope
+    dR, dK = module.resistance.slope, module.conductance.slope
+    K = module.conductance.value + dK * dT
+    joule, bend = 0.25 * dR * I**2, 0.5 * dK * (Th - Tc)
+    hh, hc = -K - bend + S * I + 0.5 * dS * Th * I + joule, K - bend + 0.5 * dS * Th * I + joule
+    cc, ch = -K + bend - S * I - 0.5 * dS * Tc * I + joule, K + bend - 0.5 * dS * Tc * I + joule
+    return np.stack([np.stack([hh, hc], -1), np.stack([ch, cc], -1)], -2)
+
+
+def _link_vertices(link: Any, a: list[float], b: list[float], ambient: bool) -> NDArray[np.float64]:
+    """Slopes at the ends of their ranges; towards an ambient of unknown temperature natural convection may vanish."""
+    apart = np.array([a[0] - b[1], a[1] - b[0]])
+    largest = np.abs(apart).max()
+    smallest = 0.0 if ambient or apart[0] <= 0 <= apart[1] else np.abs(apart).min()
+    vertices = []
+    for dT in (smallest, largest):
+        g = link.natural.gain * (1 + link.natural.exponent) * dT**link.natural.exponent if link.natural else 0.0
+        for Ta in np.unique(a):
+            for Tb in np.unique(b):
+                ra, rb = (4 * (link.radiation or 0.0) * T**3 for T in (Ta, Tb))
+                vertices.append([[-g - ra, g + rb], [g + ra, -g - rb]])
+    return np.array(vertices)

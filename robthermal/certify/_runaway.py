@@ -1,0 +1,148 @@
+"""Thermal runaway of modules that regulate their cold face: I*, q*, checked against the closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..errors import Outcome
+from ..thermal import LoadCurve, System, fold
+from ..verification import Certificate, establish
+from ._sections import made_by
+
+
+@dataclass(frozen=True)
+class Runaway:
+    """Limits of a machine whose modules hold their cold faces.
+
+    Parameters
+    ----------
+    current : dict
+        Module to I* [A]: beyond it more current takes less heat, and the hot side runs away.
+    load : dict
+        Module to q* [W]: heat taken from the cold lump there; no equilibrium takes more.
+    closed_form : dict
+        Module to the root of the cubic for constant S, R, K and the module's own effective heat sink [A].
+    curve : LoadCurve
+        Equilibria on the way to the fold.
+    certificates : dict
+        Module to the certificate of its closed form.
+    outcome : Outcome
+        How the two agree.
+    """
+
+    current: dict[str, float]
+    load: dict[str, float]
+    closed_form: dict[str, float]
+    curve: LoadCurve
+    certificates: dict[str, Certificate]
+    outcome: Outcome
+
+    def table(self) -> pd.DataFrame:
+        """I* [A], q* [W] and the closed form of every module."""
+        return pd.DataFrame({"I* [A]": self.current, "q* [W]": self.load, "closed form I* [A]": self.closed_form})
+
+    def __str__(self) -> str:
+        return self.table().round(3).to_string()
+
+    def plot(self) -> Any:
+        """Plot the load curve with its fold; returns the matplotlib axes."""
+        ax = self.curve.plot()
+        for name, current in self.current.items():
+            ax.plot(current, self.load[name], "ko")
+            ax.annotate(f"  {current:.3g} A, {self.load[name]:.3g} W", (current, self.load[name]))
+        return ax
+
+
+def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[str, float] | None = None) -> Runaway:
+    """Find the current and load at which modules that hold their cold face run away.
+
+    Parameters
+    ----------
+    system : System
+        With its modules; those not named are off.
+    setpoint : mapping
+        {module: temperature of its cold face} [K].
+    ambient : mapping, optional
+        Ambient temperatures [K]; default nominal.
+
+    Returns
+    -------
+    Runaway
+
+    Raises
+    ------
+    InputError
+        Unknown modules, Celsius.
+
+    References
+    ----------
+    Errata of Evers (2021), "Thermal runaway: what the thesis lacks".
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> limit = rt.certify.runaway(rt.systems.two_module(), setpoint={"m1": 278.15, "m2": 278.15})
+    >>> round(limit.load["m1"], 2)
+    3.75
+    """
+    curve = fold(system, setpoint, ambient=ambient)
+    current = dict(zip(setpoint, curve.current[-1].tolist(), strict=True))
+    load = dict(zip(setpoint, curve.load[-1].tolist(), strict=True))
+    numbers = {name: _constants(curve, i, name) for i, name in enumerate(setpoint)}
+    closed = {name: smallest_root(n) for name, n in numbers.items()}
+    certificates = {name: _certify(system, name, n, closed[name]) for name, n in numbers.items() if n["sink_conductance"] > 0}
+    worst = max(abs(closed[name] / current[name] - 1) for name in setpoint)
+    sloped = any(m.seebeck.slope or m.resistance.slope or m.conductance.slope for m in system.modules.values())
+    why = " (their S, R, K vary with temperature, the closed form's do not)" if sloped else ""
+    return Runaway(current, load, closed, curve, certificates, Outcome(
+        True, "found", f"The network's fold and the closed form differ by at most {100 * worst:.2g} %{why}."))
+
+
+def _constants(curve: LoadCurve, i: int, name: str) -> dict[str, float]:
+    """Constants of the closed form at the fold: S, R, K at T_avg and the effective heat sink of one module.
+
+    The sink is the line through the hot face's temperature and rejected heat at rest and at the fold.
+    """
+    module = curve.system.modules[name]
+    hot = curve.temperatures[:, curve.system.lump_names.index(module.hot)]
+    cold = curve.setpoint[name]
+    dT = 0.5 * (hot + cold) - module.reference_temperature
+    S, R, K = (getattr(module, key).value + getattr(module, key).slope * dT for key in
+               ("seebeck", "resistance", "conductance"))
+    current = curve.current[:, i]
+    rejected = curve.load[:, i] + R * current**2 + S * (hot - cold) * current
+    g = (rejected[-1] - rejected[0]) / (hot[-1] - hot[0])
+    w = hot[-1] - rejected[-1] / g
+    return {"seebeck": float(S[-1]), "resistance": float(R[-1]), "conductance": float(K[-1]),
+            "sink_conductance": float(g), "sink_temperature": float(w), "setpoint": float(cold)}
+
+
+def smallest_root(n: Mapping[str, float]) -> float:
+    """Smallest positive root I* of the cubic of the errata [A]; nan if there is none."""
+    S, R, K = n["seebeck"], n["resistance"], n["conductance"]
+    g, w, x = n["sink_conductance"], n["sink_temperature"], n["setpoint"]
+    roots = np.roots([-2 * R * S**2, S * (5 * K * R + 4 * g * R + 2 * S**2 * x),
+                      -2 * (K + g) * (2 * K * R + g * R + 2 * S**2 * x), 2 * g * S * ((g + 2 * K) * x - K * w)])
+    real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
+    return float(real.min(initial=np.inf)) if real.size else float("nan")
+
+
+def load_at(n: Mapping[str, float], current: float) -> float:
+    """Load q(I) of the closed form [W]."""
+    S, R, K = n["seebeck"], n["resistance"], n["conductance"]
+    g, w, x, I = n["sink_conductance"], n["sink_temperature"], n["setpoint"], current  # noqa: E741 - I is the current
+    top = g * K * (x - w) + g * S * x * I - (g * R / 2 + K * R + S**2 * x) * I**2 + S * R * I**3 / 2
+    return top / (g + K - S * I)
+
+
+def _certify(system: System, name: str, numbers: dict[str, float], current: float) -> Certificate:
+    load = load_at(numbers, current)
+    width, spread = 1e-6 * current, 1e-6 * max(abs(load), 1.0)
+    return establish("runaway", system={"name": f"{system.name}, module {name}", **numbers}, region={},
+                     evidence={"current": [current - width, current + width], "load": [load - spread, load + spread]},
+                     made_by=made_by("numpy.roots", "found"))

@@ -1,0 +1,106 @@
+"""Sections of a certificate file from a system and a box; refuses boxes that do not fit the system."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..thermal import System
+
+Interval = tuple[float, float]
+Currents = Mapping[str, Interval]
+Temperatures = Interval | Mapping[str, Interval]
+
+
+def system_section(system: System) -> dict[str, Any]:
+    """Every number of a thermal network that a claim depends on, kelvin."""
+    if not isinstance(system, System):
+        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
+                         remedy="Read one with rt.read_system(path).")
+    return {"name": system.name,
+            "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
+            "ambients": list(system.ambients),
+            "links": [_link(link) for link in system.links],
+            "modules": {name: _module(module) for name, module in system.modules.items()}}
+
+
+def _link(link: Any) -> dict[str, Any]:
+    section: dict[str, Any] = {"name": link.name, "between": list(link.between), "conductance": link.conductance}
+    if link.natural is not None:
+        section["natural"] = {"gain": link.natural.gain, "exponent": link.natural.exponent}
+    if link.radiation is not None:
+        section["radiation"] = link.radiation
+    return section
+
+
+def _module(module: Any) -> dict[str, Any]:
+    properties = {key: {"value": getattr(module, key).value, "slope": getattr(module, key).slope}
+                  for key in ("seebeck", "resistance", "conductance")}
+    return {"hot": module.hot, "cold": module.cold, **properties, "reference_temperature": module.reference_temperature}
+
+
+def region_section(system: System, current: Currents, temperature: Temperatures) -> dict[str, Any]:
+    """Temperature and current box, checked against the system."""
+    return {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
+
+
+def temperature_box(system: System, temperature: Temperatures) -> Any:
+    """[lo, hi] or {lump: [lo, hi]}, kelvin."""
+    if isinstance(temperature, Mapping):
+        _same_names(temperature, system.lump_names, "argument temperature", "lump")
+        return {name: _interval(temperature[name], f"argument temperature[{name!r}]", kelvin=True)
+                for name in system.lump_names}
+    return _interval(temperature, "argument temperature", kelvin=True)
+
+
+def current_box(system: System, current: Currents) -> dict[str, list[float]]:
+    """{module: [lo, hi]} [A], every module named."""
+    if not isinstance(current, Mapping):
+        raise InputError(f"current is a {type(current).__name__}", where="argument current",
+                         expected='a mapping {"m1": (lo, hi), …} with every module')
+    _same_names(current, system.module_names, "argument current", "module")
+    return {name: _interval(current[name], f"argument current[{name!r}]") for name in system.module_names}
+
+
+def named_ranges(values: Mapping[str, Interval], names: tuple[str, ...], argument: str, kind: str,
+                 kelvin: bool = False) -> dict[str, list[float]]:
+    """Checked intervals of some of the names."""
+    unknown = [name for name in values if name not in names]
+    if unknown:
+        raise InputError(f"there is no {kind} {unknown[0]!r}", where=f"argument {argument}",
+                         expected="one of " + ", ".join(names))
+    return {name: _interval(pair, f"argument {argument}[{name!r}]", kelvin=kelvin) for name, pair in values.items()}
+
+
+def _same_names(given: Iterable[str], names: tuple[str, ...], where: str, kind: str) -> None:
+    given = list(given)
+    missing, unknown = [n for n in names if n not in given], [n for n in given if n not in names]
+    if unknown:
+        raise InputError(f"there is no {kind} {unknown[0]!r}", where=where, expected="one of " + ", ".join(names))
+    if missing:
+        raise InputError(f"{kind} {missing[0]!r} has no range", where=where, expected=f"a range for every {kind}",
+                         remedy=f'Add "{missing[0]}": (lower, upper); (0, 0) says that it is never used.')
+
+
+def _interval(pair: Any, where: str, kelvin: bool = False) -> list[float]:
+    try:
+        low, high = (float(value) for value in pair)
+    except (TypeError, ValueError):
+        raise InputError(f"{pair!r}", where=where, expected="a pair of numbers (lower, upper)") from None
+    if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+        raise InputError(f"({low}, {high})", where=where, expected="finite numbers, lower <= upper")
+    if kelvin and low < 150.0:
+        raise InputError(f"{low} K is below 150 K: it looks like degrees Celsius", where=where, expected="kelvin",
+                         remedy="Add 273.15.")
+    return [low, high]
+
+
+def made_by(solver: str, status: str) -> dict[str, str]:
+    """Versions, solver and its status: for the record, never as evidence."""
+    return {"robthermal": version("robthermal"), "python": platform.python_version(), "numpy": np.__version__,
+            "solver": solver, "status": status}

@@ -1,0 +1,12 @@
+"""Frequency responses from records that never reached steady state, with a covariance that can be believed."""
+
+from ._bla import bla as bla
+from ._closed_loop import closed_loop as closed_loop
+from ._etfe import etfe as etfe
+from ._lpm import lpm as lpm
+from ._lrm import lrm as lrm
+from ._lrmp import lrmp as lrmp
+from ._response import FrequencyResponse as FrequencyResponse
+from ._spectral import spectral as spectral
+
+__all__ = ["FrequencyResponse", "bla", "closed_loop", "etfe", "lpm", "lrm", "lrmp", "spectral"]

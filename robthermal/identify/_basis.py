@@ -1,0 +1,62 @@
+"""Local basis of the plant and of the transient: polynomials, or rational functions with prescribed poles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class LocalBasis:
+    """Functions of the offset r [bins] from the centre k of a window, 1 at r = 0 for the first, 0 there for the others.
+
+    Without poles, (r/l)^s for s = 0 ... degree: the local polynomial method, Evers (3.16).
+    With n poles, x^s D(k)/D(k+r), s = 0 ... n, with x proportional to exp(j r delta) - 1, D(k) = prod(z_k - gamma_i),
+    z_k = exp(j k delta). These span the constant and the n functions with poles gamma_i, hence the same space as
+    (4.23) with the constant added, but stay well conditioned far from the poles, where (4.23) is nearly collinear.
+    In z, not in omega, because under zero-order hold response and transient are rational in z, Evers (4.5)-(4.6).
+    """
+
+    half_width: int
+    degree: int
+    n_samples: int  # of the record whose bins are the frequency grid
+    poles: Array = field(default_factory=lambda: np.empty(0, dtype=complex))  # p T_s, dimensionless: gamma = exp(p T_s)
+
+    @property
+    def n_points(self) -> int:
+        return 2 * self.half_width + 1
+
+    @property
+    def size(self) -> int:
+        return self.degree + 1
+
+    @property
+    def step(self) -> float:
+        """Angle between neighbouring bins [rad]."""
+        return 2.0 * np.pi / self.n_samples
+
+    def powers(self, offsets: Array) -> Array:
+        """Powers of the local variable at `offsets` [bins], of shape (*offsets.shape, degree+1)."""
+        if self.poles.size:
+            x = np.expm1(1j * self.step * offsets) / (self.step * self.half_width)
+        else:
+            x = offsets / self.half_width
+        return np.stack([x**s for s in range(self.size)], axis=-1)
+
+    def weights(self, bins: Array, offsets: Array) -> Array:
+        """D(k)/D(k+r), with `bins` (B,) counted from 1 and `offsets` (B, m) or (m,); ones when there are no poles."""
+        bins = np.asarray(bins, dtype=float)[:, None]
+        weights = np.ones(np.broadcast_shapes(bins.shape, offsets.shape), dtype=complex)
+        for pole in self.poles:  # z - gamma = gamma expm1(j theta - p T_s): no cancellation for slow poles at low bins
+            weights *= np.expm1(1j * self.step * bins - pole) / np.expm1(1j * self.step * (bins + offsets) - pole)
+        return weights
+
+
+def window_starts(bins: Array, n_bins: int, n_points: int) -> Array:
+    """First bin (from 1) of each window: centred, shifted at the edges, never wrapped over bin 0 or Nyquist."""
+    return np.clip(bins - n_points // 2, 1, n_bins - n_points + 1)

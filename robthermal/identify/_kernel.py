@@ -1,0 +1,171 @@
+"""Interior windows of equal records, many at a time: modified Gram-Schmidt with the bins along the last axis.
+
+The columns of every window are [transient | U x^R ... U x^1 | U x^0 | Y]. After orthogonalisation, G and its block of
+(K^H K)^-1 follow from the last n_u columns alone, and what is left of Y is the residual: no Q, no solution with the
+whole triangle, and no normal equations, whose squared condition number would spoil the residual of clean data.
+For polynomials the transient is removed by one constant matrix, the orthonormal complement of the powers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from ._basis import LocalBasis
+from ._records import Spectrum
+
+Array = NDArray[Any]
+
+_DOUBTFUL = 1e-14  # remaining energy of a regressor relative to its input; below it `_windows` decides the rank
+
+
+@dataclass(frozen=True)
+class ChunkFit:
+    """Results of consecutive interior bins; `noise` holds the diagonal (n_y, B) or the matrix (n_y, n_y, B)."""
+
+    response: Array
+    gram: Array
+    noise: Array
+    doubtful: Array  # (B,) bool: to be solved again with a rank decision
+
+
+class Kernel:
+    """Solver of chunks of interior windows for one set of spectra and one basis."""
+
+    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis):
+        self.spectra, self.basis = spectra, basis
+        self.n_u, self.n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
+        offsets = np.arange(-basis.half_width, basis.half_width + 1.0)
+        self.powers = basis.powers(offsets)  # (m, R+1)
+        self.degrees_of_freedom = len(spectra) * (basis.n_points - basis.size) - self.n_u * basis.size
+        if not basis.poles.size:
+            complement = np.linalg.qr(self.powers, mode="complete")[0][:, basis.size :].T
+            descending = self.powers.T[::-1, None, :]
+            self.project_input = (complement * descending).reshape(-1, basis.n_points)
+            self.project_output = np.ascontiguousarray(complement)
+
+    def solve(self, start: int, stop: int, *, full_noise: bool) -> ChunkFit:
+        """Windows centred at bins start ... stop-1, counted from 1; all of them must fit between the edges."""
+        columns = self._rational(start, stop) if self.basis.poles.size else self._polynomial(start, stop)
+        energy = self._input_energy(start, stop)
+        return self._orthogonalise(columns, energy, full_noise=full_noise)
+
+    def _slices(self, start: int, stop: int) -> slice:
+        return slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
+
+    def _polynomial(self, start: int, stop: int) -> Array:
+        """Columns with the transient projected out, (n_columns, rows, B)."""
+        size, n_u, n_y, m = self.basis.size, self.n_u, self.n_y, self.basis.n_points
+        part, width, rows = self._slices(start, stop), stop - start, m - self.basis.size
+        columns = np.empty((size * n_u + n_y, len(self.spectra) * rows, width), dtype=complex)
+        for place, spectrum in enumerate(self.spectra):
+            mine = slice(place * rows, (place + 1) * rows)
+            for i in range(n_u):
+                made = self.project_input @ _windows(spectrum.U[i, part], m)
+                columns[i : size * n_u : n_u, mine] = made.view(complex).reshape(size, rows, width)
+            for o in range(n_y):
+                columns[size * n_u + o, mine] = (self.project_output @ _windows(spectrum.Y[o, part], m)).view(complex)
+        return columns
+
+    def _rational(self, start: int, stop: int) -> Array:
+        """The same with prescribed poles: the transient functions differ between bins and are orthogonalised first."""
+        size, n_u, n_y, m = self.basis.size, self.n_u, self.n_y, self.basis.n_points
+        part, width = self._slices(start, stop), stop - start
+        row_weights = self._row_weights(start, stop)
+        functions = self.powers.T[:, :, None] * row_weights
+        descending = functions[::-1].copy()
+        for s in range(size):
+            _remove(functions[s], functions[s + 1 :], np.zeros(width))
+        columns = np.empty((size * n_u + n_y, len(self.spectra) * m, width), dtype=complex)
+        for place, spectrum in enumerate(self.spectra):
+            mine = slice(place * m, (place + 1) * m)
+            for i in range(n_u):
+                columns[i : size * n_u : n_u, mine] = descending * _windows(spectrum.U[i, part], m).view(complex)
+            for o in range(n_y):
+                columns[size * n_u + o, mine] = _windows(spectrum.Y[o, part], m).view(complex)
+            for s in range(size):
+                coefficients = np.multiply(functions[s].conj(), columns[:, mine]).sum(axis=1)
+                columns[:, mine] -= functions[s] * coefficients[:, None]
+        return columns
+
+    def _row_weights(self, start: int, stop: int) -> Array:
+        """D(k)/D(k+r) as (m, B)."""
+        bins = np.arange(start, stop, dtype=float)
+        offsets = np.arange(-self.basis.half_width, self.basis.half_width + 1.0)
+        return np.ascontiguousarray(self.basis.weights(bins, offsets).T)
+
+    def _input_energy(self, start: int, stop: int) -> Array:
+        """Energy of each input in each window, all records together, (n_u, B)."""
+        part, m = self._slices(start, stop), self.basis.n_points
+        energy = np.zeros((self.n_u, stop - start))
+        for spectrum in self.spectra:
+            U = spectrum.U[:, part]
+            power = U.real**2 + U.imag**2
+            for shift in range(m):
+                energy += power[:, shift : shift + stop - start]
+        return energy
+
+    def _orthogonalise(self, columns: Array, energy: Array, *, full_noise: bool) -> ChunkFit:
+        size, n_u, width = self.basis.size, self.n_u, columns.shape[2]
+        n_k = size * n_u
+        doubtful = np.zeros(width, dtype=bool)
+        triangle = np.empty((n_u, columns.shape[0], width), dtype=complex)  # rows of R that belong to U x^0
+        for c in range(n_k):
+            norms, coefficients = _remove(columns[c], columns[c + 1 :], _DOUBTFUL * energy[c % n_u])
+            doubtful |= norms == 0.0
+            if c >= n_k - n_u:
+                triangle[c - n_k + n_u, c] = norms
+                triangle[c - n_k + n_u, c + 1 :] = coefficients
+        inverse = _invert_triangle(triangle[:, n_k - n_u : n_k])
+        response = np.einsum("ijb,job->oib", inverse, triangle[:, n_k:])
+        gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
+        residual = columns[n_k:]
+        if full_noise:
+            noise = np.stack([np.multiply(residual, row.conj()).sum(axis=1) for row in residual], axis=1)
+        else:
+            noise = (residual.real**2 + residual.imag**2).sum(axis=1)
+        return ChunkFit(response, gram, noise / self.degrees_of_freedom, doubtful)
+
+
+def _windows(spectrum: Array, m: int) -> Array:
+    """Row r holds the bins shifted by r, as pairs of real numbers: (m, 2B)."""
+    return np.ascontiguousarray(sliding_window_view(spectrum, spectrum.size - m + 1)).view(float)
+
+
+def _remove(column: Array, others: Array, floor: Array) -> tuple[Array, Array]:
+    """Normalise `column` (rows, B) and remove it from `others` (n, rows, B), both in place.
+
+    Returns the norms (B,), zero where the energy is not above `floor` (nothing is removed there), and the
+    coefficients (n, B).
+    """
+    square = (column.real**2 + column.imag**2).sum(axis=0)
+    norms = np.sqrt(np.where(square > floor, square, 0.0))
+    column *= np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
+    conjugate = column.conj()
+    coefficients = np.empty((others.shape[0], column.shape[1]), dtype=complex)
+    work = np.empty_like(column)
+    for place, other in enumerate(others):
+        np.multiply(conjugate, other, out=work)
+        np.add.reduce(work, axis=0, out=coefficients[place])
+        np.multiply(column, coefficients[place], out=work)
+        other -= work
+    return norms, coefficients
+
+
+def _invert_triangle(triangle: Array) -> Array:
+    """Inverse of upper triangles (n, n, B); zero diagonal entries give zeros, their bins are solved again."""
+    n = triangle.shape[0]
+    inverse = np.zeros_like(triangle)
+    for j in range(n):
+        inverse[j, j] = np.divide(1.0, triangle[j, j], out=np.zeros_like(triangle[j, j]), where=triangle[j, j] != 0.0)
+        for i in range(j - 1, -1, -1):
+            total = sum(triangle[i, k] * inverse[k, j] for k in range(i + 1, j + 1))
+            inverse[i, j] = -total * np.divide(
+                1.0, triangle[i, i], out=np.zeros_like(triangle[i, i]), where=triangle[i, i] != 0.0
+            )
+    return inverse

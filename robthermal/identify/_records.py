@@ -1,0 +1,147 @@
+"""What every estimator asks of its records before any arithmetic, and the spectra it works on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from robthermal.errors import InputError
+from robthermal.signals import Record
+
+Array = NDArray[Any]
+
+_SILENT = 1e-12  # standard deviation relative to the largest value, below which a signal is constant to rounding
+_LINE_SILENT = 1e3  # a bin is excited when it exceeds this many times the rounding error of its signal
+_COPIES = 1e-12  # squared relative distance below which inputs are linear combinations of each other
+
+
+def as_records(records: Any) -> tuple[Record, ...]:
+    """One record or a sequence of records as a tuple whose channels and sample time agree."""
+    if isinstance(records, Record):
+        found: tuple[Any, ...] = (records,)
+    elif isinstance(records, (list, tuple)):
+        found = tuple(records)
+    else:
+        raise _not_a_record(records, "records")
+    if not found:
+        raise InputError("the list of records is empty", where="records", expected="at least one rt.Record")
+    for place, record in enumerate(found):
+        if not isinstance(record, Record):
+            raise _not_a_record(record, f"records[{place}]")
+        _check_alike(found[0], record, place)
+    for names, kind in ((found[0].input_names, "input"), (found[0].output_names, "output")):
+        if not names:
+            raise InputError(
+                f"the record has no {kind}", where=f"{kind}s", remedy=f"A frequency response needs at least one {kind}."
+            )
+    return found
+
+
+def _not_a_record(value: Any, where: str) -> InputError:
+    return InputError(
+        f"got {type(value).__name__}",
+        where=where,
+        expected="an rt.Record, or a list of them",
+        remedy="Build one with rt.Record(sample_time=, inputs=, outputs=, input_names=, output_names=).",
+    )
+
+
+def _check_alike(first: Record, record: Record, place: int) -> None:
+    if abs(record.sample_time - first.sample_time) > 1e-9 * first.sample_time:
+        raise InputError(
+            f"sample_time is {record.sample_time!r} s, that of records[0] is {first.sample_time!r} s",
+            where=f"records[{place}]",
+            expected="one sample time in all records",
+            remedy="Resample one of them first.",
+        )
+    for kind in ("input_names", "output_names"):
+        mine, theirs = list(getattr(record, kind)), list(getattr(first, kind))
+        if mine != theirs:
+            raise InputError(
+                f"{kind} are {mine}, those of records[0] are {theirs}",
+                where=f"records[{place}]",
+                expected="the same channels in the same order in all records",
+                remedy="Use record.select(inputs=[...], outputs=[...]).",
+            )
+
+
+def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: str = "inputs") -> None:
+    """Refuse signals (each (n, n_u), one per experiment) that are constant, or combinations of each other."""
+    for i, name in enumerate(names):
+        columns = [signal[:, i] for signal in signals]
+        if all(_is_constant(column) for column in columns):
+            raise InputError(
+                f"{name!r} is constant ({columns[0][0]:g} throughout): it does not excite the system",
+                where=where,
+                expected="a signal that varies in at least one record",
+                remedy="Excite it (multisine, noise, staircase), or leave it out with record.select(inputs=[...]).",
+            )
+    gram = np.zeros((len(names), len(names)))
+    for signal in signals:
+        centred = signal - signal.mean(axis=0)
+        gram += centred.T @ centred
+    scale = np.sqrt(np.diag(gram))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    if values[0] < _COPIES:
+        # The null vector names the inputs that take part in the combination.
+        involved = [name for name, part in zip(names, vectors[:, 0], strict=True) if abs(part) > 1e-3]
+        raise InputError(
+            f"{', '.join(map(repr, involved))} are copies or linear combinations of each other at all frequencies",
+            where=where,
+            expected="inputs that vary independently",
+            remedy="Excite them with different phases, or in separate records passed as a list.",
+        )
+
+
+def _is_constant(column: Array) -> bool:
+    return bool(column.std() <= _SILENT * np.abs(column).max())
+
+
+def whole_number(value: Any, name: str, *, least: int) -> int:
+    """`value` as an int not below `least`; fractions, text, NaN and booleans are refused by name."""
+    wrong = isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating))
+    if wrong or not np.isfinite(value) or value != int(value) or value < least:
+        raise InputError(f"{name} is {value!r}", where=name, expected=f"a whole number of at least {least}")
+    return int(value)
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """DFT of one record, normalised by 1/sqrt(N), bins 1 ... (N-1)//2: Evers (4.2). Bin 0 and Nyquist are left out."""
+
+    U: Array  # (n_u, F)
+    Y: Array  # (n_y, F)
+    n_samples: int
+
+    @property
+    def n_bins(self) -> int:
+        return int(self.U.shape[1])
+
+
+def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
+    """Spectra of the deviations from the mean; input bins that hold rounding errors only are set to exactly zero."""
+    U, Y = _half_spectrum(inputs), _half_spectrum(outputs)
+    for row, level in zip(U, rounding_level(inputs), strict=True):
+        row[np.abs(row) <= level] = 0.0
+    return Spectrum(U=U, Y=Y, n_samples=inputs.shape[0])
+
+
+def rounding_level(signals: Array) -> Array:
+    """Size of a spectral line, per channel of `signals` (n, channels), that may be nothing but rounding."""
+    largest = np.maximum(signals.max(axis=0), -signals.min(axis=0))
+    return np.asarray(_LINE_SILENT * np.finfo(float).eps * largest)
+
+
+def _half_spectrum(signals: Array) -> Array:
+    n, channels = signals.shape
+    bins = (n - 1) // 2
+    half = np.empty((channels, bins), dtype=complex)
+    for c in range(channels):  # channel by channel: a record of ten million samples must not be copied whole
+        column = signals[:, c]
+        half[c] = fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
+    return half

@@ -1,0 +1,147 @@
+"""Frequency responses on disk: JSON for people, .mat for MATLAB, .npz for speed. Nothing is pickled."""
+
+from __future__ import annotations
+
+import json
+import math
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import io
+
+from robthermal.errors import InputError
+
+if TYPE_CHECKING:
+    from ._response import FrequencyResponse
+
+FORMAT = "robthermal frequency response 1"
+
+_ARRAYS = (
+    "frequencies",
+    "response",
+    "covariance",
+    "noise_covariance",
+    "degrees_of_freedom",
+    "transient",
+    "coherence",
+    "suspect",
+    "ratio_uncertainty",
+)
+_LISTS = ("input_names", "output_names", "notes")
+_SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
+_SUFFIXES = (".json", ".mat", ".npz")
+
+
+def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
+    """Write `result`; the suffix of `path` chooses the format."""
+    path = _checked(path)
+    arrays = {name: getattr(result, name) for name in _ARRAYS if getattr(result, name) is not None}
+    texts = {name: list(getattr(result, name)) for name in _LISTS}
+    scalars = {name: getattr(result, name) for name in _SCALARS}
+    if path.suffix == ".json":
+        content = {"format": FORMAT, **scalars, **texts, **{name: _to_json(a) for name, a in arrays.items()}}
+        path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
+    elif path.suffix == ".npz":
+        lists = {name: np.array(value, dtype=str) for name, value in texts.items()}
+        np.savez_compressed(path, allow_pickle=False, format=FORMAT, **scalars, **lists, **arrays)
+    else:
+        cells = {name: np.array(value, dtype=object) for name, value in texts.items()}
+        io.savemat(path, {"format": FORMAT, **scalars, **cells, **arrays}, long_field_names=True)
+
+
+def load(path: str | PathLike[str]) -> dict[str, Any]:
+    """Arguments for `FrequencyResponse` from a file that `save` wrote."""
+    path = _checked(path)
+    if not path.is_file():
+        raise InputError(f"no such file: {path}", where="path")
+    try:
+        content = {".json": _read_json, ".npz": _read_npz, ".mat": _read_mat}[path.suffix](path)
+    except (ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError) as error:
+        raise InputError(
+            f"cannot be read: {error}", where=str(path), expected="a file written by FrequencyResponse.save"
+        ) from error
+    if content.get("format") != FORMAT:
+        raise InputError(
+            f"its format is {content.get('format')!r}", where=str(path), expected=f"{FORMAT!r}, as save writes it"
+        )
+    missing = [name for name in (*_ARRAYS[:5], *_LISTS, *_SCALARS) if name not in content]
+    if missing:
+        raise InputError(f"lacks {', '.join(missing)}", where=str(path), remedy="Write it again with save.")
+    arguments = {name: content[name] for name in _ARRAYS if name in content}
+    arguments |= {name: [str(text) for text in content[name]] for name in _LISTS}
+    return arguments | {name: kind(content[name]) for name, kind in _SCALARS.items()}
+
+
+def _checked(path: str | PathLike[str]) -> Path:
+    path = Path(path)
+    if path.suffix not in _SUFFIXES:
+        raise InputError(f"the suffix is {path.suffix!r}", where="path", expected=f"one of {', '.join(_SUFFIXES)}")
+    return path
+
+
+def _to_json(array: NDArray[Any]) -> dict[str, Any]:
+    """Shape and flat lists; complex as two lists; NaN and infinities as text, which JSON has no numbers for."""
+    coded: dict[str, Any] = {"shape": list(array.shape)}
+    if np.iscomplexobj(array):
+        return coded | {"real": _numbers(array.real), "imag": _numbers(array.imag)}
+    return coded | {"values": _numbers(array) if array.dtype.kind == "f" else array.ravel().tolist()}
+
+
+def _numbers(array: NDArray[Any]) -> list[Any]:
+    return [x if math.isfinite(x) else repr(x) for x in array.ravel().tolist()]
+
+
+def _from_json(coded: Any) -> NDArray[Any]:
+    if "real" in coded:
+        real, imag = (np.array([float(x) for x in coded[part]]) for part in ("real", "imag"))
+        flat = np.empty(real.size, dtype=complex)  # not real + 1j*imag: that turns an infinity into NaN
+        flat.real, flat.imag = real, imag
+    else:
+        values = coded["values"]
+        flat = np.array([float(x) if isinstance(x, str) else x for x in values])
+    return flat.reshape(coded["shape"])
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    content = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(content, dict):
+        raise ValueError("no table of names and values")
+    return {name: _from_json(value) if name in _ARRAYS else value for name, value in content.items()}
+
+
+def _read_npz(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as stored:
+        content = {name: stored[name] for name in stored.files}
+    return {name: value[()] if value.ndim == 0 else value for name, value in content.items()}
+
+
+def _read_mat(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = {}
+    for name, value in io.loadmat(path, chars_as_strings=True).items():
+        if name in _LISTS:
+            content[name] = [str(cell.item()) if cell.size else "" for cell in value.ravel()]
+        elif name in _SCALARS or name == "format":
+            content[name] = value.item()
+        elif name in _ARRAYS:
+            content[name] = value
+    return _without_matlab_padding(content)
+
+
+def _without_matlab_padding(content: dict[str, Any]) -> dict[str, Any]:
+    """MATLAB has no vectors and drops trailing axes of one: the lengths of the names restore the shapes."""
+    n_f, n_y, n_u = content["frequencies"].size, len(content["output_names"]), len(content["input_names"])
+    shapes = {
+        "frequencies": (n_f,),
+        "degrees_of_freedom": (n_f,),
+        "suspect": (n_f,),
+        "response": (n_y, n_u, n_f),
+        "ratio_uncertainty": (n_y, n_u, n_f),
+        "covariance": (n_y * n_u, n_y * n_u, n_f),
+        "noise_covariance": (n_y, n_y, n_f),
+        "transient": (n_y, n_f),
+        "coherence": (n_y, n_f),
+    }
+    return {name: value.reshape(shapes[name]) if name in shapes else value for name, value in content.items()}

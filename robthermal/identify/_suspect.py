@@ -1,0 +1,59 @@
+"""Bins whose residual is larger than the noise of neighbouring bins explains: the local model does not fit there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[Any]
+
+_LEVEL = 2e-3  # chance of a false alarm in one output of one bin, before the estimation error of the reference
+_REACH = 6  # width of the reference on either side, in half widths
+
+
+def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int) -> Array:
+    """Compare each noise variance (n_y, F) with the median of the bins next to its window, left and right.
+
+    The lower of the two medians counts, so that a hump between quiet neighbours (a resonance narrower than the window,
+    the slowest pole near bin 0) is found, while a slope of the noise spectrum is not. Bins share data within
+    2 half_width, hence the gap. The reference has an error of its own, which the threshold allows for.
+    """
+    n_y, n_f = variance.shape
+    gap, reach = 2 * half_width + 1, _REACH * max(half_width, 1)
+    if n_f < gap + reach:
+        gap, reach = min(gap, n_f // 2), max(1, n_f // 4)
+    q = np.maximum(degrees_of_freedom, 1)
+    found = np.zeros(n_f, dtype=bool)
+    # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
+    independent = max(2.0, 1.5 * reach / gap)
+    threshold = {int(v): stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in np.unique(q)}
+    limit = np.vectorize(threshold.__getitem__, otypes=[float])(q)
+    for row in variance:
+        found |= row > limit * _reference(row / _median_ratio(q), gap, reach)
+    return found
+
+
+def _median_ratio(q: Array) -> Array:
+    """Median over mean of chi-square with 2q degrees of freedom (Wilson and Hilferty)."""
+    return (1.0 - 1.0 / (9.0 * q)) ** 3
+
+
+def _reference(row: Array, gap: int, reach: int) -> Array:
+    """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
+    n = row.size
+    medians = np.full(n, np.inf)
+    view, step = sliding_window_view(row, reach), 2**16
+    for first in range(0, view.shape[0], step):  # a part at a time: medians sort copies
+        part = view[first : first + step]
+        medians[first : first + part.shape[0]] = np.median(part, axis=1)
+    place = np.arange(n)
+    right, left = place + gap, place - gap - reach + 1
+    # Near the ends the reference moves inwards instead of vanishing.
+    on_right = np.where(right <= n - reach, medians[np.minimum(right, n - reach)], np.inf)
+    on_left = np.where(left >= 0, medians[np.maximum(left, 0)], np.inf)
+    lower = np.minimum(on_right, on_left)
+    return np.where(np.isfinite(lower), lower, np.median(row))

@@ -1,0 +1,166 @@
+"""What a record refuses: every message names the argument, the channel, the row and the time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def finite_number(value: object, where: str, unit: str = "") -> float:
+    """`value` as a finite float; booleans, text, complex numbers, NaN and infinity are refused."""
+    expected = f"a finite number{f' [{unit}]' if unit else ''}"
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.integer, np.floating)):
+        raise InputError(f"{where} is {value!r}, not a number", where=f"argument {where}", expected=expected)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{where} is {number}, not finite", where=f"argument {where}", expected=expected)
+    return number
+
+
+def positive_number(value: object, where: str, unit: str = "") -> float:
+    """`value` as a finite float above zero."""
+    number = finite_number(value, where, unit)
+    if number <= 0.0:
+        raise InputError(
+            f"{where} is {number!r}",
+            where=f"argument {where}",
+            expected=f"a positive number{f' [{unit}]' if unit else ''}",
+        )
+    return number
+
+
+def channel_names(value: object, where: str) -> tuple[str, ...]:
+    """`value` as a tuple of non-empty texts, none twice."""
+    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
+        raise InputError(
+            f"{where} is {value!r}", where=f"argument {where}", expected="a list of channel names", remedy="Write ['T1']."
+        )
+    names = []
+    for place, name in enumerate(value):
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(
+                f"name {place} is {name!r}", where=f"argument {where}", expected="names that are non-empty text"
+            )
+        if name in names:
+            raise InputError(f"the name {name!r} is used twice", where=f"argument {where}", expected="names used once")
+        names.append(str(name))
+    return tuple(names)
+
+
+def distinct(input_names: Sequence[str], output_names: Sequence[str]) -> None:
+    """Refuse a name that stands for an input and an output."""
+    for name in output_names:
+        if name in input_names:
+            raise InputError(
+                f"the name {name!r} is used twice, for an input and for an output",
+                where="argument output_names",
+                expected="every name once among inputs and outputs",
+                remedy="Rename one of the two.",
+            )
+
+
+def channel_units(value: object, names: Sequence[str]) -> dict[str, str]:
+    """`value` as a dictionary from channel name to unit text."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise InputError(f"units is {value!r}", where="argument units", expected="a mapping from channel name to text")
+    for name, unit in value.items():
+        if name not in names:
+            raise InputError(
+                f"there is no channel {name!r}", where="argument units", expected=f"some of {', '.join(names)}"
+            )
+        if not isinstance(unit, str):
+            raise InputError(f"the unit of {name!r} is {unit!r}", where="argument units", expected="text such as 'K'")
+    return dict(value)
+
+
+def channel_matrix(value: ArrayLike, names: Sequence[str], where: str, sample_time: float, start_time: float) -> Array:
+    """`value` as a read-only (n, channels) copy of finite floats, columns named by `names`."""
+    matrix = _two_dimensional(_real_numbers(value, where), where)
+    if matrix.shape[1] != len(names):
+        singular = where.removesuffix("s")
+        raise InputError(
+            f"{where} has {matrix.shape[1]} columns and {singular}_names has {len(names)} names",
+            where=f"argument {where}",
+            expected=f"one column per name, an array of shape (n_samples, {len(names)})",
+            remedy="Transpose it: time runs down." if matrix.shape[0] == len(names) != matrix.shape[1] else "",
+        )
+    wrong = np.argwhere(~np.isfinite(matrix))
+    if wrong.size:
+        row, column = (int(i) for i in wrong[0])
+        raise InputError(
+            f"channel {names[column]!r} is {matrix[row, column]} (not finite) in row {row}, "
+            f"time {start_time + row * sample_time:.10g} s"
+            + (f"; {len(wrong)} such values in all" if len(wrong) > 1 else ""),
+            where=f"argument {where}",
+            expected="finite numbers",
+            remedy="Cut the record there, or repair the data.",
+        )
+    matrix.setflags(write=False)
+    return matrix
+
+
+def _two_dimensional(array: Array, where: str) -> Array:
+    if array.ndim == 1:
+        return array[:, np.newaxis]
+    if array.ndim != 2:
+        raise InputError(
+            f"{where} has shape {array.shape}", where=f"argument {where}", expected="an array (n_samples, channels)"
+        )
+    return array
+
+
+def _real_numbers(value: ArrayLike, where: str) -> Array:
+    """A fresh C-contiguous float copy; text, booleans, complex numbers and dates are refused."""
+    expected = "real numbers, an array (n_samples, channels)"
+    if np.ma.isMaskedArray(value) and np.ma.is_masked(value):
+        row = int(np.argwhere(np.ma.getmaskarray(value))[0][0])
+        raise InputError(f"a value is masked (missing) in row {row}", where=f"argument {where}", expected=expected)
+    try:
+        raw = np.asarray(value)
+    except (ValueError, TypeError) as error:  # rows of different lengths
+        raise InputError(
+            f"{where} is not a rectangular array ({error})", where=f"argument {where}", expected=expected
+        ) from None
+    if raw.dtype.kind == "O":
+        raw = _unpacked(raw, where, expected)
+    if raw.dtype.kind not in "fiu":
+        kind = {"b": "booleans", "c": "complex numbers", "U": "text", "S": "text", "M": "dates", "m": "time spans"}
+        raise InputError(
+            f"{where} holds {kind.get(raw.dtype.kind, str(raw.dtype))}", where=f"argument {where}", expected=expected
+        )
+    with np.errstate(over="ignore"):  # a long double beyond float becomes inf, refused below with its row
+        return np.array(raw, dtype=np.float64, order="C")
+
+
+def _unpacked(raw: NDArray[Any], where: str, expected: str) -> Array:
+    """An object array as floats: numbers of any length are welcome, everything else is named."""
+    flat = np.empty(raw.size)
+    for place, item in enumerate(raw.ravel()):
+        row = place // (raw.size // raw.shape[0]) if raw.ndim else 0
+        if isinstance(item, (bool, np.bool_)) or not isinstance(item, (Real, np.integer, np.floating)):
+            raise InputError(f"row {row} holds {item!r}, not a number", where=f"argument {where}", expected=expected)
+        try:
+            flat[place] = float(item)
+        except OverflowError:
+            raise InputError(
+                f"row {row} holds an integer too large for a float (overflow)",
+                where=f"argument {where}",
+                expected=expected,
+            ) from None
+    return flat.reshape(raw.shape)

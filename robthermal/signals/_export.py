@@ -1,0 +1,139 @@
+"""A record as a table: on the screen, as a data frame, in a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy.io import savemat
+
+from ..errors import InputError
+from ._checks import channel_names
+from ._names import suggestion
+from ._units import kelvin_to_celsius
+
+if TYPE_CHECKING:
+    from ._record import Record
+
+_SHOWN_NAME = 24  # characters of a channel name in the table on the screen
+
+
+def frame(record: Record) -> pd.DataFrame:
+    """Columns time, inputs, outputs."""
+    if "time" in record.names:
+        raise InputError("a channel is called 'time'", where="record", remedy="Rename it: that column holds the time.")
+    columns = {"time": record.time} | {name: np.array(record[name]) for name in record.names}
+    return pd.DataFrame(columns)
+
+
+def summary(record: Record) -> str:
+    """Name, length, and the range of every channel."""
+    title = f"Record {record.name!r}" if record.name else "Record"
+    lines = [f"{title}: {record.n_samples} samples of {record.sample_time:.10g} s, from {record.start_time:.10g} s"]
+    rows = [("", "channel", "min", "max", "unit")]
+    for kind, names in (("input", record.input_names), ("output", record.output_names)):
+        for name in names:
+            column = record[name]
+            shown = name if len(name) <= _SHOWN_NAME else name[: _SHOWN_NAME - 1] + "…"
+            rows.append((kind, shown, f"{column.min():.6g}", f"{column.max():.6g}", record.units.get(name, "")))
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    for kind, name, low, high, unit in rows:
+        cells = (f"{kind:<{widths[0]}}", f"{name:<{widths[1]}}", f"{low:>{widths[2]}}", f"{high:>{widths[3]}}", unit)
+        lines.append("  " + "  ".join(cells).rstrip())
+    return "\n".join(lines + [f"  note: {note}" for note in record.notes])
+
+
+def write(record: Record, path: Path, temperature_unit: str, temperatures: Sequence[str] | None) -> None:
+    """Write `path` in the format of its suffix; the file appears only when it is complete."""
+    writer = _WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(
+            f"the file name ends in {path.suffix!r}", where=f"{path}", expected=f"one of {', '.join(_WRITERS)}"
+        )
+    table = _in_unit(record, frame(record), temperature_unit, temperatures)
+    part = path.with_name(path.name + ".part")
+    try:
+        writer(table, part)
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror or error})", where=f"{path}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _in_unit(record: Record, table: pd.DataFrame, unit: str, temperatures: Sequence[str] | None) -> pd.DataFrame:
+    if unit not in ("K", "degC"):
+        raise InputError(f"temperature_unit is {unit!r}", where="argument temperature_unit", expected="'K' or 'degC'")
+    if temperatures is None:
+        named = tuple(name for name in record.names if record.units.get(name) == "K")
+    else:
+        named = channel_names(temperatures, "temperatures")
+    for name in named:
+        if name not in record.names:
+            raise InputError(
+                f"there is no channel {name!r}",
+                where="argument temperatures",
+                remedy=suggestion(name, record.names),
+            )
+    if unit == "K":
+        return table
+    if not named:
+        raise InputError(
+            "no channel is known to be a temperature",
+            where="argument temperatures",
+            expected="their names, or units={'T1': 'K', ...} in the record",
+        )
+    for name in named:
+        table[name] = kelvin_to_celsius(table[name].to_numpy())
+    return table
+
+
+def _write_csv(table: pd.DataFrame, path: Path) -> None:
+    for name in table.columns:
+        if name != name.strip() or any(sign in name for sign in ',;\t"\r\n#[]'):
+            raise InputError(
+                f"the channel name {name!r} cannot be a CSV header",
+                where=f"{path}",
+                remedy="Rename it: no separators, quotes, '#', brackets or outer spaces.",
+            )
+    table.to_csv(path, index=False, lineterminator="\n", encoding="utf-8")
+
+
+def _write_parquet(table: pd.DataFrame, path: Path) -> None:
+    pyarrow, parquet = require_pyarrow()
+    arrow = pyarrow.table({name: table[name].to_numpy() for name in table.columns})
+    parquet.write_table(arrow, path)
+
+
+def _write_matlab(table: pd.DataFrame, path: Path) -> None:
+    for name in table.columns:
+        if not (name.isidentifier() and name.isascii() and name[0] != "_" and len(name) <= 63):
+            raise InputError(
+                f"the channel name {name!r} is no MATLAB variable name",
+                where=f"{path}",
+                remedy="Use letters, digits and underscores, or save as .csv.",
+            )
+    columns = {name: table[name].to_numpy() for name in table.columns}
+    with path.open("wb") as file:
+        savemat(file, columns, do_compression=True, oned_as="column", long_field_names=True)
+
+
+def require_pyarrow() -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet, or the message that says how to install them."""
+    try:
+        # Imported here: an optional extra, and slow to load.
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise InputError(
+            "Parquet files need the package pyarrow, which is not installed",
+            remedy="Install it with: pip install 'robthermal[parquet]'",
+        ) from None
+    return pyarrow, pyarrow.parquet
+
+
+_WRITERS = {".csv": _write_csv, ".parquet": _write_parquet, ".mat": _write_matlab}

@@ -1,0 +1,358 @@
+"""Record: inputs and outputs sampled uniformly in time, with names and units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ._checks import Array, channel_matrix, channel_names, channel_units, distinct, finite_number, positive_number
+from ._export import frame, summary, write
+from ._figure import draw
+from ._names import suggestion
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Record:
+    """Measured or simulated signals, sampled uniformly; temperatures in kelvin.
+
+    Inputs (heaters, currents, ambient temperatures) are held: row k acts over [t_k, t_k + sample_time).
+    Outputs are read at t_k, before row k of the inputs has had any effect.
+
+    Parameters
+    ----------
+    sample_time : float
+        Time between rows [s].
+    inputs : array_like, shape (n_samples, n_inputs) or (n_samples,)
+        One column per name of `input_names`, held. May have no columns.
+    outputs : array_like, shape (n_samples, n_outputs) or (n_samples,)
+        One column per name of `output_names`, instantaneous. May have no columns.
+    input_names, output_names : sequence of str
+        Channel names; none twice.
+    start_time : float, optional
+        Time of the first row [s].
+    units : mapping of str to str, optional
+        Channel name to unit. Temperatures are in kelvin: ``"K"``.
+    name : str, optional
+        For reports.
+    notes : sequence of str, optional
+        What was done to the data on the way, in words.
+
+    Attributes
+    ----------
+    inputs, outputs : ndarray
+        Read-only copies, float64, two-dimensional.
+
+    Raises
+    ------
+    InputError
+        NaN, infinite, complex, boolean or text values, lengths that differ, fewer than two rows, a sample time that is
+        not positive, names that are missing, empty or used twice.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> record = rt.Record(sample_time=0.5, inputs=np.ones(4), outputs=[[300.0], [300.5], [300.9], [301.2]],
+    ...                    input_names=["heater"], output_names=["T1"], units={"T1": "K"})
+    >>> record["T1"][1:3]
+    array([300.5, 300.9])
+    >>> before, after = record.split(1.0)
+    >>> after.start_time, after.n_samples
+    (1.0, 2)
+    """
+
+    sample_time: float
+    inputs: Array
+    outputs: Array
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    start_time: float
+    units: Mapping[str, str]
+    name: str
+    notes: tuple[str, ...]
+
+    def __init__(
+        self,
+        *,
+        sample_time: float,
+        inputs: ArrayLike,
+        outputs: ArrayLike,
+        input_names: Sequence[str],
+        output_names: Sequence[str],
+        start_time: float = 0.0,
+        units: Mapping[str, str] | None = None,
+        name: str = "",
+        notes: Sequence[str] = (),
+    ):
+        h = positive_number(sample_time, "sample_time", "s")
+        t0 = finite_number(start_time, "start_time", "s")
+        input_list, output_list = channel_names(input_names, "input_names"), channel_names(output_names, "output_names")
+        distinct(input_list, output_list)
+        U = channel_matrix(inputs, input_list, "inputs", h, t0)
+        Y = channel_matrix(outputs, output_list, "outputs", h, t0)
+        _check_shapes(U, Y)
+        fields = {
+            "sample_time": h,
+            "inputs": U,
+            "outputs": Y,
+            "input_names": input_list,
+            "output_names": output_list,
+            "start_time": t0,
+            "units": channel_units(units, input_list + output_list),
+            "name": _text(name, "name"),
+            "notes": _texts(notes),
+        }
+        for field, value in fields.items():
+            object.__setattr__(self, field, value)  # frozen: this is the one place that writes
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+        return int(self.outputs.shape[0])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All channel names, inputs first."""
+        return self.input_names + self.output_names
+
+    @property
+    def time(self) -> Array:
+        """Time of every row [s]."""
+        return self.start_time + self.sample_time * np.arange(self.n_samples)
+
+    @property
+    def duration(self) -> float:
+        """Time the record covers [s]: the last input is held for one more sample."""
+        return self.n_samples * self.sample_time
+
+    def __len__(self) -> int:
+        return self.n_samples
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    def __getitem__(self, key: str | slice) -> Any:
+        """One channel by name, (n_samples,), or a part of the record by a slice of rows."""
+        if isinstance(key, str):
+            return self._column(key)
+        if isinstance(key, slice):
+            return self._rows(key)
+        raise InputError(
+            f"a record has no item {key!r}",
+            where="record[...]",
+            expected="a channel name, or a slice of rows",
+            remedy="Write record['T1'] or record[100:200].",
+        )
+
+    def between(self, start: float, stop: float) -> Record:
+        """Rows with start <= time < stop.
+
+        Parameters
+        ----------
+        start, stop : float
+            [s]; may lie outside the record, or be infinite.
+
+        Returns
+        -------
+        Record
+        """
+        return self[self._row_at(start, "start") : self._row_at(stop, "stop")]
+
+    def split(self, time: float) -> tuple[Record, Record]:
+        """Cut the record in two.
+
+        Parameters
+        ----------
+        time : float
+            The second part starts with the first row that is not earlier [s].
+
+        Returns
+        -------
+        before, after : Record
+        """
+        row = self._row_at(time, "time")
+        if not 2 <= row <= self.n_samples - 2:
+            raise InputError(
+                f"time is {time!r} s",
+                where="argument time",
+                expected=f"a time that leaves two rows on either side, inside {self.start_time:.10g} s ... "
+                f"{self.time[-1]:.10g} s",
+            )
+        return self[:row], self[row:]
+
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Record:
+        """Keep some channels.
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str, optional
+            Channels to keep, in the order wished; None keeps all. An output may be taken as input and the reverse.
+
+        Returns
+        -------
+        Record
+        """
+        ins = self.input_names if inputs is None else channel_names(inputs, "inputs")
+        outs = self.output_names if outputs is None else channel_names(outputs, "outputs")
+        return self._changed(
+            inputs=self._columns(ins),
+            outputs=self._columns(outs),
+            input_names=ins,
+            output_names=outs,
+            units={name: unit for name, unit in self.units.items() if name in ins + outs},
+        )
+
+    def with_outputs(self, outputs: ArrayLike, output_names: Sequence[str] | None = None) -> Record:
+        """Same inputs, other outputs.
+
+        Parameters
+        ----------
+        outputs : array_like, shape (n_samples, n_outputs)
+            Temperatures in [K].
+        output_names : sequence of str, optional
+            Default: the present ones.
+
+        Returns
+        -------
+        Record
+        """
+        names = self.output_names if output_names is None else channel_names(output_names, "output_names")
+        units = {name: unit for name, unit in self.units.items() if name in self.input_names + names}
+        return self._changed(outputs=outputs, output_names=names, units=units)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Copy as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns time [s], inputs, outputs.
+        """
+        return frame(self)
+
+    def save(
+        self,
+        path: str | Path,
+        temperature_unit: Literal["K", "degC"] = "K",
+        temperatures: Sequence[str] | None = None,
+    ) -> None:
+        """Write a file that `read_record` reads back to the last digit.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.csv``, ``.parquet`` or ``.mat``. Names, numbers and time are written; units, name and notes are not.
+        temperature_unit : {"K", "degC"}, optional
+            Unit of the temperatures in the file.
+        temperatures : sequence of str, optional
+            Which channels are temperatures; default: those whose unit is K. Needed for ``"degC"`` only.
+        """
+        write(self, Path(path), temperature_unit, temperatures)
+
+    def plot(self) -> NDArray[Any]:
+        """Inputs and outputs against time.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes, shape (2,)
+            Inputs above, outputs below.
+        """
+        return draw(self)
+
+    def __str__(self) -> str:
+        return summary(self)
+
+    def __repr__(self) -> str:
+        title = f"{self.name!r}, " if self.name else ""
+        return (
+            f"<Record {title}{self.n_samples} samples of {self.sample_time:.10g} s, "
+            f"inputs {list(self.input_names)}, outputs {list(self.output_names)}>"
+        )
+
+    def _column(self, name: str) -> Array:
+        if name in self.input_names:
+            return self.inputs[:, self.input_names.index(name)]
+        if name in self.output_names:
+            return self.outputs[:, self.output_names.index(name)]
+        raise InputError(
+            f"there is no channel {name!r}", where="record[...]", remedy=suggestion(name, self.names)
+        )
+
+    def _columns(self, names: Sequence[str]) -> Array:
+        matrix = np.empty((self.n_samples, len(names)))
+        for place, name in enumerate(names):
+            matrix[:, place] = self._column(name)
+        return matrix
+
+    def _rows(self, rows: slice) -> Record:
+        if rows.step not in (None, 1):
+            raise InputError(
+                f"the step is {rows.step!r}",
+                where="record[...]",
+                expected="a slice without a step",
+                remedy="Dropping rows aliases: filter the signals and build a new Record.",
+            )
+        start, stop, _ = rows.indices(self.n_samples)
+        if stop - start < 2:
+            raise InputError(
+                f"rows {start} to {stop} hold {max(stop - start, 0)} samples",
+                where="part of a record",
+                expected=f"at least two of the {self.n_samples} rows",
+            )
+        return self._changed(
+            inputs=self.inputs[start:stop],
+            outputs=self.outputs[start:stop],
+            start_time=self.start_time + start * self.sample_time,
+        )
+
+    def _row_at(self, time: float, where: str) -> int:
+        """First row that is not earlier than `time`, clipped to the record."""
+        if isinstance(time, (int, float)) and math.isinf(time):
+            return 0 if time < 0 else self.n_samples
+        offset = (finite_number(time, where, "s") - self.start_time) / self.sample_time
+        # 1e-9 of a sample: 0.1 * 3 is not 0.3, but the user means that row.
+        return int(min(max(math.ceil(offset - 1e-9 * max(1.0, abs(offset))), 0), self.n_samples))
+
+    def _changed(self, **changes: Any) -> Record:
+        fields = {field: getattr(self, field) for field in self.__dataclass_fields__}
+        return Record(**{**fields, **changes})
+
+
+def _check_shapes(U: Array, Y: Array) -> None:
+    if U.shape[1] == 0 and Y.shape[1] == 0:
+        raise InputError("the record has neither inputs nor outputs", where="arguments inputs and outputs",
+                         expected="at least one channel", remedy="Give input_names or output_names.")
+    if U.shape[0] != Y.shape[0]:
+        raise InputError(
+            f"inputs have {U.shape[0]} rows and outputs have {Y.shape[0]} rows: their lengths differ",
+            where="arguments inputs and outputs",
+            expected="the same number of samples",
+            remedy="A record without inputs has inputs of shape (n_samples, 0)." if 0 in (U.size, Y.size) else "",
+        )
+    if U.shape[0] < 2:
+        raise InputError(
+            f"the record has {U.shape[0]} samples: it is {'empty' if U.shape[0] == 0 else 'a single sample'}",
+            where="arguments inputs and outputs",
+            expected="at least two samples",
+        )
+
+
+def _text(value: object, where: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{where} is {value!r}", where=f"argument {where}", expected="text")
+    return value
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f"notes is {value!r}", where="argument notes", expected="a list of texts")
+    return tuple(_text(note, "notes") for note in value)

@@ -1,0 +1,43 @@
+"""Thermal systems: lumps, links, thermoelectric modules; equations, simulation, steady state, linearisation."""
+
+from ._datasheet import DatasheetFit as DatasheetFit
+from ._datasheet import ModuleParameters as ModuleParameters
+from ._datasheet import module_from_datasheet as module_from_datasheet
+from ._equations import Equations as Equations
+from ._file import format_system as format_system
+from ._file import parse_system as parse_system
+from ._file import read_system as read_system
+from ._file import write_system as write_system
+from ._linear import linearize as linearize
+from ._linear import time_constants as time_constants
+from ._parts import Ambient as Ambient
+from ._parts import FitRange as FitRange
+from ._parts import Input as Input
+from ._parts import Linear as Linear
+from ._parts import Link as Link
+from ._parts import Lump as Lump
+from ._parts import Module as Module
+from ._parts import Natural as Natural
+from ._parts import Sensor as Sensor
+from ._polynomials import PolynomialFit as PolynomialFit
+from ._polynomials import Polynomials as Polynomials
+from ._polynomials import module_from_polynomials as module_from_polynomials
+from ._reduce import Reduction as Reduction
+from ._reduce import hinf_error as hinf_error
+from ._reduce import reduce as reduce
+from ._regulated import LoadCurve as LoadCurve
+from ._regulated import fold as fold
+from ._regulated import load_curve as load_curve
+from ._simulate import Trajectory as Trajectory
+from ._simulate import simulate as simulate
+from ._simulate import trajectory as trajectory
+from ._steady import Equilibrium as Equilibrium
+from ._steady import SteadyState as SteadyState
+from ._steady import steady_state as steady_state
+from ._system import System as System
+
+__all__ = ["Ambient", "DatasheetFit", "Equations", "Equilibrium", "FitRange", "Input", "Linear", "Link", "LoadCurve",
+           "Lump", "Module", "ModuleParameters", "Natural", "PolynomialFit", "Polynomials", "Reduction", "Sensor",
+           "SteadyState", "System", "Trajectory", "fold", "format_system", "hinf_error", "linearize", "load_curve",
+           "module_from_datasheet", "module_from_polynomials", "parse_system", "read_system", "reduce", "simulate",
+           "steady_state", "time_constants", "trajectory", "write_system"]

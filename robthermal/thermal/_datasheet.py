@@ -1,0 +1,208 @@
+"""Thermoelectric module from the four numbers of a datasheet: both inversions, and how far they disagree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..errors import InputError, Outcome
+from ._checks import kelvin, positive
+from ._parts import Linear, Module
+
+_HIGHEST_DT = 90.0  # single-stage modules reach about 80 K
+_HIGHEST_I = 200.0
+_AGREE = 0.1  # sheets that disagree with themselves by more are told apart; published rows reach 16 %
+
+
+@dataclass(frozen=True)
+class ModuleParameters:
+    """Constant properties of a thermoelectric module.
+
+    Parameters
+    ----------
+    seebeck : float
+        S [V/K].
+    resistance : float
+        R [Ω].
+    conductance : float
+        K [W/K].
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> round(rt.thermal.ModuleParameters(seebeck=0.05, resistance=2.0, conductance=0.5).figure_of_merit, 6)
+    0.0025
+    """
+
+    seebeck: float
+    resistance: float
+    conductance: float
+
+    @property
+    def figure_of_merit(self) -> float:
+        """Z = S²/(R K) [1/K]."""
+        return self.seebeck**2 / (self.resistance * self.conductance)
+
+
+@dataclass(frozen=True)
+class DatasheetFit:
+    """A datasheet inverted twice: four rated numbers, three unknowns.
+
+    Parameters
+    ----------
+    v_max, i_max, dt_max, q_max, t_hot : float
+        The sheet [V], [A], [K], [W] or None, [K].
+    voltage : ModuleParameters
+        From Vmax, Imax, dTmax: Lineykin and Ben-Yaakov (2007).
+    heat : ModuleParameters or None
+        From Qmax, Imax, dTmax; None without Qmax.
+    q_max_misfit : float or None
+        Qmax predicted by `voltage`, relative to the sheet [-]: +0.16 says 16 % above.
+    v_max_misfit : float or None
+        Vmax predicted by `heat`, relative to the sheet [-].
+    outcome : Outcome
+        Whether the sheet agrees with itself.
+    """
+
+    v_max: float
+    i_max: float
+    dt_max: float
+    q_max: float | None
+    t_hot: float
+    voltage: ModuleParameters
+    heat: ModuleParameters | None
+    q_max_misfit: float | None
+    v_max_misfit: float | None
+    outcome: Outcome
+
+    def module(self, hot: str, cold: str, *, basis: Literal["voltage", "heat"] = "voltage",
+               current_limits: tuple[float, float] | None = None) -> Module:
+        """Module with constant properties between two lumps.
+
+        Parameters
+        ----------
+        hot, cold : str
+            Lumps of the two faces.
+        basis : {"voltage", "heat"}
+            Which parameter set.
+        current_limits : tuple of float, optional
+            [A]; Imax is where dT is largest, not a limit of damage, so none is set by default.
+
+        Returns
+        -------
+        Module
+
+        Raises
+        ------
+        InputError
+            Unknown basis, or "heat" without Qmax.
+        """
+        if basis not in ("voltage", "heat"):
+            raise InputError(f"{basis!r}", where="argument basis", expected='"voltage" or "heat"',
+                             remedy="Choose one of them.")
+        chosen = self.voltage if basis == "voltage" else self.heat
+        if chosen is None:
+            raise InputError('"heat" needs Qmax, which this sheet does not give', where="argument basis",
+                             remedy='Give q_max, or use basis="voltage".')
+        return Module(hot=hot, cold=cold, seebeck=Linear(value=chosen.seebeck),
+                      resistance=Linear(value=chosen.resistance), conductance=Linear(value=chosen.conductance),
+                      current_limits=current_limits)
+
+    def __str__(self) -> str:
+        lines = [f"{'from':8} {'S [V/K]':>10} {'R [Ω]':>10} {'K [W/K]':>10} {'Z [1/K]':>10}   predicts"]
+        lines.append(_row("Vmax", self.voltage, "Qmax", self.q_max_misfit))
+        if self.heat is not None:
+            lines.append(_row("Qmax", self.heat, "Vmax", self.v_max_misfit))
+        return "\n".join([*lines, self.outcome.text])
+
+
+def module_from_datasheet(*, v_max: float, i_max: float, dt_max: float, t_hot: float,
+                          q_max: float | None = None) -> DatasheetFit:
+    """Invert the rated values of a single-stage thermoelectric module.
+
+    With constant S, R, K the sheet says: at Imax the cold face reaches Th - dTmax without load, Vmax is the voltage
+    there, and Qmax is the heat pumped at Imax without temperature difference. Hence, from Vmax (Lineykin and
+    Ben-Yaakov), S = Vmax/Th, R = Vmax (Th - dTmax)/(Imax Th), K = Vmax Imax (Th - dTmax)/(2 Th dTmax); from Qmax,
+    S = 2 Qmax/(Imax (Th + dTmax)), R = S (Th - dTmax)/Imax, K = S (Th - dTmax) Imax/(2 dTmax).
+
+    Parameters
+    ----------
+    v_max : float
+        [V].
+    i_max : float
+        [A].
+    dt_max : float
+        [K]; a difference.
+    t_hot : float
+        Hot-side temperature at which the sheet holds [K]; vendors use 25, 27 or 50 °C.
+    q_max : float, optional
+        [W]; without it nothing checks the sheet.
+
+    Returns
+    -------
+    DatasheetFit
+
+    Raises
+    ------
+    InputError
+        A number that is missing, not positive, or by its size in another unit.
+
+    References
+    ----------
+    S. Lineykin and S. Ben-Yaakov, IEEE Transactions on Industry Applications 43 (2007) 505.
+    F. L. Tan and S. C. Fok, Energy Conversion and Management 49 (2008) 1715: good to about two thirds of Imax.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> print(rt.thermal.module_from_datasheet(v_max=15.4, i_max=6.0, dt_max=67.0, q_max=51.4, t_hot=298.0))
+    from        S [V/K]      R [Ω]    K [W/K]    Z [1/K]   predicts
+    Vmax        0.05168     1.9896    0.53452   0.002511   Qmax +10.1 %
+    Qmax        0.04694     1.8072    0.48552   0.002511   Vmax -9.2 %
+    The two inversions differ by more than 10 %: ...
+    """
+    v_max, i_max = positive(v_max, "argument v_max", "V"), positive(i_max, "argument i_max", "A")
+    t_hot = kelvin(t_hot, "argument t_hot")
+    dt_max = _difference(dt_max, t_hot)
+    if i_max > _HIGHEST_I:
+        raise InputError(f"{i_max:g} A is more than any single module takes: it looks like milliampere",
+                         where="argument i_max", expected="ampere", remedy="Divide by 1000.")
+    voltage = _parameters(v_max / t_hot, i_max, dt_max, t_hot)
+    if q_max is None or bool(np.isnan(q_max)):  # a missing entry of a table of datasheets is NaN
+        return DatasheetFit(v_max, i_max, dt_max, None, t_hot, voltage, None, None, None, Outcome(
+            True, "unchecked", "Without Qmax nothing checks the sheet against itself."))
+    q_max = positive(q_max, "argument q_max", "W")
+    heat = _parameters(2 * q_max / (i_max * (t_hot + dt_max)), i_max, dt_max, t_hot)
+    q_misfit = 0.5 * voltage.seebeck * i_max * (t_hot + dt_max) / q_max - 1
+    v_misfit = heat.seebeck * t_hot / v_max - 1
+    return DatasheetFit(v_max, i_max, dt_max, q_max, t_hot, voltage, heat, q_misfit, v_misfit, _outcome(q_misfit))
+
+
+def _parameters(S: float, i_max: float, dt_max: float, t_hot: float) -> ModuleParameters:
+    """R and K from S: at dTmax the current is optimal, I = S Tc/R, and the heat balance closes without load."""
+    t_cold = t_hot - dt_max
+    return ModuleParameters(S, S * t_cold / i_max, S * t_cold * i_max / (2 * dt_max))
+
+
+def _difference(value: float, t_hot: float) -> float:
+    dt_max = positive(value, "argument dt_max", "K")
+    if dt_max > _HIGHEST_DT:
+        raise InputError(f"{dt_max:g} K: single-stage modules do not exceed about 80 K", where="argument dt_max",
+                         expected="a temperature difference in kelvin",
+                         remedy="A difference in Fahrenheit is divided by 1.8; one that a shop converted like a "
+                         f"temperature was {(dt_max - 32) / 1.8:.1f} K. Multi-stage modules are not described by S, R, K.")
+    return dt_max
+
+
+def _outcome(misfit: float) -> Outcome:
+    if abs(misfit) <= _AGREE:
+        return Outcome(True, "agrees", f"Vmax and Qmax agree within {abs(misfit):.1%}.")
+    return Outcome(False, "disagrees", "The two inversions differ by more than 10 %: check t_hot and the gas of the "
+                   "rating, then measure one of them, or let calibration decide between both sets.")
+
+
+def _row(name: str, p: ModuleParameters, predicted: str, misfit: float | None) -> str:
+    end = "" if misfit is None else f"   {predicted} {misfit * 100:+.1f} %"
+    return f"{name:8} {p.seebeck:10.5f} {p.resistance:10.5g} {p.conductance:10.5f} {p.figure_of_merit:10.4g}{end}"

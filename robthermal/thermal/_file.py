@@ -1,0 +1,227 @@
+"""System files: TOML in, TOML out, exact round trip."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ._parts import Part
+from ._system import System, build
+from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN, celsius_to_kelvin, kelvin_to_celsius
+
+_MAX_BYTES = 200_000_000
+_TEMPERATURES = {"ambients": "temperature", "lumps": "initial", "modules": "reference_temperature"}
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def read_system(path: str | Path) -> System:
+    """Read a thermal system from a TOML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        File as described in the documentation, "System file".
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    InputError
+        Naming file, table, key, value and remedy.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> system = rt.systems.two_module()
+    >>> rt.thermal.write_system(system, "setup.toml")
+    >>> rt.read_system("setup.toml") == system
+    True
+    """
+    path = Path(path)
+    return parse_system(_text(path), str(path))
+
+
+def parse_system(text: str, where: str = "system text") -> System:
+    """Read a thermal system from TOML text.
+
+    Parameters
+    ----------
+    text : str
+        Content of a system file.
+    where : str
+        Name used in messages.
+
+    Returns
+    -------
+    System
+    """
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"is not valid TOML: {error}", where=where, remedy="Correct the line it names.") from None
+    return build(_kelvin(_flat(data, where), where), where)
+
+
+def write_system(system: System, path: str | Path) -> None:
+    """Write a system to a TOML file; reading it back gives an equal system.
+
+    Parameters
+    ----------
+    system : System
+        What to write.
+    path : str or Path
+        Where to.
+    """
+    Path(path).write_text(format_system(system), encoding="utf-8")
+
+
+def format_system(system: System) -> str:
+    """TOML text of a system.
+
+    Parameters
+    ----------
+    system : System
+
+    Returns
+    -------
+    str
+    """
+    return "\n".join(_lines(system)) + "\n"
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"is larger than {_MAX_BYTES // 1_000_000} MB", where=str(path),
+                             remedy="Large networks: use System.from_matrices.")
+        text = path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
+    except UnicodeDecodeError:
+        raise InputError("is not a text file in UTF-8", where=str(path), expected="a system file in TOML",
+                         remedy="Is this the right file?") from None
+    if not text.strip():
+        raise InputError("is empty", where=str(path), expected="a system file in TOML", remedy="Is this the right file?")
+    return text
+
+
+def _flat(data: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Move the keys of [system] to the top, as in `System`."""
+    data = dict(data)
+    head = data.pop("system", {})
+    if not isinstance(head, dict):
+        raise InputError(f"system = {head!r}", where=where, expected="a table [system]")
+    for key in ("name", "temperature_unit"):
+        if key in data:
+            raise InputError(f"{key!r} stands outside a table", where=where, remedy="Put it under [system].")
+    unknown = [key for key in head if key not in ("name", "temperature_unit")]
+    if unknown:
+        raise InputError(f"unknown key {unknown[0]!r}", where=f"{where} [system]", expected="name, temperature_unit",
+                         remedy="Remove it, or correct its spelling.")
+    if "temperature_unit" not in head:
+        raise InputError("key 'temperature_unit' is missing", where=f"{where} [system]",
+                         remedy='Add temperature_unit = "degC" or "K": all temperatures of the file and its records.')
+    return {**data, **head}
+
+
+def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
+    """Convert the temperatures of the file, after catching Celsius declared as kelvin and the reverse."""
+    unit = data.get("temperature_unit")
+    if unit not in ("K", "degC"):
+        raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"')
+    for table, key in _TEMPERATURES.items():
+        parts = data.get(table, {})
+        if isinstance(parts, dict):
+            data[table] = {name: _part_kelvin(part, key, unit, f"{where} [{table}.{name}] {key}")
+                           for name, part in parts.items()}
+    return _fit_kelvin(data, unit)
+
+
+def _part_kelvin(part: Any, key: str, unit: str, where: str) -> Any:
+    if not isinstance(part, dict) or not _is_number(part.get(key)):
+        return part
+    value = float(part[key])
+    if unit == "K" and value < LOWEST_KELVIN:
+        raise InputError(f"{value} K is below {LOWEST_KELVIN:.0f} K: it looks like degrees Celsius declared as kelvin",
+                         where=where, remedy='Set temperature_unit = "degC", or give kelvin.')
+    if unit == "degC" and value > HIGHEST_CELSIUS:
+        raise InputError(f"{value} °C is above {HIGHEST_CELSIUS:.0f} °C: it looks like kelvin declared as Celsius",
+                         where=where, remedy='Set temperature_unit = "K", or give degrees Celsius.')
+    return {**part, key: _convert(value) if unit == "degC" else value}
+
+
+def _convert(value: float) -> float:
+    return celsius_to_kelvin(value) if value == value and abs(value) != float("inf") else value
+
+
+def _fit_kelvin(data: dict[str, Any], unit: str) -> dict[str, Any]:
+    fit = data.get("fit")
+    if unit == "degC" and isinstance(fit, dict):
+        data["fit"] = {name: _shifted(bounds, _convert) if _is_temperature(name) else bounds
+                       for name, bounds in fit.items()}
+    return data
+
+
+def _shifted(bounds: Any, convert: Any) -> Any:
+    if not isinstance(bounds, dict):
+        return bounds
+    return {key: convert(float(v)) if key in ("lower", "upper") and _is_number(v) else v for key, v in bounds.items()}
+
+
+def _is_temperature(name: str) -> bool:
+    return any(name.startswith(table + ".") and name.endswith("." + key) for table, key in _TEMPERATURES.items())
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _lines(system: System) -> Iterator[str]:
+    convert = kelvin_to_celsius if system.temperature_unit == "degC" else float
+    yield "[system]"
+    yield f"name = {_string(system.name)}"
+    yield f"temperature_unit = {_string(system.temperature_unit)}"
+    for table in ("ambients", "lumps", "links", "inputs", "modules", "sensors"):
+        parts = getattr(system, table)
+        named = [("[[links]]", link) for link in parts] if table == "links" else [
+            (f"[{table}.{_key(name)}]", part) for name, part in parts.items()]
+        for header, part in named:
+            yield ""
+            yield header
+            fields = part.model_dump(exclude_unset=True)
+            if _TEMPERATURES.get(table) in fields and fields[_TEMPERATURES[table]] is not None:
+                fields[_TEMPERATURES[table]] = convert(fields[_TEMPERATURES[table]])
+            yield from (f"{_key(key)} = {_value(value)}" for key, value in fields.items() if value is not None)
+    if system.fit:
+        yield ""
+        yield "[fit]"
+        for name, bounds in system.fit.items():
+            fields = bounds.model_dump(exclude_unset=True)
+            yield f"{_string(name)} = {_value(_shifted(fields, convert) if _is_temperature(name) else fields)}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        return _string(value)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items() if v is not None) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, Part):
+        return _value(value.model_dump(exclude_unset=True))
+    return repr(float(value))
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _string(name)
+
+
+def _string(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

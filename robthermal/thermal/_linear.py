@@ -1,0 +1,140 @@
+"""Linearisation to python-control, with the names of the system; time constants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import control
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+from scipy.linalg import expm
+
+from ..errors import InputError
+from ._augmented import lagged
+from ._equations import Equations
+from ._sensors import source_states
+from ._steady import exogenous_point
+from ._system import System, equations
+from ._terms import Array
+
+
+def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
+              inputs: Mapping[str, float] | None = None, *, sample_time: float = 0.0) -> control.StateSpace:
+    """Linearise a system to a python-control state space.
+
+    Parameters
+    ----------
+    system : System
+        Whose.
+    temperatures : array_like or mapping, optional
+        Lump temperatures of the operating point [K]; default: initial temperatures. It need not be an equilibrium.
+    inputs : mapping, optional
+        Heaters [unit], module currents [A] and ambients [K] of the operating point; default off and nominal.
+    sample_time : float
+        0 for continuous time; else the exact zero-order-hold equivalent at this sample time [s].
+
+    Returns
+    -------
+    control.StateSpace
+        Deviations from the operating point; inputs, states and outputs carry the names of the system (a lagged sensor
+        adds a state "NAME_lag"; without sensors the outputs are all lumps). Sensor delays are not part of a state space.
+
+    Raises
+    ------
+    InputError
+        Unknown names, Celsius, wrong lengths, negative sample time.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> G = rt.thermal.linearize(rt.systems.two_module())
+    >>> G.nstates, G.input_labels
+    (18, ['m1', 'm2', 'room'])
+    """
+    eq = equations(system)
+    x, u = _point(eq, temperatures), exogenous_point(eq, inputs or {})
+    A, B = _matrices(eq, x, u)
+    if not (np.isfinite(sample_time) and sample_time >= 0):
+        raise InputError(f"sample_time = {sample_time}", where="argument sample_time", expected="0 or a positive number [s]")
+    if sample_time:
+        both = np.zeros((A.shape[0] + B.shape[1],) * 2)
+        both[:len(A)] = np.hstack([A, B]) * sample_time
+        exact = expm(both)[:len(A)]
+        A, B = exact[:, :len(A)], exact[:, len(A):]
+    C, outputs = _outputs(eq, len(A))
+    states = [*system.lump_names, *(f"{name}_lag" for name in lagged(eq))]
+    return control.ss(A, B, C, np.zeros((len(C), B.shape[1])), dt=sample_time, name=system.name,
+                      inputs=list(system.exogenous_names), outputs=outputs, states=states)
+
+
+def time_constants(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
+                   inputs: Mapping[str, float] | None = None) -> pd.DataFrame:
+    """Time constants of the lumps' network at an operating point, slowest first.
+
+    Parameters
+    ----------
+    system, temperatures, inputs
+        As in `linearize`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns "time constant [s]" (negative: unstable), "lump" (where the mode is largest) and "share", its part of the
+        mode's stored heat.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> round(float(rt.thermal.time_constants(rt.systems.two_module())["time constant [s]"].max()))
+    225
+    """
+    eq = equations(system)
+    J = eq.jacobian(_point(eq, temperatures), exogenous_point(eq, inputs or {})).toarray() / eq.capacity[:, None]
+    values, modes = np.linalg.eig(J)
+    order = np.argsort(-values.real)
+    heat = eq.capacity[:, None] * np.abs(modes[:, order]) ** 2
+    largest = heat.argmax(axis=0)
+    return pd.DataFrame({"time constant [s]": -1 / values.real[order],
+                         "lump": [system.lump_names[i] for i in largest],
+                         "share": heat.max(axis=0) / heat.sum(axis=0)})
+
+
+def _point(eq: Equations, temperatures: ArrayLike | Mapping[str, float] | None) -> Array:
+    if temperatures is None:
+        return eq.initial()
+    names = eq.system.lump_names
+    if isinstance(temperatures, Mapping):
+        missing = [name for name in names if name not in temperatures]
+        if missing:
+            raise InputError(f"no temperature for lump {missing[0]!r}", where="argument temperatures",
+                             remedy="Give every lump a temperature [K].")
+        temperatures = [temperatures[name] for name in names]
+    x = np.asarray(temperatures, float)
+    if x.shape != (len(names),) or not np.isfinite(x).all() or x.min() < 150:
+        raise InputError(f"shape {x.shape}, smallest value {x.min(initial=np.inf):.6g}", where="argument temperatures",
+                         expected=f"{len(names)} finite temperatures in kelvin")
+    return x
+
+
+def _matrices(eq: Equations, x: Array, u: Array) -> tuple[Array, Array]:
+    """A (with the lags as states) and B, [1/s] and [K/s per unit]."""
+    n, lags = len(eq.capacity), lagged(eq)
+    A, B = np.zeros((n + len(lags), n + len(lags))), np.zeros((n + len(lags), u.size))
+    A[:n, :n] = eq.jacobian(x, u).toarray() / eq.capacity[:, None]
+    B[:n] = eq.input_jacobian(x, u).toarray() / eq.capacity[:, None]
+    for row, name in enumerate(lags, start=n):
+        sensor = eq.system.sensors[name]
+        A[row, row] = -1 / sensor.time_constant
+        A[row, eq.system.lump_names.index(sensor.lump)] = 1 / sensor.time_constant
+    return A, B
+
+
+def _outputs(eq: Equations, n_states: int) -> tuple[Array, list[str]]:
+    sensors = eq.system.sensors
+    if not sensors:
+        return np.eye(len(eq.capacity), n_states), list(eq.system.lump_names)
+    C = np.zeros((len(sensors), n_states))
+    for row, (state, sensor) in enumerate(zip(source_states(eq), sensors.values(), strict=True)):
+        C[row, state] = sensor.gain
+    return C, list(sensors)

@@ -1,0 +1,113 @@
+"""Checks that need the whole network: names, references, and a path from every lump to an ambient."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import InputError
+from ._parameters import read_parameter
+
+if TYPE_CHECKING:
+    from ._system import System
+
+_TABLES = ("ambients", "lumps", "inputs", "modules", "sensors")
+
+
+def check_network(system: System) -> None:
+    """Refuse a network whose names or paths do not make sense."""
+    if not system.lumps:
+        raise InputError("there are no lumps", where="[lumps]", remedy="Add at least one [lumps.NAME] table.")
+    if not system.ambients:
+        raise InputError("there is no ambient", where="[ambients]", remedy="Add [ambients.room] with its temperature.")
+    _names_used_once(system)
+    _links_exist(system)
+    _modules_exist(system)
+    for table, parts in (("inputs", system.inputs), ("sensors", system.sensors)):
+        for name, part in parts.items():
+            _known(part.lump, system.lumps, f"[{table}.{name}] lump", "a lump")
+    _path_to_ambient(system)
+    _fit_is_possible(system)
+
+
+def _known(name: str, known: Iterable[str], where: str, expected: str) -> None:
+    known = list(known)
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        remedy = f"Did you mean {close[0]!r}?" if close else "Add it to the file, or correct the name."
+        raise InputError(f"{name!r} does not exist", where=where, expected=expected, remedy=remedy)
+
+
+def _names_used_once(system: System) -> None:
+    seen: dict[str, str] = {}
+    for table in _TABLES:
+        for name in getattr(system, table):
+            if name in seen:
+                raise InputError(f"the name {name!r} is used twice, in [{seen[name]}] and in [{table}]",
+                                 where=f"[{table}.{name}]", remedy="Record columns go by name: rename one of them.")
+            if name.lower() == "time":
+                raise InputError(f"the name {name!r} is the time column of a record", where=f"[{table}.{name}]",
+                                 remedy="Rename it.")
+            seen[name] = table
+
+
+def _links_exist(system: System) -> None:
+    nodes = list(system.lumps) + list(system.ambients)
+    known, names = set(nodes), set()
+    for number, link in enumerate(system.links, start=1):
+        where = f"[[links]] number {number}"
+        for end in link.between:
+            if end not in known:
+                _known(end, nodes, f"{where} between", "a lump or an ambient")
+        if not any(end in system.lumps for end in link.between):
+            raise InputError(f"joins two ambients, {link.between[0]!r} and {link.between[1]!r}", where=where,
+                             remedy="At least one end must be a lump.")
+        if link.name in names:
+            raise InputError(f"the link name {link.name!r} is used twice", where=where,
+                             remedy='Add name = "…" to one of them, or join them into one link.')
+        names.add(link.name)
+
+
+def _modules_exist(system: System) -> None:
+    pairs: dict[frozenset[str], str] = {}
+    for name, module in system.modules.items():
+        where = f"[modules.{name}]"
+        for face in ("hot", "cold"):
+            _known(getattr(module, face), system.lumps, f"{where} {face}", "a lump")
+        pair = frozenset((module.hot, module.cold))
+        if pair in pairs:
+            raise InputError(f"modules {pairs[pair]!r} and {name!r} join the same two lumps, {module.hot!r} and "
+                             f"{module.cold!r}", where=where, remedy="Describe both as one module (in series: add their "
+                             "Seebeck coefficients, resistances and conductances), or give each faces of its own.")
+        pairs[pair] = name
+
+
+def _path_to_ambient(system: System) -> None:
+    names = list(system.lumps) + list(system.ambients)
+    index = {name: i for i, name in enumerate(names)}
+    ends = [link.between for link in system.links
+            if link.conductance > 0 or link.radiation or (link.natural and link.natural.gain > 0)]
+    ends += [(m.hot, m.cold) for m in system.modules.values()]
+    rows = [index[a] for a, _ in ends]
+    columns = [index[b] for _, b in ends]
+    graph = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
+    _, labels = connected_components(graph, directed=False)
+    joined = set(labels[len(system.lumps):])
+    stranded = [name for name, label in zip(system.lumps, labels, strict=False) if label not in joined]
+    if stranded:
+        shown = ", ".join(stranded[:5]) + (f" and {len(stranded) - 5} more" if len(stranded) > 5 else "")
+        raise InputError(f"no heat path to an ambient from lump {shown}", where=f"[lumps.{stranded[0]}]",
+                         remedy="Add a [[links]] entry that joins it, directly or through other lumps, to an ambient.")
+
+
+def _fit_is_possible(system: System) -> None:
+    for name, bounds in system.fit.items():
+        value = read_parameter(system, name)
+        if not bounds.lower <= value <= bounds.upper:
+            raise InputError(f"its value {value} is outside [{bounds.lower}, {bounds.upper}]", where=f'[fit] "{name}"',
+                             remedy="Widen the range, or start inside it.")

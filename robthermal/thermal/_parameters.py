@@ -1,0 +1,103 @@
+"""Named parameters: read and replace any number of a system by its dotted name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ._parts import Part
+    from ._system import System
+
+_LINEAR = tuple(f"{p}.{k}" for p in ("seebeck", "resistance", "conductance") for k in ("value", "slope"))
+FIELDS: dict[str, tuple[str, ...]] = {
+    "ambients": ("temperature",),
+    "lumps": ("capacity", "disturbance", "initial"),
+    "links": ("conductance", "natural.gain", "natural.exponent", "radiation"),
+    "inputs": ("gain",),
+    "modules": (*_LINEAR, "reference_temperature"),
+    "sensors": ("noise", "time_constant", "offset", "gain", "delay"),
+}
+
+
+def parts_of(system: System, table: str) -> Mapping[str, Part]:
+    """Parts of one table by name (links too)."""
+    if table == "links":
+        return {link.name: link for link in system.links}
+    return getattr(system, table)
+
+
+def parameter_names(system: System) -> Iterator[str]:
+    """Every named number that is set."""
+    for table, fields in FIELDS.items():
+        for name, part in parts_of(system, table).items():
+            for field in fields:
+                if _get(part, field) is not None:
+                    yield f"{table}.{name}.{field}"
+
+
+def locate(system: System, name: str) -> tuple[str, str, str]:
+    """Split a parameter name into table, part and field; names may contain dots."""
+    table, _, rest = name.partition(".")
+    for field in FIELDS.get(table, ()):
+        part = rest.removesuffix("." + field)
+        if part != rest and part in parts_of(system, table):
+            return table, part, field
+    known = list(parameter_names(system))
+    close = difflib.get_close_matches(name, known, n=1)
+    remedy = f"Did you mean {close[0]!r}?" if close else f"For example {known[0]!r}."
+    raise InputError(f"there is no parameter {name!r}", where="parameter name",
+                     expected="TABLE.NAME.KEY as in the system file", remedy=remedy)
+
+
+def read_parameter(system: System, name: str) -> float:
+    """Value of one parameter, kelvin for temperatures."""
+    table, part, field = locate(system, name)
+    value = _get(parts_of(system, table)[part], field)
+    if value is None:
+        raise InputError(f"{name!r} is not set in this system", where="parameter name",
+                         remedy=f"Give {field} in [{table}.{part}] first.")
+    return value
+
+
+def replace_parameters(system: System, values: Mapping[str, float]) -> System:
+    """Copy of the system with new values; each touched part is validated again."""
+    changes: dict[str, dict[str, dict[str, float]]] = {}
+    for name, value in values.items():
+        table, part, field = locate(system, name)
+        changes.setdefault(table, {}).setdefault(part, {})[field] = float(value)
+    update: dict[str, Any] = {}
+    for table, parts in changes.items():
+        new = {name: _changed(part, parts[name], f"{table}.{name}") if name in parts else part
+               for name, part in parts_of(system, table).items()}
+        update[table] = tuple(new.values()) if table == "links" else new
+    return system.model_copy(update=update)
+
+
+def _get(part: Any, field: str) -> float | None:
+    for word in field.split("."):
+        part = getattr(part, word) if part is not None else None
+    return part
+
+
+def _changed(part: Part, fields: Mapping[str, float], where: str) -> Part:
+    data = part.model_dump(exclude_unset=True)
+    if "name" in type(part).model_fields:
+        data["name"] = getattr(part, "name")  # noqa: B009 - only links have one
+    for field, value in fields.items():
+        *outer, last = field.split(".")
+        target = data
+        for word in outer:
+            target = target.setdefault(word, {})
+        target[last] = value
+    try:
+        return type(part)(**data)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        raise InputError(f"{'.'.join(map(str, fault['loc']))} = {fault['input']!r}: {fault['msg']}",
+                         where=f"parameter of {where}", remedy="Keep it within what the part accepts.") from None

@@ -1,0 +1,235 @@
+"""The parts of a thermal system: ambients, lumps, links, heaters, thermoelectric modules, sensors."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from ._units import LOWEST_KELVIN
+
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Kelvin = Annotated[float, Field(ge=LOWEST_KELVIN, allow_inf_nan=False, strict=True)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Range = tuple[Finite, Finite]
+
+
+class Part(BaseModel):
+    """Immutable; unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def _ordered(value: Range | None) -> Range | None:
+    if value is not None and not value[0] < value[1]:
+        raise ValueError("must be [lower, upper] with lower < upper")
+    return value
+
+
+class Ambient(Part):
+    """Surroundings at a prescribed temperature.
+
+    Parameters
+    ----------
+    temperature : float
+        Used when a record has no column of this name [K].
+    """
+
+    temperature: Kelvin
+
+
+class Lump(Part):
+    """A mass of uniform temperature.
+
+    Parameters
+    ----------
+    capacity : float
+        Heat capacity [J/K].
+    disturbance : float
+        Unmeasured random heat [W/√Hz].
+    initial : float, optional
+        Temperature at the start [K]; default: the nearest measured value, else the first ambient.
+    """
+
+    capacity: Positive
+    disturbance: NonNegative = 0.0
+    initial: Kelvin | None = None
+
+
+class Natural(Part):
+    """Natural convection: heat = gain ``|dT|^exponent dT`` [W].
+
+    Parameters
+    ----------
+    gain : float
+        [W/K^(1+exponent)].
+    exponent : float
+        [-]; 0.25 for laminar flow.
+    """
+
+    gain: NonNegative
+    exponent: NonNegative = 0.25
+
+
+class Link(Part):
+    """A heat path between two lumps, or a lump and an ambient.
+
+    Parameters
+    ----------
+    between : tuple of str
+        The two ends.
+    conductance : float
+        Linear part [W/K].
+    natural : Natural, optional
+        Natural convection added to it.
+    radiation : float, optional
+        Coefficient of Ta⁴ - Tb⁴ [W/K⁴].
+    name : str
+        Default "a-b".
+    """
+
+    between: tuple[Name, Name]
+    conductance: NonNegative = 0.0
+    natural: Natural | None = None
+    radiation: NonNegative | None = None
+    name: str = ""
+
+    @model_validator(mode="after")
+    def _named_and_real(self) -> Link:
+        if self.between[0] == self.between[1]:
+            raise ValueError(f"both ends are {self.between[0]!r}: a link must join two different nodes")
+        if not {"conductance", "natural", "radiation"} & self.model_fields_set:
+            raise ValueError("carries no heat: give conductance, natural or radiation")
+        if not self.name:
+            object.__setattr__(self, "name", "-".join(self.between))
+        return self
+
+
+class Input(Part):
+    """A heater.
+
+    Parameters
+    ----------
+    lump : str
+        Where its heat goes.
+    gain : float
+        [W per unit of the record column].
+    limits : tuple of float, optional
+        Range of the record column [unit].
+    """
+
+    lump: Name
+    gain: Finite = 1.0
+    limits: Range | None = None
+
+    _check = field_validator("limits")(_ordered)
+
+
+class Linear(Part):
+    """A property that varies linearly with temperature: value + slope (T - reference_temperature).
+
+    Parameters
+    ----------
+    value : float
+        At the reference temperature.
+    slope : float
+        Per kelvin.
+    """
+
+    value: Positive
+    slope: Finite = 0.0
+
+
+class Module(Part):
+    """A thermoelectric module; positive current pumps heat from `cold` to `hot`.
+
+    Parameters
+    ----------
+    hot, cold : str
+        Lumps of its two faces.
+    seebeck : Linear
+        S(T_avg) [V/K, V/K²].
+    resistance : Linear
+        R(T_avg) [Ω, Ω/K].
+    conductance : Linear
+        K(T_avg) [W/K, W/K²].
+    reference_temperature : float
+        [K].
+    current_limits : tuple of float, optional
+        [A].
+    """
+
+    hot: Name
+    cold: Name
+    seebeck: Linear
+    resistance: Linear
+    conductance: Linear
+    reference_temperature: Kelvin = 298.15
+    current_limits: Range | None = None
+
+    _check = field_validator("current_limits")(_ordered)
+
+    @field_validator("seebeck", "resistance", "conductance", mode="before")
+    @classmethod
+    def _number_is_a_value(cls, value: Any) -> Any:
+        return {"value": value} if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Module:
+        if self.hot == self.cold:
+            raise ValueError(f"hot and cold are both {self.hot!r}: a module must join two different lumps")
+        sloped = any(p.slope for p in (self.seebeck, self.resistance, self.conductance))
+        if sloped and "reference_temperature" not in self.model_fields_set:
+            raise ValueError("has a slope but no reference_temperature: say at which temperature the values hold")
+        return self
+
+
+class Sensor(Part):
+    """A temperature sensor: reading = T_ref + gain (T_lagged - T_ref) + offset, T_ref the first ambient's nominal temperature.
+
+    Parameters
+    ----------
+    lump : str
+        What it measures.
+    noise : float
+        Standard deviation [K]; 0 means not declared.
+    time_constant : float
+        First-order lag [s].
+    offset : float
+        [K].
+    gain : float
+        [-].
+    delay : float
+        Pure delay [s].
+    """
+
+    lump: Name
+    noise: NonNegative = 0.0
+    time_constant: NonNegative = 0.0
+    offset: Finite = 0.0
+    gain: Positive = 1.0
+    delay: NonNegative = 0.0
+
+
+class FitRange(Part):
+    """What calibration may do to one parameter.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Bounds, in the unit of the parameter.
+    sigma : float, optional
+        Standard deviation of the prior around the value in the file.
+    """
+
+    lower: Finite
+    upper: Finite
+    sigma: Positive | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> FitRange:
+        if not self.lower < self.upper:
+            raise ValueError(f"lower {self.lower} is not below upper {self.upper}")
+        return self

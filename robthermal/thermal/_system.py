@@ -1,0 +1,210 @@
+"""The thermal system a user describes: validated, immutable, kelvin inside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from scipy.linalg import eigvals
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from ..errors import InputError
+from ._equations import Equations
+from ._network import check_network
+from ._parameters import parameter_names, read_parameter, replace_parameters
+from ._parts import Ambient, FitRange, Input, Link, Lump, Module, Name, Part, Sensor
+from ._refusals import refusal
+
+
+class System(Part):
+    """A lumped thermal system: E ẋ = f(x, u), temperatures in kelvin.
+
+    Build one from Python with keyword arguments (kelvin), or read it with `read_system`.
+
+    Parameters
+    ----------
+    name : str
+        For reports.
+    ambients, lumps, inputs, modules, sensors : mapping
+        Name to part; plain dictionaries are accepted.
+    links : sequence of Link
+        Heat paths.
+    fit : mapping
+        Parameter name to `FitRange`.
+    temperature_unit : {"K", "degC"}
+        Unit of the temperatures in the files of this system and in its records; inside, all is kelvin.
+
+    Raises
+    ------
+    InputError
+        What, where, what was expected, what to do.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 298.15}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}])
+    >>> bar.parameter("links.bar-room.conductance")
+    0.5
+    """
+
+    name: str = "thermal system"
+    temperature_unit: Literal["K", "degC"] = "K"
+    ambients: dict[Name, Ambient]
+    lumps: dict[Name, Lump]
+    links: tuple[Link, ...] = ()
+    inputs: dict[Name, Input] = {}
+    modules: dict[Name, Module] = {}
+    sensors: dict[Name, Sensor] = {}
+    fit: dict[str, FitRange] = {}
+
+    def __init__(self, **data: Any):
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise refusal(error) from None
+        check_network(self)
+
+    @property
+    def lump_names(self) -> tuple[str, ...]:
+        """Lumps in file order: the states."""
+        return tuple(self.lumps)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Heaters in file order."""
+        return tuple(self.inputs)
+
+    @property
+    def module_names(self) -> tuple[str, ...]:
+        """Modules in file order."""
+        return tuple(self.modules)
+
+    @property
+    def ambient_names(self) -> tuple[str, ...]:
+        """Ambients in file order."""
+        return tuple(self.ambients)
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """Sensors in file order."""
+        return tuple(self.sensors)
+
+    @property
+    def exogenous_names(self) -> tuple[str, ...]:
+        """Everything that drives the system, in the order of `u`: heaters, module currents, ambients."""
+        return self.input_names + self.module_names + self.ambient_names
+
+    @property
+    def current_limits(self) -> dict[str, tuple[float, float] | None]:
+        """Declared current range of each module [A]."""
+        return {name: module.current_limits for name, module in self.modules.items()}
+
+    @property
+    def input_limits(self) -> dict[str, tuple[float, float] | None]:
+        """Declared range of each heater column [unit]."""
+        return {name: heater.limits for name, heater in self.inputs.items()}
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Every number of the system that has a name, for example ``modules.m1.seebeck.slope``."""
+        return tuple(parameter_names(self))
+
+    def parameter(self, name: str) -> float:
+        """Value of one named parameter, temperatures in kelvin.
+
+        Parameters
+        ----------
+        name : str
+            For example ``links.x1-x3.conductance``.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        InputError
+            If the system has no such parameter.
+        """
+        return read_parameter(self, name)
+
+    def with_parameters(self, values: Mapping[str, float]) -> System:
+        """Return a copy with some parameters replaced.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Parameter name to new value, temperatures in kelvin.
+
+        Returns
+        -------
+        System
+
+        Raises
+        ------
+        InputError
+            Unknown name, or a value the part refuses (a negative capacity).
+        """
+        return replace_parameters(self, values)
+
+    def poles(self) -> NDArray[np.float64]:
+        """Poles at rest (heaters and currents off, everything at its initial temperature), slowest first.
+
+        Returns
+        -------
+        ndarray, shape (n_lumps,)
+            [rad/s], real and negative: conduction is symmetric.
+        """
+        eq = Equations(self)
+        J = eq.jacobian(eq.initial(), eq.nominal()).toarray()
+        return np.sort(eigvals(J / eq.capacity[:, None]).real)[::-1]
+
+    def nearest_lumps(self, sources: Iterable[str]) -> dict[str, str]:
+        """For every lump, the source lump with the least thermal resistance to it.
+
+        Parameters
+        ----------
+        sources : iterable of str
+            Lumps, for example those with a sensor.
+
+        Returns
+        -------
+        dict
+            Lump to nearest source; a lump that no source reaches is left out.
+        """
+        index = {name: i for i, name in enumerate(self.lumps)}
+        names, targets = list(self.lumps), [index[name] for name in sources]
+        if not targets:
+            return {}
+        edges = [(index[a], index[b], 1.0 / max(g, 1e-12)) for a, b, g in self._paths() if a in index and b in index]
+        rows, columns, weights = zip(*edges, strict=True) if edges else ((), (), ())
+        graph = csr_array((np.array(weights, float), (rows, columns)), shape=(len(names), len(names)))
+        _, _, origin = dijkstra(graph, directed=False, indices=targets, min_only=True, return_predecessors=True)
+        return {names[i]: names[o] for i, o in enumerate(origin) if o >= 0}
+
+    def _paths(self) -> list[tuple[str, str, float]]:
+        links = [(*link.between, link.conductance + (link.natural.gain if link.natural else 0.0)
+                  + 4 * (link.radiation or 0.0) * 300.0**3) for link in self.links]
+        return links + [(m.hot, m.cold, m.conductance.value) for m in self.modules.values()]
+
+
+def equations(system: System) -> Equations:
+    """Equations of a system, refusing what is not one."""
+    if not isinstance(system, System):
+        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
+                         remedy="Read one with rt.read_system(path).")
+    return Equations(system)
+
+
+def build(data: Mapping[str, Any], where: str) -> System:
+    """Build a system, naming `where` it came from in every refusal."""
+    try:
+        return System(**data)
+    except InputError as error:
+        raise InputError(error.what, where=f"{where} {error.where}".strip(), expected=error.expected,
+                         remedy=error.remedy) from None

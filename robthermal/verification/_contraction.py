@@ -1,0 +1,126 @@
+"""Kind "contraction": E x' = f(x, I) contracts in one norm over a box of temperatures and currents."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flint import fmpq
+
+from robthermal.errors import InputError
+
+from . import _energy, _lyapunov, _weighted
+from ._fields import get, mapping, margin_of, not_negative, numbers, sequence, text
+from ._kind import Kind, Proof, working_precision
+from ._numbers import name_of, round_down, show
+from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
+
+_NORMS = {
+    "sum": "the weighted sum of absolute differences",
+    "max": "the weighted largest difference",
+    "energy": "the capacity-weighted sum of squared differences",
+    "lyapunov": "the quadratic form e'Pe of the differences",
+}
+
+
+@dataclass(frozen=True)
+class Contraction:
+    """The exact problem of one contraction certificate."""
+
+    system: ThermalSystem
+    region: Region
+    method: str
+    rate: fmpq
+    margin: fmpq
+    weights: tuple[fmpq, ...]
+    matrix: tuple[tuple[fmpq, ...], ...]
+
+
+def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
+    """Return the exact problem, or raise InputError."""
+    network = read_system(system)
+    box = read_region(region, network)
+    table = mapping(evidence, "evidence")
+    method = text(get(table, "method", "evidence"), "evidence.method")
+    if method not in _NORMS:
+        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(_NORMS)}")
+    rate = not_negative(get(table, "rate", "evidence"), "evidence.rate")
+    n = len(network.lumps)
+    weights: list[fmpq] = []
+    matrix: list[list[fmpq]] = []
+    if method in ("sum", "max"):
+        weights = numbers(get(table, "weights", "evidence"), n, "evidence.weights")
+    if method == "lyapunov":
+        rows = sequence(get(table, "matrix", "evidence"), "evidence.matrix")
+        if len(rows) != n:
+            raise InputError(f"{len(rows)} rows", where="evidence.matrix", expected=f"{n}, one per lump")
+        matrix = [numbers(row, n, f"evidence.matrix[{k}]") for k, row in enumerate(rows)]
+    return Contraction(network, box, method, rate, margin_of(margin, "rate"), tuple(weights),
+                       tuple(tuple(row) for row in matrix))
+
+
+def claim(problem: Contraction) -> str:
+    """Return the one sentence the data give."""
+    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
+             else "decays strictly")
+    return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}: "
+            f"between any two trajectories in this box under the same inputs, {_NORMS[problem.method]} "
+            f"(method {problem.method}) {speed}.")
+
+
+def prove(problem: Contraction) -> Proof:
+    """Prove the inequality of the method over the whole box, with the stored margin added to the rate."""
+    with working_precision():
+        if problem.method in ("sum", "max"):
+            return _weighted.prove(problem)
+        return _prove_matrix(problem)
+
+
+def find_margin(problem: Contraction) -> dict[str, float]:
+    """Return a margin that the checker proves, close to the largest [1/s]."""
+    with working_precision():
+        if problem.method in ("sum", "max"):
+            extra = round_down(_weighted.largest_margin(problem))
+        else:
+            extra = _search(problem)
+    return {"rate": shorten(extra)}
+
+
+def shorten(value: float) -> float:
+    """Return four digits of a margin, rounded to the safe side by about a thousandth."""
+    return float(f"{value * 0.999:.4g}") if value > 0 else 0.0
+
+
+def _prove_matrix(problem: Contraction) -> Proof:
+    extra = max(problem.margin, fmpq(0))
+    proof = _prove_rate(problem, problem.rate + extra)
+    if proof.valid:
+        return replace(proof, margins={"rate": round_down(extra)})
+    if extra > 0 and _prove_rate(problem, problem.rate).valid:
+        return Proof(False, f"stored margin {show(extra)} 1/s is larger than what can be proven: {proof.reason}")
+    return proof
+
+
+def _prove_rate(problem: Contraction, rate: fmpq) -> Proof:
+    return (_energy if problem.method == "energy" else _lyapunov).prove(problem, rate)
+
+
+def _search(problem: Contraction) -> float:
+    """Bisect the proof itself: the largest additional rate that is still proven, to two per mille."""
+    def proven(extra: float) -> bool:
+        return _prove_rate(problem, problem.rate + fmpq(*extra.as_integer_ratio())).valid
+
+    low, high = 0.0, max(round_down(problem.rate), 1e-6)
+    for _ in range(40):
+        if not proven(high):
+            break
+        low, high = high, 2 * high
+    for _ in range(40):
+        if low > 0 and high - low <= 0.002 * high or high < 1e-9:
+            break
+        middle = (low + high) / 2 if low > 0 else high / 4
+        low, high = (middle, high) if proven(middle) else (low, middle)
+    return low
+
+
+CONTRACTION = Kind("contraction", read, claim, prove, find_margin)

@@ -1,0 +1,163 @@
+"""Method "energy": sym J <= -rate E as a matrix inequality, V = e'Ee.
+
+The network is eliminated once down to the lumps of the modules (Schur complement, the same for every vertex of the
+box); what is left is a matrix as small as the modules, checked at the vertices of the box (proof note, 3).
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from flint import arb, fmpq
+
+from ._definite import eliminate, is_positive, is_semidefinite
+from ._kind import Proof
+from ._numbers import as_float, name_of, show
+from ._slopes import least_ambient_slope, natural_slope, radiation_slope
+from ._vertices import Cluster, Point, Vertex, clusters, count, describe, endpoints, hull, vertices
+
+if TYPE_CHECKING:
+    from ._contraction import Contraction
+
+Block = list[list[fmpq]]
+_MOST_PER_CLUSTER = 5_000
+_MOST_PRUNED = 200
+_MOST_TOGETHER = 20_000
+_PIECES = 8
+
+
+def prove(problem: Contraction, rate: fmpq) -> Proof:
+    """Prove that -(sym J + rate E) is positive definite over the box."""
+    system = problem.system
+    groups = clusters(system)
+    ports = sorted(lump for group in groups for lump in group.lumps)
+    rows = [{j: arb(value) for j, value in row.items()} for row in _network(problem, rate)]
+    failed = eliminate(rows, set(ports))
+    if failed is not None:
+        return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven even without the "
+                            f"modules, at lump {name_of(system.lumps[failed])}")
+    points = [_points(problem, k) for k in range(len(system.modules))]
+    for group in groups:
+        if count(group, problem.region, points) > _MOST_PER_CLUSTER:
+            return Proof(False, f"method energy: too many vertices ({count(group, problem.region, points)}) of modules "
+                                "that share lumps to check them one by one")
+    choices = [_undominated(group, vertices(system, problem.region, group, points)) for group in groups]
+    rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
+    return _check(problem, rate, rest, ports, groups, choices)
+
+
+def _network(problem: Contraction, rate: fmpq) -> list[dict[int, fmpq]]:
+    """Return -(sym A + rate E) of the links: for links that are not linear, a lower bound in the matrix order."""
+    system, region = problem.system, problem.region
+    rows = [{k: -rate * capacity} for k, capacity in enumerate(system.capacity)]
+    for link in system.links:
+        a, b = link.nodes
+        if isinstance(a, int) and isinstance(b, int):
+            here, there = region.temperature[a], region.temperature[b]
+            g = link.conductance + natural_slope(link, here, there)[0]
+            u, v = radiation_slope(link, here), radiation_slope(link, there)
+            # The slope at a enters as -u z_a² + u z_a z_b; beyond its least value that is at most (u - u_min) z_b²/4.
+            rows[a][a] += g + u[0] - (v[1] - v[0]) / 4
+            rows[b][b] += g + v[0] - (u[1] - u[0]) / 4
+            between = rows[a].get(b, fmpq(0)) - g - (u[0] + v[0]) / 2
+            rows[a][b] = rows[b][a] = between
+        else:
+            for lump in (node for node in (a, b) if isinstance(node, int)):
+                rows[lump][lump] += least_ambient_slope(link, lump, region)
+    return rows
+
+
+def _points(problem: Contraction, k: int) -> list[Point]:
+    """Return the current points of a module: sym J is convex in the current when R' >= 0, so its ends suffice."""
+    interval = problem.region.current[k]
+    return endpoints(interval) if problem.system.modules[k].resistance[1] >= 0 else hull(interval, _PIECES)
+
+
+def _block(group: Cluster, vertex: Vertex) -> Block:
+    get = vertex.entries.get
+    zero = fmpq(0)
+    return [[(get((i, j), zero) + get((j, i), zero)) / 2 for j in group.lumps] for i in group.lumps]
+
+
+def _undominated(group: Cluster, found: list[Vertex]) -> list[tuple[Block, Vertex]]:
+    """Drop vertices whose block is below another's in the matrix order: they are implied."""
+    pairs = [(_block(group, vertex), vertex) for vertex in found]
+    if len(pairs) > _MOST_PRUNED:
+        return pairs
+    kept: list[tuple[Block, Vertex]] = []
+    for pair in pairs:
+        if any(_below(pair[0], other) for other, _ in kept):
+            continue
+        kept = [item for item in kept if not _below(item[0], pair[0])]
+        kept.append(pair)
+    return kept
+
+
+def _below(lower: Block, upper: Block) -> bool:
+    return is_semidefinite([[b - a for a, b in zip(low, up, strict=True)]
+                            for low, up in zip(lower, upper, strict=True)])
+
+
+def _check(problem: Contraction, rate: fmpq, rest: list[list[arb]], ports: list[int], groups: list[Cluster],
+           choices: list[list[tuple[Block, Vertex]]]) -> Proof:
+    if math.prod(len(choice) for choice in choices) > _MOST_TOGETHER:
+        return _check_common_bound(rate, rest, ports, groups, choices)
+    balls = [[([[arb(entry) for entry in row] for row in block], vertex) for block, vertex in choice]
+             for choice in choices]
+    place = {lump: k for k, lump in enumerate(ports)}
+    for chosen in product(*balls):
+        matrix = [list(row) for row in rest]
+        for group, (block, _) in zip(groups, chosen, strict=True):
+            _subtract(matrix, [place[lump] for lump in group.lumps], block)
+        if not is_positive(matrix):
+            where = "; ".join(describe(problem.system, group, vertex)
+                              for group, (_, vertex) in zip(groups, chosen, strict=True))
+            return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven at {where} "
+                                f"(least eigenvalue left on the module lumps {_least(matrix):.3g} W/K)")
+    return Proof(True, f"-(sym J + {show(rate)} E) is positive definite at every vertex of the box that is not "
+                       "implied by another")
+
+
+def _check_common_bound(rate: fmpq, rest: list[list[arb]], ports: list[int], groups: list[Cluster],
+                        choices: list[list[tuple[Block, Vertex]]]) -> Proof:
+    """With too many vertices, replace those of each cluster by one matrix above them all (sound, less sharp)."""
+    place = {lump: k for k, lump in enumerate(ports)}
+    matrix = [list(row) for row in rest]
+    for group, choice in zip(groups, choices, strict=True):
+        blocks = [block for block, _ in choice]
+        above = _upper_bound(blocks)
+        if above is None or not all(_below(block, above) for block in blocks):
+            return Proof(False, "method energy: too many vertices to check one by one, and no common bound was proven")
+        _subtract(matrix, [place[lump] for lump in group.lumps], [[arb(entry) for entry in row] for row in above])
+    if is_positive(matrix):
+        return Proof(True, f"-(sym J + {show(rate)} E) is positive definite for a common bound of all vertices")
+    return Proof(False, f"method energy: too many vertices to check one by one, and sym J < -{show(rate)} E is not "
+                        f"proven for their common bound (least eigenvalue {_least(matrix):.3g} W/K)")
+
+
+def _upper_bound(blocks: list[Block]) -> Block | None:
+    """Return a matrix that should lie above all blocks; a hint from floats, checked exactly by the caller."""
+    floats = [np.array([[as_float(entry) for entry in row] for row in block]) for block in blocks]
+    bound = floats[0]
+    for block in floats[1:]:
+        values, vectors = np.linalg.eigh(block - bound)
+        bound = bound + (vectors * np.maximum(values, 0.0)) @ vectors.T
+    bound = (bound + bound.T) / 2 + 1e-12 * np.max(np.abs(bound)) * np.eye(len(bound))
+    if not bool(np.all(np.isfinite(bound))):
+        return None
+    return [[fmpq(*entry.as_integer_ratio()) for entry in row] for row in bound.tolist()]
+
+
+def _subtract(matrix: list[list[arb]], places: list[int], block: list[list[arb]]) -> None:
+    for i, row in zip(places, block, strict=True):
+        for j, entry in zip(places, row, strict=True):
+            matrix[i][j] -= entry
+
+
+def _least(matrix: list[list[arb]]) -> float:
+    """Return the least eigenvalue in floats, for a message only."""
+    floats = np.array([[float(entry) for entry in row] for row in matrix])
+    return float(np.linalg.eigvalsh(floats)[0]) if bool(np.all(np.isfinite(floats))) else math.nan

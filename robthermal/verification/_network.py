@@ -1,0 +1,227 @@
+"""Kind "network": a large cooperative network E x' = A x decays in a weighted largest or summed temperature.
+
+Rows (or columns) are bounded by floating-point sums with a rigorous error bound, all at once; the few that this cannot
+decide are decided in exact rational arithmetic (proof note, 7).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpq
+from numpy.typing import NDArray
+
+from robthermal.errors import InputError
+
+from ._fields import get, mapping, margin_of, not_negative, text
+from ._kind import Kind, Proof
+from ._numbers import as_float, exact, name_of, round_down, show
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+_UNIT = 2.0**-52  # twice the rounding error of one operation
+_MODERATE = (1e-90, 1e90)  # products of three such numbers neither overflow nor underflow
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A list of exact numbers and the doubles nearest to them."""
+
+    source: Any
+    nearest: Floats
+
+    def at(self, k: int) -> fmpq:
+        """Return one number exactly."""
+        return exact(self.source[k], "number")
+
+
+@dataclass(frozen=True)
+class Network:
+    """The problem of one network certificate."""
+
+    capacity: Numbers
+    rows: Indices
+    cols: Indices
+    values: Numbers
+    method: str
+    rate: fmpq
+    weights: Numbers
+    margin: fmpq
+
+
+def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
+    """Return the problem, or raise InputError."""
+    table, found = mapping(system, "system"), mapping(evidence, "evidence")
+    mapping(region, "region")
+    capacity = _numbers(get(table, "capacity", "system"), "system.capacity")
+    n = len(capacity.nearest)
+    if n == 0 or not bool(np.all(capacity.nearest > 0)):
+        where = int(np.argmin(capacity.nearest > 0)) if n else 0
+        raise InputError(f"capacity of lump {where} is missing or not positive", where="system.capacity")
+    rows = _indices(get(table, "rows", "system"), n, "system.rows")
+    cols = _indices(get(table, "cols", "system"), n, "system.cols")
+    values = _numbers(get(table, "values", "system"), "system.values")
+    if not len(rows) == len(cols) == len(values.nearest):
+        raise InputError(f"{len(rows)} rows, {len(cols)} cols, {len(values.nearest)} values", where="system",
+                         expected="the same number of each")
+    _no_duplicates(rows, cols, n)
+    method = text(found.get("method", "max"), "evidence.method")
+    if method not in ("max", "sum"):
+        raise InputError(f"method {name_of(method)}", where="evidence.method", expected="'max' or 'sum'")
+    weights = _numbers(get(found, "weights", "evidence"), "evidence.weights")
+    if len(weights.nearest) != n:
+        raise InputError(f"{len(weights.nearest)} weights", where="evidence.weights", expected=f"{n}, one per lump")
+    rate = not_negative(get(found, "rate", "evidence"), "evidence.rate")
+    return Network(capacity, rows, cols, values, method, rate, weights, margin_of(margin, "rate"))
+
+
+def claim(problem: Network) -> str:
+    """Return the one sentence the data give."""
+    norm = "largest" if problem.method == "max" else "summed"
+    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
+             else "decays strictly")
+    return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries is stable: "
+            f"the weighted {norm} absolute temperature difference (method {problem.method}) between any two of its "
+            f"trajectories under the same inputs {speed}.")
+
+
+def prove(problem: Network) -> Proof:
+    """Prove the inequality of every row (max) or column (sum), with the stored margin added to the rate."""
+    off = problem.rows != problem.cols
+    negative = np.flatnonzero(off & (problem.values.nearest < 0))
+    if len(negative):
+        k = int(negative[0])
+        return Proof(False, f"not Metzler: A[{problem.rows[k]}, {problem.cols[k]}] = {problem.values.nearest[k]!r}")
+    low = np.flatnonzero(~(problem.weights.nearest > 0))
+    if len(low):
+        return Proof(False, f"weight of lump {low[0]} is {float(problem.weights.nearest[low[0]])!r}, not positive")
+    extra = max(problem.margin, fmpq(0))
+    failed = _first_failure(problem, problem.rate + extra)
+    if failed is None:
+        return Proof(True, f"every weighted {_line(problem)} is bounded", {"rate": round_down(extra)})
+    lump, value = failed
+    if extra > 0 and _first_failure(problem, problem.rate) is None:
+        return Proof(False, f"stored margin {show(extra)} 1/s is larger than the recomputed one: {_line(problem)} "
+                            f"{lump} decays at {show(-value)} 1/s, rate {show(problem.rate)} 1/s")
+    return Proof(False, f"weighted {_line(problem)} {lump} is {show(value)} 1/s, not "
+                        f"{'<=' if problem.rate + extra > 0 else '<'} -{show(problem.rate + extra)} 1/s")
+
+
+def find_margin(problem: Network) -> dict[str, float]:
+    """Return a margin that is proven for every line, rounded to the safe side [1/s]."""
+    sums, bounds, scale = _sums(problem, 0.0)
+    with np.errstate(all="ignore"):
+        least = float(np.min(-(sums + bounds) / scale)) - as_float(problem.rate)
+    extra = float(f"{least * 0.999:.4g}") if math.isfinite(least) and least > 0 else 0.0
+    proven = extra > 0 and _first_failure(problem, problem.rate + exact(extra, "margin")) is None
+    return {"rate": extra if proven else 0.0}
+
+
+def _line(problem: Network) -> str:
+    return "row" if problem.method == "max" else "column"
+
+
+def _first_failure(problem: Network, rate: fmpq) -> tuple[int, fmpq] | None:
+    """Return the first line that does not satisfy its inequality and its exact value over w E [1/s], or None."""
+    sums, bounds, _ = _sums(problem, as_float(rate))
+    with np.errstate(all="ignore"):
+        open_lines = np.flatnonzero(~(sums + bounds < 0))  # also where anything is not finite
+    if not len(open_lines):
+        return None
+    lines, _ = _lines(problem)
+    order = np.argsort(lines, kind="stable")
+    starts = np.searchsorted(lines[order], open_lines, side="left")
+    stops = np.searchsorted(lines[order], open_lines, side="right")
+    for lump, start, stop in zip(open_lines.tolist(), starts.tolist(), stops.tolist(), strict=True):
+        value = _exact_line(problem, lump, order[start:stop])
+        if value > -rate or (value == 0 and rate == 0):
+            return lump, value
+    return None
+
+
+def _lines(problem: Network) -> tuple[Indices, Indices]:
+    """Return the line of every entry and the lump whose weight multiplies it."""
+    return (problem.rows, problem.cols) if problem.method == "max" else (problem.cols, problem.rows)
+
+
+def _sums(problem: Network, rate: float) -> tuple[Floats, Floats, Floats]:
+    """Return sum_j A_ij w_j + rate E_i w_i in floats, a bound of its error, and E_i w_i.
+
+    Each of k + 1 terms is a product of at most three doubles that differ from the exact numbers by one rounding each:
+    at most five roundings, and k more for the sum in any order, so the error is below gamma_(k+5) times the sum T of
+    absolute values (Higham, Accuracy and Stability, lemma 3.1 and section 4.2). (k + 16) 2^-52 times the computed T is
+    larger than that, T's own rounding included. Where a number is so small or large that a product could underflow or
+    overflow the bound is infinite, and the line is decided exactly.
+    """
+    lines, others = _lines(problem)
+    n = len(problem.capacity.nearest)
+    with np.errstate(all="ignore"):
+        terms = problem.values.nearest * problem.weights.nearest[others]
+        scale = problem.capacity.nearest * problem.weights.nearest
+        decay = rate * scale
+        sums = np.bincount(lines, terms, n) + decay
+        total = np.bincount(lines, np.abs(terms), n) + decay
+        bounds = total * (np.bincount(lines, minlength=n) + 16.0) * _UNIT
+    extreme = ~_moderate(problem.weights.nearest) | ~_moderate(problem.capacity.nearest)
+    odd = (~_moderate(problem.values.nearest) & (problem.values.nearest != 0)) | extreme[others]
+    extreme[lines[odd]] = True
+    if rate != 0 and not _MODERATE[0] <= rate <= _MODERATE[1]:
+        extreme[:] = True
+    bounds[extreme] = math.inf
+    return sums, bounds, scale
+
+
+def _moderate(values: Floats) -> NDArray[np.bool_]:
+    size = np.abs(values)
+    return (size >= _MODERATE[0]) & (size <= _MODERATE[1])
+
+
+def _exact_line(problem: Network, lump: int, entries: Indices) -> fmpq:
+    """Return (sum_j A_ij w_j)/(E_i w_i) exactly [1/s]."""
+    _, others = _lines(problem)
+    total = fmpq(0)
+    for k in entries.tolist():
+        total += problem.values.at(k) * problem.weights.at(int(others[k]))
+    return total / (problem.capacity.at(lump) * problem.weights.at(lump))
+
+
+def _numbers(value: Any, where: str) -> Numbers:
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim == 1:
+        if not bool(np.all(np.isfinite(value))):
+            raise InputError(f"entry {int(np.argmin(np.isfinite(value)))} is not finite", where=where)
+        return Numbers(value, value)
+    if not isinstance(value, (list, tuple)):
+        raise InputError(f"{name_of(type(value).__name__)} is not a list of numbers", where=where)
+    nearest = [item if type(item) is float and math.isfinite(item) else as_float(exact(item, f"{where}[{k}]"))
+               for k, item in enumerate(value)]
+    return Numbers(value, np.array(nearest, dtype=np.float64))
+
+
+def _indices(value: Any, n: int, where: str) -> Indices:
+    if isinstance(value, np.ndarray):
+        if value.ndim != 1 or value.dtype.kind not in "iu":
+            raise InputError(f"array of {value.dtype}", where=where, expected="a list of integers")
+        bad = np.flatnonzero((value < 0) | (value >= n))
+        if len(bad):
+            raise InputError(f"index {value[bad[0]]}", where=f"{where}[{bad[0]}]", expected=f"0 to {n - 1}")
+        return value.astype(np.int64)
+    if not isinstance(value, (list, tuple)):
+        raise InputError(f"{name_of(type(value).__name__)} is not a list of integers", where=where)
+    for k, item in enumerate(value):
+        if type(item) is not int or not 0 <= item < n:
+            raise InputError(f"index {name_of(item)}", where=f"{where}[{k}]", expected=f"an integer from 0 to {n - 1}")
+    return np.array(value, dtype=np.int64)
+
+
+def _no_duplicates(rows: Indices, cols: Indices, n: int) -> None:
+    keys = np.sort(rows * np.int64(n) + cols)
+    twice = np.flatnonzero(keys[1:] == keys[:-1])
+    if len(twice):
+        key = int(keys[twice[0]])
+        raise InputError(f"entry ({key // n}, {key % n}) is given twice", where="system.rows, system.cols")
+
+
+NETWORK = Kind("network", read, claim, prove, find_margin)

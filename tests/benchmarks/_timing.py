@@ -1,0 +1,36 @@
+"""Shared by the benchmarks: run a few times, keep the best, print one table row."""
+
+from __future__ import annotations
+
+import gc
+import os
+import platform
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+def best_of(run: Callable[[], Result], *, repeats: int = 3) -> tuple[float, Result]:
+    """Shortest wall time [s] of `repeats` runs, and the last result: the minimum is the code, the rest the machine."""
+    times = []
+    for _ in range(repeats):
+        gc.collect()
+        start = time.perf_counter()
+        result = run()
+        times.append(time.perf_counter() - start)
+    return min(times), result
+
+
+def header(title: str) -> None:
+    """Print a title and the machine the rows below belong to."""
+    threads = os.environ.get("OMP_NUM_THREADS", "not set")
+    print(f"\n{title}\n{'-' * len(title)}")
+    machine = f"{platform.machine()}, {os.cpu_count()} cores"
+    print(f"Python {platform.python_version()}, {machine}, OMP_NUM_THREADS {threads}")
+
+
+def row(what: str, seconds: float, note: str = "") -> None:
+    """Print one measured time [s] and what it is compared with."""
+    print(f"{what:<52} {seconds:>10.3f} s   {note}".rstrip(), flush=True)

@@ -1,0 +1,64 @@
+"""The documentation builds without a warning, names every public object, and its examples are read."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sphinx.util.inventory import InventoryFile
+
+import robthermal as rt
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("docs")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
+    command += ["-d", str(target / "doctrees"), str(DOCS), str(target / "html")]
+    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert run.returncode == 0, run.stderr
+    return target / "html"
+
+
+def test_every_public_name_is_on_a_page(built: Path) -> None:
+    inventory = InventoryFile.loads((built / "objects.inv").read_bytes(), uri="")
+    on_a_page = {name for kind, entries in inventory.data.items() if kind.startswith("py:") for name in entries}
+    public = {
+        f"robthermal.{room}.{name}"
+        for room in rt._ROOMS
+        for name in getattr(import_module(f"robthermal.{room}"), "__all__", ["InputError", "Diverged", "Outcome"])
+    }
+    assert not public - on_a_page
+
+
+def test_pages_fetch_nothing_but_the_formula_renderer(built: Path) -> None:
+    fetched = re.compile(r"<(?:script|img|iframe|link)\b[^>]*\s(?:src|href)=\"(https?://[^\"]+)")
+    pages = list(built.rglob("*.html"))
+    assert pages
+    remote = {address for page in pages for address in fetched.findall(page.read_text(encoding="utf-8"))}
+    assert {address for address in remote if "mathjax" not in address} == set()
+
+
+def code_block(page: Path, language: str) -> str:
+    found = re.search(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
+    assert found, f"{page.name} has no {language} block"
+    return found.group(1)
+
+
+def test_the_system_and_record_of_the_start_page_are_read(tmp_path: Path) -> None:
+    (tmp_path / "bench.toml").write_text(code_block(DOCS / "start.md", "toml"), encoding="utf-8")
+    (tmp_path / "run.csv").write_text(code_block(DOCS / "start.md", "text"), encoding="utf-8")
+    system = rt.read_system(tmp_path / "bench.toml")
+    record = rt.read_record(tmp_path / "run.csv", system)
+    assert record.sample_time == 1.0
+    np.testing.assert_allclose(record["T_plate"], [22.10 + 273.15, 22.11 + 273.15])
+    np.testing.assert_allclose(record["m1"], [0.0, 0.8])

@@ -1,0 +1,268 @@
+"""Tests that read the package: who imports whom, what is documented, what is public, what it depends on."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+from importlib import import_module, metadata
+from pathlib import Path
+from types import ModuleType
+
+import grimp
+import pytest
+from importlinter import cli as import_linter
+from numpydoc.docscrape import NumpyDocString
+from packaging.requirements import Requirement
+
+import robthermal as rt
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "robthermal"
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+ROOMS = rt._ROOMS
+FILES = sorted(PACKAGE.rglob("*.py"))
+CONTRACTS = [contract["id"] for contract in PYPROJECT["tool"]["importlinter"]["contracts"]]
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@cache
+def import_graph() -> grimp.ImportGraph:
+    return grimp.build_graph(
+        "robthermal", include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None
+    )
+
+
+# Who imports whom
+
+
+@pytest.mark.parametrize("contract", CONTRACTS)
+def test_import_contract(contract: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ROOT)
+    status = import_linter.lint_imports(
+        config_filename=str(ROOT / "pyproject.toml"), limit_to_contracts=(contract,), no_cache=True
+    )
+    assert status == 0, capsys.readouterr().out
+
+
+def test_no_import_cycles() -> None:
+    graph = import_graph()
+    uses = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    try:
+        TopologicalSorter(uses).prepare()
+    except CycleError as cycle:
+        pytest.fail(f"import cycle: {' -> '.join(cycle.args[1])}")
+
+
+def test_no_room_goes_through_the_front_door() -> None:
+    # `import robthermal` inside a room would let it reach every other room past the contract.
+    guests = import_graph().find_modules_that_directly_import("robthermal")
+    assert guests <= {"robthermal.cli", "robthermal.__main__"}
+
+
+def test_checker_imports_only_what_its_proofs_need() -> None:
+    graph = import_graph()
+    trusted = {"robthermal.errors", "numpy", "flint"} | set(sys.stdlib_module_names)
+    inside = {module for module in graph.modules if f"{module}.".startswith("robthermal.verification.")}
+    assert inside
+    foreign = {
+        (module, imported)
+        for module in inside
+        for imported in graph.find_modules_directly_imported_by(module) - inside
+        if imported not in trusted and imported.split(".")[0] not in trusted
+    }
+    assert not foreign
+
+
+def test_importing_the_package_loads_no_heavy_dependency() -> None:
+    heavy = {"numpy", "scipy", "pandas", "control", "matplotlib", "cvxpy", "clarabel", "flint", "pydantic", "jinja2"}
+    code = "import sys, robthermal; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(run.stdout.split())
+    assert "robthermal" in loaded
+    assert not loaded & heavy
+
+
+def imports_inside_functions(path: Path) -> Iterator[tuple[int, str]]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    for node in {node for function in functions for node in ast.walk(function)}:
+        if isinstance(node, ast.Import):
+            yield node.lineno, node.names[0].name
+        elif isinstance(node, ast.ImportFrom):
+            yield node.lineno, "." * node.level + (node.module or "")
+
+
+@pytest.mark.parametrize("path", FILES, ids=relative)
+def test_imports_stand_at_the_top(path: Path) -> None:
+    # Heavy and seldom needed: drawing, two optional file formats, package metadata. Nothing else may hide.
+    may_wait = ("matplotlib", "nptdms", "pyarrow", "importlib.metadata")
+    hidden = [(line, name) for line, name in imports_inside_functions(path) if not name.startswith(may_wait)]
+    assert not hidden, f"{relative(path)}: imports inside functions at (line, module) {sorted(hidden)}"
+
+
+@pytest.mark.parametrize("path", FILES, ids=relative)
+def test_no_file_is_longer_than_400_lines(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
+
+
+# What is public
+
+
+def test_rooms_are_the_packages_that_exist() -> None:
+    public = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()} | {"errors"}
+    assert set(ROOMS) == public, "list the room in robthermal/__init__.py"
+    pages = {path.stem for path in (ROOT / "docs" / "api").glob("*.md")} - {"index"}
+    assert pages == public, "give the room a page in docs/api"
+
+
+def test_every_top_level_name_loads_and_is_the_one_of_its_room() -> None:
+    for name in rt.__all__:
+        assert getattr(rt, name) is not None
+    for name, room in rt._HOME.items():
+        assert getattr(rt, name) is getattr(import_module(f"robthermal.{room}"), name)
+
+
+def test_unknown_top_level_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = rt.nonsense
+
+
+def test_type_checkers_see_the_lazy_names() -> None:
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    guard = next(node for node in tree.body if isinstance(node, ast.If))
+    seen: dict[str, str | None] = {}
+    for node in guard.body:
+        assert isinstance(node, ast.ImportFrom)
+        seen |= {alias.name: node.module for alias in node.names}
+    assert seen == {**rt._HOME, **dict.fromkeys(ROOMS)}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_room_has_an_export_list_and_no_name_of_another_library(room: str) -> None:
+    module = import_module(f"robthermal.{room}")
+    for name in public_names(module):
+        value = getattr(module, name)
+        assert not inspect.ismodule(value), f"{room}.{name} is a module"
+        assert getattr(value, "__module__", "robthermal").startswith("robthermal"), f"{room}.{name} is not ours"
+
+
+def public_names(module: ModuleType) -> list[str]:
+    if module.__name__ == "robthermal.errors":  # one file, no export list: everything it defines
+        return [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
+    names = list(module.__all__)
+    assert names and len(names) == len(set(names))
+    return names
+
+
+# What is documented
+
+
+def public_callables() -> Iterator[tuple[str, object]]:
+    for room in ROOMS:
+        module = import_module(f"robthermal.{room}")
+        for name in public_names(module):
+            value = getattr(module, name)
+            if not callable(value):
+                continue
+            yield f"{room}.{name}", value
+            if inspect.isclass(value):
+                for method, member in vars(value).items():
+                    inner = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
+                    if not method.startswith("_") and inspect.isfunction(inner):
+                        yield f"{room}.{name}.{method}", inner
+
+
+def described_parameters(value: object) -> set[str]:
+    doc = NumpyDocString(inspect.getdoc(value) or "")
+    entries = [*doc["Parameters"], *doc["Other Parameters"], *doc["Attributes"]]
+    return {name.strip().lstrip("*") for entry in entries for name in entry.name.split(",")}
+
+
+def undocumented(value: object) -> set[str]:
+    if inspect.isclass(value) and issubclass(value, Exception) and value.__init__ is Exception.__init__:
+        return set()
+    parameters = inspect.signature(value).parameters  # type: ignore[arg-type]
+    wanted = {name for name in parameters if name not in {"self", "cls"} and not name.startswith("_")}
+    return wanted - described_parameters(value)
+
+
+def is_enum_like(value: object) -> bool:
+    return inspect.isclass(value) and hasattr(value, "__members__")
+
+
+def test_every_public_callable_describes_every_parameter() -> None:
+    missing = {}
+    for name, value in public_callables():
+        if not inspect.getdoc(value):
+            missing[name] = "no docstring"
+        elif not is_enum_like(value) and undocumented(value):
+            missing[name] = f"parameters not described: {sorted(undocumented(value))}"
+    assert not missing, "\n".join(f"{name}: {what}" for name, what in missing.items())
+
+
+def test_every_public_function_has_an_example_that_runs() -> None:
+    # Doctests are collected by pytest; here only that there is one. Methods are shown by the example of their class.
+    top = [(name, value) for name, value in public_callables() if name.count(".") == 1 and inspect.isroutine(value)]
+    assert top
+    assert not [name for name, value in top if ">>>" not in (inspect.getdoc(value) or "")]
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))], ids=relative)
+def test_names_in_the_text_exist(page: Path) -> None:
+    mentioned = re.findall(r"\brt\.([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)", page.read_text(encoding="utf-8"))
+    for dotted in sorted(set(mentioned)):
+        value: object = rt
+        for part in dotted.split("."):
+            assert hasattr(value, part), f"{relative(page)} speaks of rt.{dotted}, which does not exist"
+            value = getattr(value, part)
+
+
+def test_one_version_everywhere() -> None:
+    version = PYPROJECT["project"]["version"]
+    assert re.search(rf"^version: {re.escape(version)}$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.M)
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+# What it depends on
+
+
+def installed_dependencies() -> dict[str, metadata.Distribution]:
+    """Every distribution that `pip install robthermal` brings in, without extras."""
+    found: dict[str, metadata.Distribution] = {}
+    waiting = list(PYPROJECT["project"]["dependencies"])
+    while waiting:
+        requirement = Requirement(waiting.pop())
+        if requirement.marker is not None and not requirement.marker.evaluate({"extra": ""}):
+            continue
+        name = re.sub(r"[-_.]+", "-", requirement.name).lower()
+        if name not in found:
+            found[name] = metadata.distribution(name)
+            waiting += found[name].requires or []
+    return found
+
+
+def licence_of(distribution: metadata.Distribution) -> str:
+    """What a distribution says of its licence: expression and classifiers, else the first line of the text."""
+    fields = distribution.metadata
+    stated = [fields.get("License-Expression"), *(fields.get_all("Classifier") or [])]
+    texts = [text for text in stated[:1] if text] + [text for text in stated[1:] if text.startswith("License ::")]
+    return " ".join(texts) or (fields.get("License") or "").strip().split("\n")[0]
+
+
+def test_no_dependency_is_gpl() -> None:
+    licences = {name: licence_of(distribution) for name, distribution in installed_dependencies().items()}
+    assert {"numpy", "cvxpy", "python-flint"} <= set(licences)
+    lesser = re.compile(r"LGPL|Lesser General Public", re.I)
+    strong = re.compile(r"GPL|General Public License", re.I)
+    assert not {name: text for name, text in licences.items() if strong.search(lesser.sub("", text))}
+    assert not [name for name, text in licences.items() if not text], "no licence stated: look it up"
