@@ -28,7 +28,7 @@ def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_w
 
     The noise is seen between the lines, where a periodic input and a time-invariant system leave nothing but noise and
     transient; the transient is a local polynomial there and is removed from the lines. What then varies from one
-    realisation to the next beyond the noise is nonlinear distortion: more periods do not average it, more realisations do.
+    realisation to the next beyond the noise is nonlinear distortion: more realisations average it, more periods do not.
 
     Parameters
     ----------
@@ -195,5 +195,5 @@ def _advice(distortion: Array, noise: Array) -> str:
     """Which of the two dominates the variance of one realisation, over all lines and outputs."""
     part, rest = (np.einsum("oof->o", matrix).real for matrix in (distortion, noise))
     if np.any(part > rest):
-        return "Nonlinear distortion dominates: more realisations reduce the error, more periods do not; or excite less."
-    return "Noise dominates: more periods or more realisations reduce the error alike; or excite more."
+        return "Nonlinear distortion dominates: take more realisations (more periods do not help), or excite less."
+    return "Noise dominates: take more periods or more realisations, or excite more."

@@ -85,7 +85,8 @@ def closed_loop(
     half_width = whole_number(half_width, "half_width", least=1)
     if not isinstance(inverse, str) or inverse not in ("matrix", "elementwise"):
         raise InputError(f"inverse is {inverse!r}", where="inverse", expected="'matrix' or 'elementwise'")
-    references = _references(reference, records)
+    several = not isinstance(record, Record)
+    references = _references(reference, records, several=several)
     n_u, n_y, n_r = len(records[0].input_names), len(records[0].output_names), references[0].shape[1]
     _check_sizes(n_u, n_y, n_r, inverse)
     names = [f"reference[{i}]" for i in range(n_r)]
@@ -117,8 +118,8 @@ def closed_loop(
     )
 
 
-def _references(reference: Any, records: Sequence[Record]) -> list[Array]:
-    given = list(reference) if isinstance(reference, (list, tuple)) and len(records) > 1 else [reference]
+def _references(reference: Any, records: Sequence[Record], *, several: bool) -> list[Array]:
+    given = list(reference) if several and isinstance(reference, (list, tuple)) else [reference]
     if len(given) != len(records):
         raise InputError(f"{len(given)} references for {len(records)} records", where="reference", expected="one each")
     return [_checked_reference(one, record) for one, record in zip(given, records, strict=True)]
@@ -201,9 +202,7 @@ def _matrix(both: _Both) -> _Quotient:
     noise_u = both.noise[n_y:, n_y:]
     # u^H dG v has variance (v^T gram v*) (u^H C_u u) for the directions of the smallest singular value.
     u, v = left[:, :, -1].T, right[:, -1, :].conj().T
-    spread = (
-        np.einsum("if,ijf,jf->f", v, gram, v.conj()).real * np.einsum("of,opf,pf->f", u.conj(), noise_u, u).real
-    )
+    spread = np.einsum("if,ijf,jf->f", v, gram, v.conj()).real * np.einsum("of,opf,pf->f", u.conj(), noise_u, u).real
     outer = np.einsum("rif,rsf,sjf->ijf", R, gram, R.conj())
     kappa = np.sqrt(np.einsum("iif->if", outer).real * np.einsum("iif->if", noise_u).real).sum(axis=0)
     return _Quotient(
@@ -249,13 +248,13 @@ def _elementwise(both: _Both) -> _Quotient:
         covariance=covariance.reshape(n * n, n * n, -1),
         noise=np.einsum("oaf,abf,pbf->opf", L, both.noise, L.conj()),
         ratio_uncertainty=np.sqrt(spread) / np.abs(b),
-        singular=singular.any(axis=0),
+        singular=np.any(singular, axis=0),
     )
 
 
 def _not_significant(square: Array, variance: Array, both: _Both) -> Array:
     q = np.maximum(both.found.degrees_of_freedom, 1)
-    return ~(square > stats.f.ppf(0.95, 2, 2 * q) * variance)
+    return np.logical_not(square > stats.f.ppf(0.95, 2, 2 * q) * variance)
 
 
 def _notes(singular: Array, frequencies: Array) -> list[str]:

@@ -1,4 +1,4 @@
-"""Empirical transfer function estimate: spectra of the output divided by those of the input. Evers (3.6)-(3.7), (4.7)."""
+"""Empirical transfer function estimate: output spectra divided by input spectra. Evers (3.6)-(3.9), (4.7)."""
 
 from __future__ import annotations
 

@@ -85,9 +85,8 @@ class LocalEstimate:
     def noise(self, bins: slice) -> Array:
         """Noise covariance (n_y, n_y, ...) of the bins in the slice (0 is bin 1)."""
         start, stop, step = bins.indices(self.n_bins)
-        found = self._solve(start + 1, max(stop, start) + 1, full_noise=True).noise
-        assert found is not None  # for the type checker: asked for in full
-        return found[..., ::step]
+        found = self._solve(start + 1, max(stop, start) + 1, full_noise=True)
+        return np.asarray(found.noise)[..., ::step]
 
     def transient(self, bins: slice) -> Array:
         """Transient of the first record at the bins in the slice, (n_y, ...)."""
@@ -141,15 +140,14 @@ class LocalEstimate:
         )
         exact = np.ones(count, dtype=bool)
         if self._kernel is not None:
-            first, last = max(start, self.basis.half_width + 1), min(stop, self.n_bins - self.basis.half_width + 1)
-            self._solve_interior(found, exact, start, first, last)
+            self._solve_interior(self._kernel, found, exact, start)
         for part in self._parts(start + np.flatnonzero(exact)):
             self._solve_exactly(found, part, part - start)
         return found
 
-    def _solve_interior(self, found: LocalArrays, exact: Array, start: int, first: int, last: int) -> None:
-        kernel = self._kernel
-        assert kernel is not None  # for the type checker: the caller has looked
+    def _solve_interior(self, kernel: Kernel, found: LocalArrays, exact: Array, start: int) -> None:
+        first = max(start, self.basis.half_width + 1)
+        last = min(start + exact.size, self.n_bins - self.basis.half_width + 1)
 
         def solve(a: int) -> None:
             b = min(a + _CHUNK, last)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -10,21 +11,22 @@ from typing import Any
 import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 from robthermal.errors import InputError, Outcome
 
-from . import _response_files, _response_plots
+from . import _response_files, _response_plots, _response_text
+from ._deferred import Deferred, fixed, narrow, part_of
+from ._regions import quantile, shared_data
 
 Array = NDArray[Any]
-Deferred = Callable[[slice], Array]  # the values of the bins in a slice, computed when they are asked for
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class FrequencyResponse:
     """Estimated frequency response G(j omega) with its uncertainty.
 
-    What is large is computed on first use: `covariance`, `transient`, `coherence`, and `noise_covariance` of very long
-    records. Work on a part with :meth:`between` when the whole would not fit in memory.
+    What is large is computed on first use: `covariance`, `transient`, `coherence`, and of very long records also
+    `noise_covariance`. Work on a part with :meth:`between` when the whole would not fit in memory.
 
     Parameters
     ----------
@@ -49,6 +51,8 @@ class FrequencyResponse:
         Part of the power of each output (transient removed) that the inputs explain [-].
     suspect : array_like of bool, shape (n_f,), optional
         Bins where the result distrusts its own local model.
+    nonlinear_covariance : array_like, shape (n_y, n_y, n_f), optional
+        Stochastic nonlinear distortion E[Y_S Y_S^H] of one period (`bla`) [output unit squared].
     ratio_uncertainty : array_like, shape (n_y, n_u, n_f), optional
         Relative standard deviation of the divisor when G is a ratio (closed loop) [-]; widens `confidence_radius`.
     input_names, output_names : sequence of str
@@ -56,7 +60,7 @@ class FrequencyResponse:
     sample_time : float
         Sample time [s].
     n_samples : int
-        Samples in the (longest) record [-].
+        Samples in the longest record [-].
     method : str
         The estimator and its settings, in words.
     half_width : int
@@ -81,6 +85,27 @@ class FrequencyResponse:
     True
     """
 
+    frequencies: Array
+    response: Array
+    degrees_of_freedom: Array
+    suspect: Array
+    gram: Array | None
+    nonlinear_covariance: Array | None
+    ratio_uncertainty: Array | None
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    sample_time: float
+    n_samples: int
+    half_width: int
+    method: str
+    notes: tuple[str, ...]
+    _covariance: Any
+    _noise: Any
+    _variance: Any
+    _transient: Any
+    _coherence: Any
+    _joint: Any
+
     def __init__(
         self,
         *,
@@ -94,6 +119,7 @@ class FrequencyResponse:
         transient: ArrayLike | Deferred | None = None,
         coherence: ArrayLike | Deferred | None = None,
         suspect: ArrayLike | None = None,
+        nonlinear_covariance: ArrayLike | None = None,
         ratio_uncertainty: ArrayLike | None = None,
         input_names: Sequence[str],
         output_names: Sequence[str],
@@ -104,17 +130,31 @@ class FrequencyResponse:
         joint: Callable[[Array], tuple[Array, Array]] | None = None,
         notes: Sequence[str] = (),
     ):
-        self.frequencies = _fixed(frequencies, float)
-        self.response = _fixed(response, complex)
-        self.degrees_of_freedom = _fixed(degrees_of_freedom, np.asarray(degrees_of_freedom).dtype)
-        self.suspect = _fixed(np.zeros(self.n_frequencies, bool) if suspect is None else suspect, bool)
-        self.gram = None if gram is None else _fixed(gram, complex)
-        self.ratio_uncertainty = None if ratio_uncertainty is None else _fixed(ratio_uncertainty, float)
-        self.input_names, self.output_names = tuple(input_names), tuple(output_names)
-        self.sample_time, self.n_samples, self.half_width = float(sample_time), int(n_samples), int(half_width)
-        self.method, self.notes = method, tuple(notes)
-        self._covariance, self._noise, self._joint = covariance, noise_covariance, joint
-        self._variance, self._transient, self._coherence = noise_variance, transient, coherence
+        count = np.size(frequencies)
+        fields = {
+            "frequencies": fixed(frequencies, float),
+            "response": fixed(response, complex),
+            "degrees_of_freedom": fixed(degrees_of_freedom, np.asarray(degrees_of_freedom).dtype),
+            "suspect": fixed(np.zeros(count, dtype=bool) if suspect is None else suspect, bool),
+            "gram": None if gram is None else fixed(gram, complex),
+            "nonlinear_covariance": None if nonlinear_covariance is None else fixed(nonlinear_covariance, complex),
+            "ratio_uncertainty": None if ratio_uncertainty is None else fixed(ratio_uncertainty, float),
+            "input_names": tuple(input_names),
+            "output_names": tuple(output_names),
+            "sample_time": float(sample_time),
+            "n_samples": int(n_samples),
+            "half_width": int(half_width),
+            "method": method,
+            "notes": tuple(notes),
+            "_covariance": covariance,
+            "_noise": noise_covariance,
+            "_variance": noise_variance,
+            "_transient": transient,
+            "_coherence": coherence,
+            "_joint": joint,
+        }
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)  # frozen: this is the one place that writes
         self._check_shapes()
 
     def _check_shapes(self) -> None:
@@ -128,6 +168,8 @@ class FrequencyResponse:
             ("gram", self.gram, (n_u, n_u, n_f)),
             ("covariance", self._covariance, (n_y * n_u, n_y * n_u, n_f)),
             ("noise_covariance", self._noise, (n_y, n_y, n_f)),
+            ("nonlinear_covariance", self.nonlinear_covariance, (n_y, n_y, n_f)),
+            ("ratio_uncertainty", self.ratio_uncertainty, (n_y, n_u, n_f)),
             ("transient", self._transient, (n_y, n_f)),
             ("coherence", self._coherence, (n_y, n_f)),
         ]
@@ -146,51 +188,49 @@ class FrequencyResponse:
     @cached_property
     def noise_covariance(self) -> Array:
         """E[V_o V_p*], shape (n_y, n_y, n_f) [output unit squared]."""
-        return _fixed(self._part(self._noise, slice(None)), complex)
+        return fixed(part_of(self._noise, slice(None)), complex)
 
     @cached_property
     def noise_variance(self) -> Array:
         """Diagonal of the noise covariance, shape (n_y, n_f) [output unit squared]."""
         if self._variance is not None:
-            return _fixed(self._variance, float)
-        return _fixed(np.einsum("oof->of", self.noise_covariance).real, float)
+            return fixed(self._variance, float)
+        return fixed(np.einsum("oof->of", self.noise_covariance).real, float)
 
     @cached_property
     def covariance(self) -> Array:
         """E[(vec G^ - vec G)(.)^H], columns of G stacked, shape (n_y n_u, n_y n_u, n_f)."""
         if self._covariance is not None:
-            return _fixed(self._part(self._covariance, slice(None)), complex)
+            return fixed(part_of(self._covariance, slice(None)), complex)
         n = len(self.input_names) * len(self.output_names)
         # Evers (4.16): the Kronecker product puts the input index outside, the output index inside.
-        product = np.einsum("ijf,opf->iojpf", self.gram, self.noise_covariance)
-        return _fixed(product.reshape(n, n, -1), complex)
+        product = np.einsum("ijf,opf->iojpf", np.asarray(self.gram), self.noise_covariance)
+        return fixed(product.reshape(n, n, -1), complex)
 
     @cached_property
     def transient(self) -> Array:
         """Transient of the first record at the bins, shape (n_y, n_f) [output unit]; NaN if the method has none."""
         if self._transient is None:
-            return _fixed(np.full((len(self.output_names), self.n_frequencies), np.nan), complex)
-        return _fixed(self._part(self._transient, slice(None)), complex)
+            return fixed(np.full((len(self.output_names), self.n_frequencies), np.nan), complex)
+        return fixed(part_of(self._transient, slice(None)), complex)
 
     @cached_property
     def coherence(self) -> Array:
         """Part of each output's power that the inputs explain, shape (n_y, n_f), between 0 and 1."""
         if self._coherence is None:
-            return _fixed(np.full((len(self.output_names), self.n_frequencies), np.nan), float)
-        return _fixed(self._part(self._coherence, slice(None)), float)
-
-    def _part(self, values: Any, bins: slice) -> Array:
-        found = values(bins) if callable(values) else np.asarray(values)[..., bins]
-        return np.asarray(found)
+            return fixed(np.full((len(self.output_names), self.n_frequencies), np.nan), float)
+        return fixed(part_of(self._coherence, slice(None)), float)
 
     @cached_property
     def variance(self) -> Array:
         """E|G^_oi - G_oi|^2, shape (n_y, n_u, n_f): the diagonal of `covariance`, without the rest."""
-        if self._covariance is None and self.gram is not None:
-            return _fixed(np.einsum("iif->if", self.gram).real[None] * self.noise_variance[:, None], float)
-        diagonal = np.einsum("aaf->af", self.covariance).real
+        if self.gram is not None and self._covariance is None:
+            of_inputs = np.diagonal(self.gram).T.real  # (n_u, n_f)
+            return fixed(of_inputs[None] * self.noise_variance[:, None], float)
+        # A variance that is exactly zero (y and u tied by the controller) may come out negative by rounding.
+        diagonal = np.maximum(np.einsum("aaf->af", self.covariance).real, 0.0)
         shape = (len(self.input_names), len(self.output_names), self.n_frequencies)
-        return _fixed(diagonal.reshape(shape).transpose(1, 0, 2), float)
+        return fixed(diagonal.reshape(shape).transpose(1, 0, 2), float)
 
     def confidence_radius(self, p: float = 0.95) -> Array:
         """Radius of the circle around each entry of G that holds the true value with probability `p`.
@@ -208,7 +248,7 @@ class FrequencyResponse:
         numpy.ndarray, shape (n_y, n_u, n_f)
             Radii in the complex plane [unit of G].
         """
-        factor = _quantile(p, self.degrees_of_freedom)
+        factor = quantile(p, self.degrees_of_freedom)
         with np.errstate(invalid="ignore", divide="ignore"):
             radius = np.sqrt(factor * self.variance)
             if self.ratio_uncertainty is not None:
@@ -239,9 +279,8 @@ class FrequencyResponse:
                 joint[place, :, place] = self.covariance[..., b]
             return joint.reshape(n_b * block, n_b * block)
         weights, rows = self._joint(index)
-        flat = _on_common_rows(weights, rows)  # (n_b n_u, all rows)
-        shared = (flat @ flat.conj().T).reshape(n_b, n_u, n_b, n_u)
-        noise = np.stack([self._part(self._noise, slice(b, b + 1))[..., 0] for b in index], axis=-1)
+        shared = shared_data(weights, rows)
+        noise = np.stack([part_of(self._noise, slice(b, b + 1))[..., 0] for b in index], axis=-1)
         mean = 0.5 * (noise[..., :, None] + noise[..., None, :])  # the noise level may differ a little between the two
         joint = np.einsum("aibj,opab->aiobjp", shared, mean)
         return joint.reshape(n_b * block, n_b * block)
@@ -271,15 +310,16 @@ class FrequencyResponse:
         return FrequencyResponse(
             frequencies=self.frequencies[part],
             response=self.response[..., part],
-            noise_covariance=_narrow(self._noise, part),
+            noise_covariance=narrow(self._noise, part),
             degrees_of_freedom=self.degrees_of_freedom[part],
-            covariance=_narrow(self._covariance, part),
-            gram=None if self.gram is None else self.gram[..., part],
-            noise_variance=None if self._variance is None else np.asarray(self._variance)[..., part],
-            transient=_narrow(self._transient, part),
-            coherence=_narrow(self._coherence, part),
+            covariance=narrow(self._covariance, part),
+            gram=narrow(self.gram, part),
+            noise_variance=narrow(self._variance, part),
+            transient=narrow(self._transient, part),
+            coherence=narrow(self._coherence, part),
             suspect=self.suspect[part],
-            ratio_uncertainty=None if self.ratio_uncertainty is None else self.ratio_uncertainty[..., part],
+            nonlinear_covariance=narrow(self.nonlinear_covariance, part),
+            ratio_uncertainty=narrow(self.ratio_uncertainty, part),
             input_names=self.input_names,
             output_names=self.output_names,
             sample_time=self.sample_time,
@@ -293,19 +333,7 @@ class FrequencyResponse:
     @property
     def outcome(self) -> Outcome:
         """Whether the estimate may be used as it stands; the text says what to distrust and what to do."""
-        undetermined = np.isnan(self.response).any(axis=(0, 1))
-        if undetermined.any():
-            text = f"{int(undetermined.sum())} of {len(self)} bins are not determined by the data (NaN). "
-            return Outcome(False, "undetermined", text + " ".join(self.notes))
-        if self.suspect.any():
-            where = self.frequencies[self.suspect]
-            text = (
-                f"{where.size} of {len(self)} bins are suspect, from {where[0]:.3g} to {where[-1]:.3g} Hz: the local "
-                "model does not describe the window (wider than the slowest pole, or wrong poles), or the loop hides "
-                "the plant. Prescribe the slow poles (lrmp), record longer, or leave these bins out."
-            )
-            return Outcome(False, "suspect", " ".join([text, *self.notes]))
-        return Outcome(True, "estimated", " ".join([f"All {len(self)} bins estimated.", *self.notes]))
+        return _response_text.outcome(self)
 
     def to_control(self) -> control.FrequencyResponseData:
         """As a python-control object, bins that are not determined left out.
@@ -372,61 +400,4 @@ class FrequencyResponse:
         return f"<FrequencyResponse {self.method}, {len(self.output_names)}x{len(self.input_names)}, {len(self)} bins>"
 
     def __str__(self) -> str:
-        lines = [
-            f"Frequency response by {self.method}: {len(self)} bins, "
-            f"{self.frequencies[0]:.4g} to {self.frequencies[-1]:.4g} Hz",
-            f"{'output':<14}{'input':<14}{'f [Hz]':>12}{'|G|':>12}{'phase [deg]':>13}{'radius 95 %':>13}  suspect",
-        ]
-        radius = self.confidence_radius(0.95)
-        chosen = np.unique(np.geomspace(1, len(self), 4).astype(int) - 1)
-        for o, output in enumerate(self.output_names):
-            for i, name in enumerate(self.input_names):
-                for f in chosen:
-                    g = self.response[o, i, f]
-                    numbers = f"{self.frequencies[f]:>12.4g}{abs(g):>12.4g}{np.degrees(np.angle(g)):>13.1f}"
-                    doubt = "yes" if self.suspect[f] else "no"
-                    lines.append(f"{output:<14}{name:<14}{numbers}{radius[o, i, f]:>13.3g}  {doubt}")
-        return "\n".join([*lines, str(self.outcome)])
-
-
-def _fixed(values: Any, kind: Any) -> Array:
-    """Read-only view: a result is not edited after the fact."""
-    array = np.asarray(values, dtype=kind).view()
-    array.flags.writeable = False
-    return array
-
-
-def _narrow(values: Any, part: slice) -> Any:
-    """The bins of `part` of an array, or of a deferred computation."""
-    if values is None:
-        return None
-    if not callable(values):
-        return np.asarray(values)[..., part]
-    count = part.stop - part.start
-
-    def inner(bins: slice) -> Array:
-        start, stop, step = bins.indices(count)
-        return np.asarray(values(slice(part.start + start, part.start + max(stop, start), step)))
-
-    return inner
-
-
-def _quantile(p: float, q: Array) -> Array:
-    """F_p(2, 2q); infinite where no degrees of freedom are left."""
-    if isinstance(p, (bool, str)) or not np.isscalar(p) or not 0.0 < float(p) < 1.0:
-        raise InputError(f"the confidence level p is {p!r}", where="p", expected="a number between 0 and 1, as 0.95")
-    q = np.asarray(q, dtype=float)
-    values, place = np.unique(q, return_inverse=True)
-    quantiles = np.array([stats.f.ppf(p, 2, 2 * v) if v > 0 else np.inf for v in values])
-    return quantiles[place]
-
-
-def _on_common_rows(weights: Array, rows: Array) -> Array:
-    """Weights (n_u, m, B) of rows numbered (B, m), spread over the union of all rows: (B n_u, n_rows)."""
-    labels, place = np.unique(rows, return_inverse=True)
-    place = place.reshape(rows.shape)
-    n_u, _, n_b = weights.shape
-    flat = np.zeros((n_b, n_u, labels.size), dtype=complex)
-    for b in range(n_b):
-        flat[b][:, place[b]] = weights[..., b]
-    return flat.reshape(n_b * n_u, labels.size)
+        return _response_text.table(self)

@@ -28,6 +28,7 @@ _ARRAYS = (
     "transient",
     "coherence",
     "suspect",
+    "nonlinear_covariance",
     "ratio_uncertainty",
 )
 _LISTS = ("input_names", "output_names", "notes")
@@ -141,6 +142,7 @@ def _without_matlab_padding(content: dict[str, Any]) -> dict[str, Any]:
         "ratio_uncertainty": (n_y, n_u, n_f),
         "covariance": (n_y * n_u, n_y * n_u, n_f),
         "noise_covariance": (n_y, n_y, n_f),
+        "nonlinear_covariance": (n_y, n_y, n_f),
         "transient": (n_y, n_f),
         "coherence": (n_y, n_f),
     }

@@ -70,7 +70,8 @@ def spectral(
     segments = whole_number(segments, "segments", least=1)
     if window not in WINDOWS:
         raise InputError(f"window is {window!r}", where="window", expected=f"one of {', '.join(map(repr, WINDOWS))}")
-    if isinstance(overlap, (bool, str)) or not np.isscalar(overlap) or not 0.0 <= overlap < 1.0:
+    real = isinstance(overlap, (int, float, np.number)) and not isinstance(overlap, (bool, complex))
+    if not real or not 0.0 <= overlap < 1.0:
         raise InputError(f"overlap is {overlap!r}", where="overlap", expected="a number from 0 to below 1")
     check_excitation([r.inputs for r in records], first.input_names)
     length = int(min(len(r) for r in records) / (1.0 + (segments - 1) * (1.0 - overlap)))
@@ -106,9 +107,10 @@ def spectral(
         sample_time=first.sample_time,
         n_samples=max(len(r) for r in records),
         method=f"spectral, {count} segments of {length} samples, {window} window, overlap {overlap:g}",
-        notes=["The transient is suppressed by the window, not estimated.", *undetermined_inputs(
-            response, frequencies, first.input_names
-        )],
+        notes=[
+            "The transient is suppressed by the window, not estimated.",
+            *undetermined_inputs(response, frequencies, first.input_names),
+        ],
     )
 
 

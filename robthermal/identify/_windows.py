@@ -38,7 +38,8 @@ class Regression:
 def points_per_record(spectra: Sequence[Spectrum], basis: LocalBasis) -> tuple[int, ...]:
     """Bins per window in each record: a shorter record has fewer bins in the same frequency window."""
     return tuple(
-        min(s.n_bins, max(1, round(basis.n_points * s.n_samples / basis.n_samples))) if s.n_samples != basis.n_samples
+        min(s.n_bins, max(1, round(basis.n_points * s.n_samples / basis.n_samples)))
+        if s.n_samples != basis.n_samples
         else basis.n_points
         for s in spectra
     )
@@ -66,7 +67,7 @@ def regression(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> R
 
 
 def rows_of(spectrum: Spectrum, basis: LocalBasis, bins: Array) -> tuple[Array, Array]:
-    """Bins of one record (from 1) in the windows centred at `bins` of the grid, and their offsets [grid bins], (B, m)."""
+    """Bins of one record (from 1) in the windows centred at `bins` of the grid, and their offsets [bins], (B, m)."""
     ratio, m = basis.n_samples / spectrum.n_samples, points_per_record([spectrum], basis)[0]
     start = window_starts(np.rint(bins / ratio).astype(int), spectrum.n_bins, m)
     mine = start[:, None] + np.arange(m)

@@ -47,7 +47,10 @@ def channel_names(value: object, where: str) -> tuple[str, ...]:
     """`value` as a tuple of non-empty texts, none twice."""
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
         raise InputError(
-            f"{where} is {value!r}", where=f"argument {where}", expected="a list of channel names", remedy="Write ['T1']."
+            f"{where} is {value!r}",
+            where=f"argument {where}",
+            expected="a list of channel names",
+            remedy="Write ['T1'].",
         )
     names = []
     for place, name in enumerate(value):

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
 from ._checks import Array
 
 _HEAD = 64 * 1024  # a header that does not fit here is no header
-_COMMENT = re.compile(rb"(?m)^[ \t]*#[^\r\n]*(?:\r*\n|\r|\Z)")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+([eE][+-]?\d+)?\s*")
 _MISSING = {"", "na", "n/a", "nan", "-nan", "null", "none", "#n/a", "<na>"}
 
@@ -25,8 +22,8 @@ class CsvSource:
 
     def __init__(self, path: Path):
         self.path = path
-        self._text = _checked_bytes(path)
-        self._newline = "\n" if b"\n" in self._text else "\r"
+        self._text = _checked_text(path)
+        self._newline = "\n" if "\n" in self._text else "\r"
         header = next(self._lines(), None)
         if header is None:
             raise InputError("the file has no header row, only comments or blank lines", where=f"{path}")
@@ -36,33 +33,30 @@ class CsvSource:
         self._check_header()
 
     def read(self, wanted: Sequence[str]) -> dict[str, Array]:
-        """The wanted columns. The parser is fast and forgiving; whatever it stumbles over, the slow walk names."""
+        """The wanted columns. The parser is fast and strict; what it stumbles over, the slow walk names."""
         places = {self.headers.index(header): header for header in wanted}
-        kinds = {i: np.float64 if i in places else str for i in range(len(self.headers))}
-        try:
-            table = pd.read_csv(
-                io.BytesIO(_COMMENT.sub(b"", self._text)),
-                sep=self._separator,
-                header=None,
-                names=range(len(self.headers)),
-                index_col=False,
-                skiprows=1,
-                dtype=kinds,
-                skipinitialspace=True,
-                float_precision="round_trip",
-                na_filter=False,  # an empty cell must not pass for a number, nor be filled
-                on_bad_lines="error",
-            )
-        except (ValueError, pd.errors.ParserError):
-            self._walk(places)
-            raise InputError("the rows cannot be read as numbers", where=f"{self.path}") from None
-        if len(table) == 0:
+        if next(self._rows(), None) is None:
             raise InputError("the file has a header and no data rows", where=f"{self.path}")
-        self._check_widths()
-        columns = {header: table[i].to_numpy() for i, header in places.items()}
-        if not all(np.isfinite(column).all() for column in columns.values()):
+        everything = len(places) == len(self.headers)
+        if not everything and not self._widths_agree():  # with columns left out, the parser does not look at widths
             self._walk(places)
-        return columns
+        try:
+            table = np.loadtxt(
+                (text for _, text in self._rows()),
+                delimiter=self._separator,
+                comments=None,
+                quotechar='"',
+                usecols=None if everything else list(places),
+                ndmin=2,
+            )
+        except ValueError:
+            table = np.full((1, len(places)), np.nan)
+        if table.shape[1] != len(places) or not np.isfinite(table).all():
+            self._walk(places)
+            raise InputError("the rows cannot be read as numbers", where=f"{self.path}")
+        if everything:
+            return {header: table[:, i] for i, header in places.items()}
+        return {header: table[:, k] for k, header in enumerate(places.values())}
 
     def row(self, index: int) -> str:
         """Words for a data row: counted from 0, and the line of the file counted from 1."""
@@ -73,13 +67,13 @@ class CsvSource:
 
     def _lines(self) -> Iterator[tuple[int, str]]:
         """Line number from 1 and text of every line that is neither blank nor a comment."""
-        start, number, end = 0, 0, self._newline.encode()
+        start, number = 0, 0
         while start < len(self._text):
             number += 1
-            stop = self._text.find(end, start)
+            stop = self._text.find(self._newline, start)
             stop = len(self._text) if stop < 0 else stop
-            text = self._text[start:stop].decode("utf-8").strip("\r\n")
-            if text.strip() and not text.lstrip(" \t").startswith("#"):
+            text = self._text[start:stop].strip("\r\n")
+            if text.strip() and not text.lstrip().startswith("#"):
                 yield number, text
             start = stop + 1
 
@@ -102,19 +96,10 @@ class CsvSource:
             if self.headers.count(header) > 1:
                 raise InputError(f"column {header!r} stands twice", where=where, remedy="Rename one of them.")
 
-    def _check_widths(self) -> None:
-        """Every row has as many cells as the header: the parser fills short rows and cuts long ones."""
-        separator, quoted = self._separator.encode(), b'"' in self._text
-        body = self._text if not quoted else b""
-        if not quoted and body.count(separator) == self._expected_separators(body, separator):
-            return
-        self._walk({})
-
-    def _expected_separators(self, body: bytes, separator: bytes) -> int:
-        """Separators a sound file has, or -1 when rows must be counted one by one."""
-        lengths = np.array([text.count(self._separator) for _, text in self._lines()])
-        sound = bool((lengths == len(self.headers) - 1).all()) and b"#" not in body
-        return int(lengths.sum()) if sound else -1
+    def _widths_agree(self) -> bool:
+        if '"' in self._text:  # a quoted separator does not count
+            return all(len(self._cells(text)) == len(self.headers) for _, text in self._rows())
+        return all(text.count(self._separator) == len(self.headers) - 1 for _, text in self._rows())
 
     def _walk(self, places: dict[int, str]) -> None:
         """Row by row, slowly: raise for the first row that is ragged, or holds anything but finite numbers."""
@@ -158,7 +143,7 @@ class CsvSource:
         )
 
 
-def _checked_bytes(path: Path) -> bytes:
+def _checked_text(path: Path) -> str:
     """Content of a text file without byte-order mark; binary files and endless lines are refused after 64 KiB."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
@@ -170,21 +155,19 @@ def _checked_bytes(path: Path) -> bytes:
                 where=f"{path}",
                 expected="a CSV file with a header row and one row per sample",
             )
-        text = head + file.read()
-    if b"\0" in text:
+        content = head + file.read()
+    if b"\0" in content:
         raise _binary(path)
-    text = text.removeprefix(b"\xef\xbb\xbf")
     try:
-        text.decode("utf-8")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = text.count(b"\n", 0, error.start) + 1
+        line = content.count(b"\n", 0, error.start) + 1
         raise InputError(
             f"byte {error.start} (line {line}) is no UTF-8 text",
             where=f"{path}",
             expected="a CSV file in UTF-8",
             remedy="Save it as UTF-8 (plain ASCII is UTF-8); a binary file needs its own suffix.",
         ) from None
-    return text
 
 
 def _binary(path: Path) -> InputError:

@@ -127,7 +127,8 @@ class Record:
     @property
     def time(self) -> Array:
         """Time of every row [s]."""
-        return self.start_time + self.sample_time * np.arange(self.n_samples)
+        rows: Array = np.arange(self.n_samples, dtype=np.float64)
+        return self.start_time + self.sample_time * rows
 
     @property
     def duration(self) -> float:

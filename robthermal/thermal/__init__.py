@@ -4,12 +4,21 @@ from ._datasheet import DatasheetFit as DatasheetFit
 from ._datasheet import ModuleParameters as ModuleParameters
 from ._datasheet import module_from_datasheet as module_from_datasheet
 from ._equations import Equations as Equations
+from ._file import fit_in_kelvin as fit_in_kelvin
 from ._file import format_system as format_system
 from ._file import parse_system as parse_system
 from ._file import read_system as read_system
 from ._file import write_system as write_system
+from ._geometry import Assembly as Assembly
+from ._geometry import Contact as Contact
+from ._geometry import Layer as Layer
 from ._linear import linearize as linearize
 from ._linear import time_constants as time_constants
+from ._materials import Material as Material
+from ._materials import materials as materials
+from ._matrices import MatrixImport as MatrixImport
+from ._matrices import system_from_matrices as system_from_matrices
+from ._matrix_files import read_matrices as read_matrices
 from ._parts import Ambient as Ambient
 from ._parts import FitRange as FitRange
 from ._parts import Input as Input
@@ -36,8 +45,9 @@ from ._steady import SteadyState as SteadyState
 from ._steady import steady_state as steady_state
 from ._system import System as System
 
-__all__ = ["Ambient", "DatasheetFit", "Equations", "Equilibrium", "FitRange", "Input", "Linear", "Link", "LoadCurve",
-           "Lump", "Module", "ModuleParameters", "Natural", "PolynomialFit", "Polynomials", "Reduction", "Sensor",
-           "SteadyState", "System", "Trajectory", "fold", "format_system", "hinf_error", "linearize", "load_curve",
-           "module_from_datasheet", "module_from_polynomials", "parse_system", "read_system", "reduce", "simulate",
-           "steady_state", "time_constants", "trajectory", "write_system"]
+__all__ = ["Ambient", "Assembly", "Contact", "DatasheetFit", "Equations", "Equilibrium", "FitRange", "Input", "Layer",
+           "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
+           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "System", "Trajectory", "fit_in_kelvin",
+           "fold",           "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
+           "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
+           "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_system"]

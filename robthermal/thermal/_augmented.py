@@ -136,7 +136,7 @@ class PortHeat:
         flows: list[Array] = []
         for term, (a, b), module in zip(self.terms, self.columns, self.is_module, strict=True):
             flows.extend(term.heat(T[..., a], T[..., b], current if module else current[..., :0]))
-        return np.concatenate(flows, axis=-1)
+        return np.concatenate(flows, axis=-1) if flows else np.zeros((*T.shape[:-1], 0))
 
     def slopes(self, T: Array, current: Array) -> Array:
         """Derivative (..., n_q, n_ports + n_ambients) of the heats with respect to T."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Integral
 from typing import Any
 
 from ..errors import InputError
@@ -53,7 +54,7 @@ def kelvin(value: Any, where: str) -> float:
 
 def whole(value: Any, where: str, lowest: int = 1) -> int:
     """A whole number not below `lowest`."""
-    if isinstance(value, bool) or value != value or not isinstance(value, int) or value < lowest:
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < lowest:
         raise InputError(f"{value!r} is not a whole number of at least {lowest}", where=where,
                          expected=f"{lowest}, {lowest + 1}, …", remedy="Count again.")
-    return value
+    return int(value)

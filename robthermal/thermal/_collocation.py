@@ -63,7 +63,7 @@ def step_matrices(parts: Augmented, h: float) -> Step:
         Ku.append(block[:, nz:nz + nu])
         powers = block[:, nz + nu:].reshape(len(keep), DEGREE + 1, nq)
         powers = powers * np.array([factorial(k) for k in range(DEGREE + 1)])[:, None]
-        M.append(np.einsum("rkq,kj->rjq", powers, _MONOMIALS).reshape(len(keep), -1))
+        M.append(np.einsum("rkq,kj->rjq", powers, _MONOMIALS).reshape(len(keep), (DEGREE + 1) * nq))
     return Step(np.concatenate(K), np.concatenate(Ku), np.concatenate(M))
 
 

@@ -192,7 +192,7 @@ def _difference(value: float, t_hot: float) -> float:
         raise InputError(f"{dt_max:g} K: single-stage modules do not exceed about 80 K", where="argument dt_max",
                          expected="a temperature difference in kelvin",
                          remedy="A difference in Fahrenheit is divided by 1.8; one that a shop converted like a "
-                         f"temperature was {(dt_max - 32) / 1.8:.1f} K. Multi-stage modules are not described by S, R, K.")
+                         f"temperature was {(dt_max - 32) / 1.8:.1f} K. Multi-stage modules need another model.")
     return dt_max
 
 

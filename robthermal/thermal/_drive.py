@@ -53,7 +53,7 @@ def start_state(eq: Equations, record: Record, initial: Initial, nz: int) -> Arr
         lumps = _default(eq, record)
     z = np.zeros(nz)
     z[:len(lumps)] = lumps
-    for row, name in enumerate(lagged(eq), start=len(lumps)):
+    for row, name in enumerate(lagged(eq) if nz > len(lumps) else [], start=len(lumps)):
         z[row] = lumps[eq.system.lump_names.index(eq.system.sensors[name].lump)]
     return z
 

@@ -61,6 +61,18 @@ def parse_system(text: str, where: str = "system text") -> System:
     Returns
     -------
     System
+
+    Raises
+    ------
+    InputError
+        As `read_system`.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> text = rt.thermal.format_system(rt.systems.two_module())
+    >>> rt.thermal.parse_system(text) == rt.systems.two_module()
+    True
     """
     try:
         data = tomllib.loads(text)
@@ -78,6 +90,11 @@ def write_system(system: System, path: str | Path) -> None:
         What to write.
     path : str or Path
         Where to.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.thermal.write_system(rt.systems.two_module(), "setup.toml")
     """
     Path(path).write_text(format_system(system), encoding="utf-8")
 
@@ -88,10 +105,17 @@ def format_system(system: System) -> str:
     Parameters
     ----------
     system : System
+        What to write.
 
     Returns
     -------
     str
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.thermal.format_system(rt.systems.two_module()).splitlines()[0]
+    '[system]'
     """
     return "\n".join(_lines(system)) + "\n"
 
@@ -141,7 +165,9 @@ def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
         if isinstance(parts, dict):
             data[table] = {name: _part_kelvin(part, key, unit, f"{where} [{table}.{name}] {key}")
                            for name, part in parts.items()}
-    return _fit_kelvin(data, unit)
+    if isinstance(data.get("fit"), dict):
+        data["fit"] = fit_in_kelvin(data["fit"], unit)
+    return data
 
 
 def _part_kelvin(part: Any, key: str, unit: str, where: str) -> Any:
@@ -161,12 +187,28 @@ def _convert(value: float) -> float:
     return celsius_to_kelvin(value) if value == value and abs(value) != float("inf") else value
 
 
-def _fit_kelvin(data: dict[str, Any], unit: str) -> dict[str, Any]:
-    fit = data.get("fit")
-    if unit == "degC" and isinstance(fit, dict):
-        data["fit"] = {name: _shifted(bounds, _convert) if _is_temperature(name) else bounds
-                       for name, bounds in fit.items()}
-    return data
+def fit_in_kelvin(fit: Mapping[str, Any], unit: str) -> dict[str, Any]:
+    """Convert the bounds of temperatures in a [fit] table to kelvin.
+
+    Parameters
+    ----------
+    fit : mapping
+        Parameter name to {lower, upper, sigma}, as in a system file.
+    unit : {"K", "degC"}
+        Unit of the file.
+
+    Returns
+    -------
+    dict
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.thermal.fit_in_kelvin({"ambients.room.temperature": {"lower": 20.0, "upper": 25.0}}, "degC")
+    {'ambients.room.temperature': {'lower': 293.15, 'upper': 298.15}}
+    """
+    return {name: _shifted(bounds, _convert) if unit == "degC" and _is_temperature(name) else bounds
+            for name, bounds in fit.items()}
 
 
 def _shifted(bounds: Any, convert: Any) -> Any:

@@ -166,7 +166,7 @@ def module_from_polynomials(polynomials: Polynomials, *, couples: int, i_max: fl
     S [V/K]      0.053743    7.421e-05      0.38%
     R [Ω]          4.6298      0.02275      0.06%
     K [W/K]       0.29678    0.0009477      1.06%
-    Ferrotec, Thermoelectric Technical Reference Guide, section 11 (K: ... check the vendor's page)
+    Ferrotec, Thermoelectric Technical Reference Guide, section 11 (K: ... the vendor's page)
     """
     low, high = (kelvin(t, "argument t_range") for t in t_range)
     if not low < high:
@@ -175,7 +175,7 @@ def module_from_polynomials(polynomials: Polynomials, *, couples: int, i_max: fl
     T, middle = np.linspace(low, high, _SAMPLES), 0.5 * (low + high)
     curves = polynomials.at(T, couples=couples, i_max=i_max)
     fits = [_line(T - middle, y, name) for y, name in zip(curves, ("S", "R", "K"), strict=True)]
-    worst = [float(np.abs(line.value + line.slope * (T - middle) - y).max() / np.abs(y).min())
+    worst = [float(np.abs((line.value + line.slope * (T - middle)) / y - 1).max())
              for line, y in zip(fits, curves, strict=True)]
     source = polynomials.source + (f" ({polynomials.caveat})" if polynomials.caveat else "")
     return PolynomialFit(*fits, reference_temperature=middle, t_range=(low, high),

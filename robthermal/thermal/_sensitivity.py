@@ -114,8 +114,8 @@ class Sensitivity:
         dT = np.linalg.solve(A, rhs) if nodes else rhs
         at_start = np.zeros((S, np_, dT.shape[2]))
         at_start[:, np.arange(np_), ports] = 1.0
-        dT = np.concatenate([at_start, dT], axis=1).reshape(S, DEGREE + 1, np_, -1)
-        dq = (G[..., :np_] @ dT).reshape(S, (DEGREE + 1) * self.by.nq, -1)
+        dT = np.concatenate([at_start, dT], axis=1).reshape(S, DEGREE + 1, np_, dT.shape[2])
+        dq = (G[..., :np_] @ dT).reshape(S, (DEGREE + 1) * self.by.nq, dT.shape[-1])
         end = step.M[nodes:nodes + n] @ dq
         return step.K[nodes:nodes + n, :n] + end[:, :, :n], direct[:, nodes:nodes + n] + end[:, :, n:]
 
@@ -128,7 +128,7 @@ class Sensitivity:
         T[..., by.ports.size:] = u[:, None, u.shape[1] - by.n_ambients:]
         current = u[:, None, by.first_current:by.first_current + by.n_modules]
         for _ in range(30):
-            q = by.port_heat(T, current).reshape(len(z), -1)
+            q = by.port_heat(T, current).reshape(len(z), (DEGREE + 1) * by.nq)
             new = (base + q @ step.M[:nodes].T).reshape(len(z), DEGREE, by.ports.size)
             change = np.abs(new - T[:, 1:, :by.ports.size]).max(initial=0.0)
             T[:, 1:, :by.ports.size] = new
@@ -139,7 +139,7 @@ class Sensitivity:
     def _direct(self, step: Step, level: int, z: Array, u: Array, T: Array, current: Array, q: Array, G: Array) -> Array:
         """Derivative of all rows with respect to the parameters at fixed port temperatures."""
         out = np.zeros((len(z), step.K.shape[0], len(self.names)))
-        flat = q.reshape(len(z), -1)
+        flat = q.reshape(len(z), (DEGREE + 1) * self.by.nq)
         ambient = slice(u.shape[1] - self.by.n_ambients, u.shape[1])
         for column, name in enumerate(self.names):
             if name in self._linear:
@@ -150,7 +150,7 @@ class Sensitivity:
                 out[..., column] += step.Ku @ self.held[:, column]
                 heat = heat + G[..., self.by.ports.size:] @ self.held[ambient, column]
             if np.any(heat):
-                out[..., column] += heat.reshape(len(z), -1) @ step.M.T
+                out[..., column] += heat.reshape(len(z), (DEGREE + 1) * self.by.nq) @ step.M.T
         return out
 
     def _parameter_heat(self, name: str, T: Array, current: Array) -> Array:

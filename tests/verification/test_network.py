@@ -80,6 +80,24 @@ def test_extreme_scales_never_become_valid_by_underflow(scale):
         assert not make(E, true, weights, 1.1 * scale, margin={}).holds
 
 
+def test_a_float_sum_below_zero_is_no_proof():
+    """Ten tenths minus one is zero in decimals and -1.1e-16 in floats: not strictly negative."""
+    A = -np.eye(11)
+    A[10, :10] = 0.1
+    assert sum([0.1] * 10) - 1.0 < 0
+    refused = make(np.ones(11), A, np.ones(11), 0.0)
+    assert not refused.holds and "row 10" in refused.reason
+
+
+def test_products_below_the_smallest_float_are_no_proof():
+    """Each product rounds to -1 or 0 times 2**-1074 in floats; exactly the row is positive."""
+    tiny = 2.0**-534
+    A = np.array([[-0.6 * tiny, 0.45 * tiny, 0.45 * tiny], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+    weights = np.full(3, 2.0**-540)
+    assert A[0] @ weights < 0
+    assert not make(np.ones(3), A, weights, 0.0).holds
+
+
 def test_random_against_fractions():
     rng = np.random.default_rng(0)
     counts = {True: 0, False: 0}

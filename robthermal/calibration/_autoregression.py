@@ -1,0 +1,77 @@
+"""Correlation of residuals in time: one autoregression per sensor, innovations correlated between sensors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+Array = NDArray[np.float64]
+_LONGEST = 30
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Residual model a_s(q) e_s = v_s, cov(v) = `innovation`.
+
+    Parameters
+    ----------
+    polynomials : tuple of ndarray
+        One monic polynomial per sensor.
+    innovation : ndarray, shape (n_sensors, n_sensors)
+        Covariance of the innovations.
+    """
+
+    polynomials: tuple[Array, ...]
+    innovation: Array
+
+    def meat(self, J: Array) -> Array:
+        """Jᵀ Cov(e) J for J of shape (n, n_sensors, p), by filtering J backwards in time."""
+        back = np.stack([lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)], axis=1)
+        return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
+
+
+def correlation_of(segments: list[Array], inflate: float) -> Correlation:
+    """Fit by Burg's method, order by BIC; segments (n, n_sensors) of the same sensors are pooled.
+
+    Parameters
+    ----------
+    segments : list of ndarray
+        Weighted residuals.
+    inflate : float
+        Factor on the variance for the degrees of freedom the fit has used up.
+    """
+    n_sensors = segments[0].shape[1]
+    polynomials = tuple(burg([e[:, s] for e in segments]) for s in range(n_sensors))
+    v = np.concatenate([np.column_stack([lfilter(a, [1.0], e[:, s]) for s, a in enumerate(polynomials)])
+                        for e in segments])
+    return Correlation(polynomials, inflate * v.T @ v / len(v))
+
+
+def burg(segments: list[Array]) -> Array:
+    """Monic autoregression polynomial of several stretches of one signal, always stable; order by BIC."""
+    n = sum(e.size for e in segments)
+    power = sum(float(e @ e) for e in segments) / n
+    best = a = np.ones(1)
+    if power == 0.0:
+        return best
+    least = n * math.log(power)
+    forward, backward = [e[1:] for e in segments], [e[:-1] for e in segments]
+    for order in range(1, min(_LONGEST, min(e.size for e in segments) // 10) + 1):
+        energy = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
+        if energy <= 1e-20 * n * power:
+            break
+        k = -2.0 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / energy
+        a = np.append(a, 0.0) + k * np.append(a, 0.0)[::-1]
+        power *= 1.0 - k * k
+        if power <= 0.0:
+            break
+        pairs = [(f + k * b, b + k * f) for f, b in zip(forward, backward, strict=True)]
+        forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
+        criterion = n * math.log(power) + order * math.log(n)
+        if criterion < least:
+            best, least = a, criterion
+    return best

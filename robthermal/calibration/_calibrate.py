@@ -1,0 +1,232 @@
+"""`calibrate`: parameters from records by output-error least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from ..errors import Diverged, InputError, Outcome
+from ..signals import Record
+from ..thermal import System
+from ._covariance import information
+from ._data import Data, as_data, refuse_same, refuse_short
+from ._directions import in_words
+from ._fit import Fit
+from ._noise import LOSSES, Loss, declared_noise, estimated_noise, scipy_loss
+from ._problem import Problem, scaled
+from ._ranges import Choice, Ranges, chosen_ranges
+from ._score import score_of, validate
+from ._start import STARTS, Start, initial_of
+from ._whiteness import whiteness_of
+
+Array = NDArray[np.float64]
+_ROUNDS = 8  # of noise estimation
+_SETTLED = 0.01  # relative change of the noise levels
+
+
+def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Choice = None,
+              validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
+              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50) -> Fit:
+    """Estimate parameters of a system from records: output error (free run), least squares, exact derivatives.
+
+    Parameters
+    ----------
+    system : System
+        With starting values.
+    data : Record or list of Record
+        Measured. Several records share the parameters; each has its own initial temperatures.
+    parameters : iterable of str or mapping, optional
+        What may change: names from the system's fit table, or a mapping from name to (lower, upper) or `FitRange`, in
+        the unit of the parameter, temperatures in kelvin. Default: the whole fit table.
+    validation : Record or list of Record, optional
+        Data the fit does not see; free runs on them are scored, with initial temperatures from their first tenth.
+    initial : {"free", "measured", "system"}
+        Initial lump temperatures: unknown, with a prior of max(5 K, spread of the first readings) around the nearest
+        sensor's first reading; fixed to that reading; or fixed to the file's values, where it has them.
+    loss : {"linear", "soft_l1", "huber"}
+        The last two resist glitches: beyond 1.345 standard deviations a residual counts linearly.
+    noise : mapping or float, optional
+        Standard deviation of the sensors [K]. Default: as declared in the system, but not below step/√12 of a quantised
+        reading; where the declaration is 0 it is estimated from the residuals.
+    max_iterations : int
+        Limit of the optimiser's steps.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        Nothing to fit, no sensor in a record, unknown names, bounds that exclude the start, a parameter without any
+        influence, fewer readings than unknowns, validation on the training data.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.1}})
+    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
+    >>> empty = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
+    ...                   output_names=[])
+    >>> run = rt.thermal.simulate(bar, empty)
+    >>> noisy = run.with_outputs(run.outputs + 0.1 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> start = bar.with_parameters({"lumps.bar.capacity": 60.0, "links.bar-room.conductance": 1.0})
+    >>> fit = rt.calibrate(start, noisy, parameters={"lumps.bar.capacity": (10.0, 500.0),
+    ...                                              "links.bar-room.conductance": (0.1, 5.0)})
+    >>> round(fit.parameters["lumps.bar.capacity"]), fit.outcome.code
+    (100, 'converged')
+    """
+    _check_options(system, initial, loss, max_iterations)
+    ranges = chosen_ranges(system, parameters)
+    training = as_data(system, data, "data")
+    unseen = as_data(system, validation, "validation") if validation is not None else []
+    refuse_same(training, unseen)
+    _refuse_double_start(ranges, initial)
+    starts = [initial_of(system, one, initial) for one in training]
+    refuse_short(training, len(ranges.names))
+    problem = Problem(system, training, ranges, starts)
+    levels = declared_noise(system, training, noise)
+    solution = _solve(problem, levels, loss, max_iterations)
+    return _result(problem, solution, unseen, initial, loss)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the optimiser ended: unknowns, noise levels, its status and iterations."""
+
+    v: Array
+    noise: dict[str, float]
+    converged: bool
+    iterations: int
+
+
+def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterations: int) -> Solution:
+    """Minimise; sensors without a declared noise are weighted by their residuals and the fit repeated."""
+    unknown = [name for name, level in declared.items() if not level]
+    v = problem.v0
+    noise = dict(declared) | _levels(problem, v, unknown, loss)
+    _refuse_idle(problem, v)
+    left = max_iterations
+    for _ in range(_ROUNDS):
+        problem.weigh = [scaled(np.array([noise[name] for name in one.sensors])) for one in problem.data]
+        run = least_squares(problem.vector, v, problem.jacobian, bounds=problem.bounds, x_scale="jac",
+                            loss=scipy_loss(loss, problem.n_readings), max_nfev=left, ftol=1e-9, xtol=1e-9, gtol=1e-9)
+        v, left = run.x, left - run.nfev
+        new = _levels(problem, v, unknown, loss)
+        settled = all(abs(new[name] / noise[name] - 1.0) < _SETTLED for name in unknown)
+        if settled or left < 1 or run.status == 0:
+            break
+        noise |= new
+    return Solution(v, noise, run.status > 0 and settled, max_iterations - left)
+
+
+def _levels(problem: Problem, v: Array, unknown: list[str], loss: Loss) -> dict[str, float]:
+    try:
+        residuals = problem.residuals(v)
+    except Diverged as error:
+        raise InputError(f"the model runs away at the starting values: {error}", where="argument system",
+                         remedy="Start closer to the truth: system.with_parameters({...}).") from None
+    return {name: estimated_noise(problem.data, residuals, name, loss) for name in unknown}
+
+
+def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: Start, loss: Loss) -> Fit:
+    ranges, v = problem.ranges, solution.v
+    values = problem.parameters(v)
+    known = information(problem, v, loss)
+    slopes = ranges.slopes(values)
+    residuals = problem.residuals(v)
+    system = problem.system.with_parameters(dict(zip(ranges.names, values.tolist(), strict=True)))
+    checks = [validate(system, one, initial, solution.noise) for one in unseen]
+    fit = Fit(
+        system=system,
+        parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
+        start=dict(zip(ranges.names, ranges.start.tolist(), strict=True)),
+        lower=ranges.lower, upper=ranges.upper, sigma=ranges.sigma, at_bound=ranges.at_bound(values),
+        covariance=known.covariance * np.outer(slopes, slopes),
+        undetermined=in_words(ranges, known.undetermined),
+        noise=solution.noise,
+        data=tuple(one.record for one in problem.data),
+        validation_data=tuple(one.record for one in unseen),
+        residuals=tuple(_by_sensor(one, r) for one, r in zip(problem.data, residuals, strict=True)),
+        validation_residuals=tuple(_by_sensor(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
+        initial_temperatures=tuple(_by_lump(system, T) for T in problem.temperatures(v)),
+        validation_temperatures=tuple(_by_lump(system, T) for T, _ in checks),
+        train=tuple(score_of(one, r) for one, r in zip(problem.data, residuals, strict=True)),
+        validation=tuple(score_of(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
+        whiteness={name: whiteness_of([weigh(r)[:, one.sensors.index(name)] for one, r, weigh
+                                       in zip(problem.data, residuals, problem.weigh, strict=True) if name in one.sensors])
+                   for name in solution.noise},
+        iterations=solution.iterations,
+        outcome=Outcome(True, "converged", ""),
+    )
+    return replace(fit, outcome=_outcome(fit, solution))
+
+
+def _by_sensor(one: Data, values: Array) -> dict[str, Array]:
+    return {name: values[:, i] for i, name in enumerate(one.sensors)}
+
+
+def _by_lump(system: System, temperatures: Array) -> dict[str, float]:
+    return dict(zip(system.lump_names, temperatures.tolist(), strict=True))
+
+
+def _outcome(fit: Fit, solution: Solution) -> Outcome:
+    if not solution.converged:
+        return Outcome(False, "not_converged", f"Stopped after {solution.iterations} iterations without converging. "
+                       "Raise max_iterations, start closer, or calibrate fewer parameters.")
+    if fit.undetermined:
+        return Outcome(False, "undetermined", f"Converged, but the data leave open: {'; '.join(fit.undetermined)}. "
+                       "Fix one of these parameters, give it a prior (sigma), or excite the system differently.")
+    stuck = [name for name, at in zip(fit.parameters, fit.at_bound, strict=True) if at]
+    if stuck:
+        return Outcome(True, "at_bound", f"Converged with {', '.join(stuck)} at a bound; standard deviations there ignore "
+                       "the bound. Widen it if the physics allow, else doubt the structure of the model.")
+    return Outcome(True, "converged", f"Converged in {solution.iterations} iterations.")
+
+
+def _check_options(system: System, initial: str, loss: str, max_iterations: int) -> None:
+    if not isinstance(system, System):
+        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
+                         remedy="Read one with rt.read_system(path).")
+    for name, value, allowed in (("initial", initial, STARTS), ("loss", loss, LOSSES)):
+        if value not in allowed:
+            raise InputError(f"{name} is {value!r}", where=f"argument {name}", expected="one of " + ", ".join(allowed))
+    if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
+        raise InputError(f"max_iterations is {max_iterations!r}", where="argument max_iterations",
+                         expected="a positive whole number")
+
+
+def _refuse_double_start(ranges: Ranges, initial: Start) -> None:
+    named = [name for name in ranges.names if name.startswith("lumps.") and name.endswith(".initial")]
+    if named and initial != "system":
+        raise InputError(f"{named[0]!r} is a parameter, but initial is {initial!r}", where="argument parameters",
+                         remedy='Leave it out (a free start estimates it for every record), or use initial="system".')
+
+
+def _refuse_idle(problem: Problem, v: Array) -> None:
+    """A parameter that no reading feels."""
+    ranges = problem.ranges
+    reach = np.zeros(len(ranges.names))
+    for run in problem.runs(v):
+        reach = np.maximum(reach, np.abs(run.by_parameter).max(axis=(0, 1), initial=0.0))
+    idle = np.flatnonzero(reach * ranges.spread < 1e-9)
+    if idle.size:
+        name = ranges.names[idle[0]]
+        raise InputError(f"{name!r} has no influence on any reading{_why_idle(problem, name)}", where="argument data",
+                         expected="data that excite every parameter",
+                         remedy="Take it out of the parameters, or use a record that excites it.")
+
+
+def _why_idle(problem: Problem, name: str) -> str:
+    table, _, rest = name.partition(".")
+    for source in (*problem.system.input_names, *problem.system.module_names):
+        if table in ("inputs", "modules") and rest.startswith(f"{source}.") and not any(
+                np.any(one.record[source]) for one in problem.data):
+            return f": {'heater' if table == 'inputs' else 'module'} {source!r} is never on"
+    return ""

@@ -1,0 +1,94 @@
+"""Covariance of the estimates when residuals are correlated: the sandwich, initial temperatures marginalised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from ._autoregression import correlation_of
+from ._noise import Loss, score, score_slope
+from ._problem import Problem
+
+Array = NDArray[np.float64]
+_ZERO = 1e-12  # relative eigenvalue that is rounding
+
+
+@dataclass(frozen=True)
+class Information:
+    """What the data say about the coordinates of the parameters.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (p, p)
+        In coordinates, priors included.
+    undetermined : tuple of ndarray
+        Orthonormal directions, in units of `Ranges.unit`, that the data leave open by more than one unit.
+    """
+
+    covariance: Array
+    undetermined: tuple[Array, ...]
+
+
+def information(problem: Problem, v: Array, loss: Loss) -> Information:
+    """Sandwich covariance at the estimate.
+
+    H = Σ J̃ᵀ D J̃ + GᵀG + P and M = Σ J̃ᵀ Cov(ψ) J̃ + GᵀG + P with J̃ = J - X G the derivative after the initial
+    temperatures (derivative X, unit prior) have answered: G = (XᵀDX + 1)⁻¹XᵀDJ. D holds ψ', and Cov(ψ) is that of an
+    autoregression fitted to the residuals. The covariance is H⁻¹ M H⁻¹.
+    """
+    p = len(problem.ranges.names)
+    weighted = [(weigh(run.residual), weigh(run.by_parameter), weigh(run.by_start))
+                for run, weigh in zip(problem.runs(v), problem.weigh, strict=True)]
+    H, M = np.zeros((p, p)), np.zeros((p, p))
+    answered = []
+    for e, J, X in weighted:
+        root = np.sqrt(score_slope(e, loss))[..., None]
+        J2, X2 = (root * J).reshape(e.size, p), (root * X).reshape(e.size, X.shape[2])
+        G = np.linalg.solve(X2.T @ X2 + np.eye(X.shape[2]), X2.T @ J2)
+        rest = J2 - X2 @ G
+        H += rest.T @ rest + G.T @ G
+        M += G.T @ G
+        answered.append(J - X @ G)
+    for alike in _same_sensors(problem):
+        psi = [score(weighted[i][0], loss) for i in alike]
+        correlation = correlation_of(psi, _inflation(problem))
+        M += sum(correlation.meat(answered[i]) for i in alike)
+    return _with_priors(problem, v, H, M)
+
+
+def _same_sensors(problem: Problem) -> list[list[int]]:
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for i, one in enumerate(problem.data):
+        groups.setdefault(one.sensors, []).append(i)
+    return list(groups.values())
+
+
+def _inflation(problem: Problem) -> float:
+    used = len(problem.ranges.names) + sum(min(s.n_free, len(one.sensors))
+                                           for s, one in zip(problem.starts, problem.data, strict=True))
+    return problem.n_readings / max(problem.n_readings - used, 1)
+
+
+def _with_priors(problem: Problem, v: Array, H: Array, M: Array) -> Information:
+    unit = problem.ranges.unit
+    scale = np.outer(unit, unit)
+    H, M, P = H * scale, M * scale, problem.prior_information(v) * scale
+    values, vectors = eigh(H)
+    spread = np.array([_variance(value, vector, M, values[-1]) for value, vector in zip(values, vectors.T, strict=True)])
+    open_ = tuple(vectors[:, i] for i in np.flatnonzero(spread > 1.0))
+    bounds = np.diag((unit / problem.ranges.spread) ** 2)
+    H, M = H + P, M + P
+    for direction in open_:  # no prior either: as uncertain as its bounds
+        if direction @ P @ direction < direction @ bounds @ direction:
+            extra = (direction @ bounds @ direction) * np.outer(direction, direction)
+            H, M = H + extra, M + extra
+    inverse = np.linalg.inv(H)
+    covariance = inverse @ M @ inverse * scale
+    return Information((covariance + covariance.T) / 2, open_)
+
+
+def _variance(value: float, vector: Array, M: Array, largest: float) -> float:
+    return np.inf if value <= _ZERO * largest else float(vector @ M @ vector) / value**2

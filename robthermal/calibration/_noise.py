@@ -1,0 +1,106 @@
+"""Weights and losses: what a residual of one kelvin is worth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..thermal import System
+from ._data import Data
+
+Array = NDArray[np.float64]
+Loss = Literal["linear", "soft_l1", "huber"]
+LOSSES = ("linear", "soft_l1", "huber")
+SMALLEST = 1e-4  # K: the simulation's own truncation; nothing is known better
+_TUNING = 1.345  # Huber (1964): 95 % efficient for Gaussian noise
+
+
+def declared_noise(system: System, data: list[Data], noise: Mapping[str, float] | float | None) -> dict[str, float]:
+    """Standard deviation of every sensor in the data [K]; 0 where it has to be estimated."""
+    used = [name for name in system.sensor_names if any(name in one.sensors for one in data)]
+    given = _given(used, noise)
+    out = {}
+    for name in used:
+        out[name] = given.get(name, system.sensors[name].noise)
+        if name not in given and out[name]:
+            out[name] = max(out[name], floor(data, name))
+    return out
+
+
+def _given(used: list[str], noise: Mapping[str, float] | float | None) -> dict[str, float]:
+    if noise is None:
+        return {}
+    given = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(used, noise)
+    for name, value in given.items():
+        if name not in used:
+            raise InputError(f"there is no sensor {name!r} in the data", where="argument noise",
+                             expected="one of " + ", ".join(used))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
+            raise InputError(f"the noise of {name!r} is {value!r}", where="argument noise",
+                             expected="a positive standard deviation [K]",
+                             remedy="Leave it out to have it estimated from the residuals.")
+    return given
+
+
+def quantum(readings: Array) -> float:
+    """Step of a quantised reading [K], 0 if it is not quantised."""
+    levels = np.unique(np.round(readings, 9))
+    if levels.size < 2 or 4 * levels.size > readings.size:
+        return 0.0
+    return float(np.median(np.diff(levels)))
+
+
+def floor(data: list[Data], name: str) -> float:
+    """Least credible noise of a sensor [K]: rounding to steps q is an error of q/√12."""
+    steps = [quantum(one.readings[:, one.sensors.index(name)]) for one in data if name in one.sensors]
+    return max(max(steps) / math.sqrt(12.0), SMALLEST)
+
+
+def estimated_noise(data: list[Data], residuals: list[Array], name: str, loss: Loss) -> float:
+    """Noise of a sensor from its residuals [K]: root mean square, or its robust equivalent under a robust loss."""
+    own = [r[:, one.sensors.index(name)] for one, r in zip(data, residuals, strict=True) if name in one.sensors]
+    e = np.concatenate(own)
+    scale = math.sqrt(float(np.mean(e**2))) if loss == "linear" else 1.4826 * float(np.median(np.abs(e)))
+    return max(scale, floor(data, name))
+
+
+def score(e: Array, loss: Loss) -> Array:
+    """Derivative ψ of the loss at weighted residuals."""
+    if loss == "linear":
+        return e
+    if loss == "huber":
+        return np.clip(e, -_TUNING, _TUNING)
+    return e / np.sqrt(1.0 + (e / _TUNING) ** 2)
+
+
+def score_slope(e: Array, loss: Loss) -> Array:
+    """Derivative of `score`."""
+    if loss == "linear":
+        return np.ones_like(e)
+    if loss == "huber":
+        return (np.abs(e) <= _TUNING).astype(float)
+    return (1.0 + (e / _TUNING) ** 2) ** -1.5
+
+
+def scipy_loss(loss: Loss, n_readings: int) -> str | Callable[[Array], Array]:
+    """Loss for `scipy.optimize.least_squares` that leaves the priors, which follow the readings, quadratic."""
+    if loss == "linear":
+        return "linear"
+
+    def rho(z: Array) -> Array:
+        out = np.array([z, np.ones_like(z), np.zeros_like(z)])
+        y = z[:n_readings] / _TUNING**2
+        root = np.sqrt(1.0 + y) if loss == "soft_l1" else np.sqrt(np.maximum(y, 1.0))
+        out[0, :n_readings] = 2.0 * _TUNING**2 * (root - 1.0) if loss == "soft_l1" \
+            else np.where(y <= 1.0, z[:n_readings], _TUNING**2 * (2.0 * root - 1.0))
+        out[1, :n_readings] = 1.0 / root
+        far = -0.5 / (root**3 * _TUNING**2)
+        out[2, :n_readings] = far if loss == "soft_l1" else np.where(y <= 1.0, 0.0, far)
+        return out
+
+    return rho

@@ -1,0 +1,142 @@
+"""The least-squares problem: weighted residuals of all records, priors, and their exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Diverged
+from ..thermal import System, trajectory
+from ._data import Data
+from ._ranges import Ranges
+from ._start import REACH, Initial, start_values
+
+Array = NDArray[np.float64]
+Weigh = Callable[[Array], Array]  # (n, n_sensors, ...) in kelvin to weighted, linear
+
+
+@dataclass(frozen=True)
+class Run:
+    """One record at one point: residual (n, n_sensors) and its derivatives (n, n_sensors, p) and (…, n_free)."""
+
+    residual: Array
+    by_parameter: Array
+    by_start: Array
+
+
+@dataclass
+class Problem:
+    """Unknowns v: coordinates of the parameters, then every record's initial temperatures in units of their prior.
+
+    Parameters
+    ----------
+    system : System
+        Whose parameters.
+    data : list of Data
+        Records.
+    ranges : Ranges
+        Parameters to estimate.
+    starts : list of Initial
+        One per record.
+    weigh : list of callable
+        Maps one record's residuals [K] to weighted ones.
+    """
+
+    system: System
+    data: list[Data]
+    ranges: Ranges
+    starts: list[Initial]
+    weigh: list[Weigh] = field(default_factory=list)
+
+    @property
+    def n_readings(self) -> int:
+        """Number of readings."""
+        return sum(one.readings.size for one in self.data)
+
+    @property
+    def v0(self) -> Array:
+        """Starting point."""
+        return np.concatenate([self.ranges.coordinates(self.ranges.start), np.zeros(sum(s.n_free for s in self.starts))])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds of the unknowns."""
+        reach = np.full(sum(s.n_free for s in self.starts), REACH)
+        q = self.ranges.coordinates
+        return np.concatenate([q(self.ranges.lower), -reach]), np.concatenate([q(self.ranges.upper), reach])
+
+    def parameters(self, v: Array) -> Array:
+        """Parameter values."""
+        return self.ranges.values(v[:len(self.ranges.names)])
+
+    def temperatures(self, v: Array) -> list[Array]:
+        """Initial lump temperatures of every record [K]."""
+        out, at = [], len(self.ranges.names)
+        for start in self.starts:
+            out.append(start.mean + start.sigma * v[at:at + start.n_free] if start.n_free else start.mean)
+            at += start.n_free
+        return out
+
+    def systems(self, v: Array) -> list[System]:
+        """System of every record: the parameters, and its own initial temperatures."""
+        values = dict(zip(self.ranges.names, self.parameters(v).tolist(), strict=True))
+        return [self.system.with_parameters({**start_values(self.system, T), **values}) for T in self.temperatures(v)]
+
+    def residuals(self, v: Array) -> list[Array]:
+        """Model minus measurement of every record, (n, n_sensors) [K]."""
+        return [trajectory(system, one.record).readings[:, one.columns] - one.readings
+                for system, one in zip(self.systems(v), self.data, strict=True)]
+
+    def runs(self, v: Array) -> list[Run]:
+        """Residuals of all records with their derivatives in the coordinates [K]."""
+        slopes = self.ranges.slopes(self.parameters(v))
+        out = []
+        for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
+            free = list(start_values(system, start.mean)) if start.n_free else []
+            run = trajectory(system, one.record, sensitivities=[*self.ranges.names, *free])
+            J = run.sensitivity[:, one.columns]
+            p = len(self.ranges.names)
+            out.append(Run(run.readings[:, one.columns] - one.readings, J[..., :p] * slopes, J[..., p:] * start.sigma))
+        return out
+
+    def vector(self, v: Array) -> Array:
+        """Weighted residuals of all readings, then the priors; infinite where the model runs away (a rejected step)."""
+        try:
+            parts = [weigh(r).ravel() for weigh, r in zip(self.weigh, self.residuals(v), strict=True)]
+        except Diverged:
+            return np.full(self.n_readings + self._prior(v).size, np.inf)
+        return np.concatenate([*parts, self._prior(v)])
+
+    def jacobian(self, v: Array) -> Array:
+        """Derivative of `vector`."""
+        p, known = len(self.ranges.names), np.isfinite(self.ranges.sigma)
+        J = np.zeros((self.n_readings + int(known.sum()) + v.size - p, v.size))
+        row, column = 0, p
+        for run, weigh, start in zip(self.runs(v), self.weigh, self.starts, strict=True):
+            rows = slice(row, row + run.residual.size)
+            J[rows, :p] = weigh(run.by_parameter).reshape(run.residual.size, p)
+            J[rows, column:column + start.n_free] = weigh(run.by_start).reshape(run.residual.size, start.n_free)
+            row, column = rows.stop, column + start.n_free
+        J[row + np.arange(known.sum()), np.flatnonzero(known)] = (self._prior_slope(v))[known]
+        J[row + int(known.sum()):, p:] = np.eye(v.size - p)
+        return J
+
+    def _prior(self, v: Array) -> Array:
+        known = np.isfinite(self.ranges.sigma)
+        away = (self.parameters(v) - self.ranges.start)[known] / self.ranges.sigma[known]
+        return np.concatenate([away, v[len(self.ranges.names):]])
+
+    def _prior_slope(self, v: Array) -> Array:
+        return self.ranges.slopes(self.parameters(v)) / self.ranges.sigma
+
+    def prior_information(self, v: Array) -> Array:
+        """Information of the parameters' priors in the coordinates, (p, p)."""
+        return np.diag(self._prior_slope(v) ** 2)
+
+
+def scaled(noise: Array) -> Weigh:
+    """Weight that divides every sensor's column by its noise [K]."""
+    return lambda r: r / noise.reshape(1, -1, *[1] * (r.ndim - 2))

@@ -1,0 +1,147 @@
+"""Which parameters may change, within which bounds, with which prior; and the coordinates the optimiser works in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..thermal import FitRange, System
+
+Array = NDArray[np.float64]
+Choice = Iterable[str] | Mapping[str, tuple[float, float] | FitRange] | None
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Parameters to estimate; positive ones are optimised by their logarithm.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parameter names.
+    start, lower, upper : ndarray, shape (p,)
+        Starting values and bounds, in the unit of each parameter.
+    sigma : ndarray, shape (p,)
+        Prior standard deviation around the starting value; infinite without a prior.
+    logarithmic : ndarray of bool, shape (p,)
+        Whether the coordinate is log(value).
+    """
+
+    names: tuple[str, ...]
+    start: Array
+    lower: Array
+    upper: Array
+    sigma: Array
+    logarithmic: NDArray[np.bool_]
+
+    def coordinates(self, values: Array) -> Array:
+        """Optimiser's coordinates of parameter values."""
+        return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
+
+    def values(self, coordinates: Array) -> Array:
+        """Parameter values at optimiser's coordinates."""
+        return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates)
+
+    def slopes(self, values: Array) -> Array:
+        """Derivative of the values with respect to the coordinates."""
+        return np.where(self.logarithmic, values, 1.0)
+
+    @property
+    def unit(self) -> Array:
+        """What counts as one plausible step of each coordinate: a factor e, or a uniform spread over the bounds."""
+        return np.where(self.logarithmic, 1.0, self.spread)
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviation of each coordinate if it were uniform between its bounds."""
+        return (self.coordinates(self.upper) - self.coordinates(self.lower)) / math.sqrt(12.0)
+
+    def at_bound(self, values: Array) -> NDArray[np.bool_]:
+        """Whether each value has run into a bound (within 1e-4 of the range, in coordinates)."""
+        q, low, high = (self.coordinates(v) for v in (values, self.lower, self.upper))
+        near = 1e-4 * (high - low)
+        return (q - low < near) | (high - q < near)
+
+
+NONE = Ranges((), *(np.zeros(0) for _ in range(4)), np.zeros(0, bool))
+
+
+def chosen_ranges(system: System, parameters: Choice) -> Ranges:
+    """Ranges of a calibration: the system's fit table, some names of it, or a mapping from name to (lower, upper)."""
+    table = _table(system, parameters)
+    for name, limits in table.items():
+        _check(system, name, limits)
+    names = tuple(table)
+    start = np.array([system.parameter(name) for name in names])
+    lower = np.array([limits.lower for limits in table.values()])
+    upper = np.array([limits.upper for limits in table.values()])
+    sigma = np.array([limits.sigma or np.inf for limits in table.values()])
+    temperature = np.array([name.endswith((".temperature", ".initial")) for name in names])
+    return Ranges(names, start, lower, upper, sigma, (lower > 0) & ~temperature)
+
+
+def _table(system: System, parameters: Choice) -> dict[str, FitRange]:
+    if parameters is None:
+        if not system.fit:
+            raise InputError("nothing to calibrate: the system has no fit table", where="argument parameters",
+                             remedy='Add [fit] to the system file, or pass parameters={"links.a-b.conductance": (0.1, 10.0)}.')
+        return dict(system.fit)
+    if isinstance(parameters, str):
+        raise InputError(f"parameters is the text {parameters!r}", where="argument parameters",
+                         expected="a list of names or a mapping from name to (lower, upper)", remedy="Put it in a list.")
+    if isinstance(parameters, Mapping):
+        table = {name: _as_range(name, limits) for name, limits in parameters.items()}
+    else:
+        table = {name: _listed(system, name) for name in parameters}
+    if not table:
+        raise InputError("parameters is empty", where="argument parameters", remedy="Name at least one parameter.")
+    return table
+
+
+def _listed(system: System, name: str) -> FitRange:
+    if name not in system.fit:
+        system.parameter(name)  # an unknown name is the better message
+        raise InputError(f"{name!r} has no range in the fit table", where="argument parameters",
+                         expected="names from the fit table, here " + (", ".join(system.fit) or "empty"),
+                         remedy=f'Pass a mapping with its bounds: {{"{name}": (lower, upper)}}.')
+    return system.fit[name]
+
+
+def _as_range(name: str, limits: tuple[float, float] | FitRange) -> FitRange:
+    if isinstance(limits, FitRange):
+        return limits
+    try:
+        lower, upper = (float(value) for value in limits)
+    except (TypeError, ValueError):
+        raise InputError(f"the range of {name!r} is {limits!r}", where="argument parameters",
+                         expected="(lower, upper) or a FitRange") from None
+    if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
+        raise InputError(f"the range of {name!r} is ({lower}, {upper})", where="argument parameters",
+                         expected="finite bounds with lower < upper")
+    return FitRange(lower=lower, upper=upper)
+
+
+def _check(system: System, name: str, limits: FitRange) -> None:
+    value = system.parameter(name)
+    if name.endswith((".noise", ".disturbance", ".exponent", ".reference_temperature")):
+        raise InputError(f"{name!r} cannot be calibrated", where="argument parameters",
+                         expected="a capacity, conductance, gain, offset, lag, delay, temperature or module property",
+                         remedy="Noise levels are estimated when they are not declared; the others must be known.")
+    if not limits.lower <= value <= limits.upper:
+        raise InputError(f"{name!r} starts at {value:.6g}, outside its bounds [{limits.lower:.6g}, {limits.upper:.6g}]",
+                         where="argument parameters", remedy="Widen the bounds, or start with system.with_parameters.")
+    if name.endswith(".time_constant") and value == 0:
+        raise InputError(f"{name!r} starts at 0, where the lag does not exist and has no derivative",
+                         where="argument parameters", remedy="Start it at the order of magnitude you expect [s].")
+    inside = 1e-9 * (limits.upper - limits.lower)
+    for bound in (limits.lower + inside, limits.upper - inside):
+        try:
+            system.with_parameters({name: bound})
+        except InputError as error:
+            raise InputError(f"the bounds of {name!r} reach {bound:.6g}, which the system refuses: {error.what}",
+                             where="argument parameters", remedy="Narrow the bounds.") from None

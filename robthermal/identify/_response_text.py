@@ -1,0 +1,48 @@
+"""A frequency response in words: what to trust, and a short table."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robthermal.errors import Outcome
+
+if TYPE_CHECKING:
+    from ._response import FrequencyResponse
+
+
+def outcome(result: FrequencyResponse) -> Outcome:
+    """Whether the estimate may be used as it stands, and what to distrust."""
+    undetermined = np.isnan(result.response).any(axis=(0, 1))
+    if undetermined.any():
+        text = f"{int(undetermined.sum())} of {len(result)} bins are not determined by the data (NaN). "
+        return Outcome(False, "undetermined", text + " ".join(result.notes))
+    if result.suspect.any():
+        where = result.frequencies[result.suspect]
+        text = (
+            f"{where.size} of {len(result)} bins are suspect, from {where[0]:.3g} to {where[-1]:.3g} Hz: the local "
+            "model does not describe the window (wider than the slowest pole, or wrong poles), or the loop hides "
+            "the plant. Prescribe the slow poles (lrmp), record longer, or leave these bins out."
+        )
+        return Outcome(False, "suspect", " ".join([text, *result.notes]))
+    return Outcome(True, "estimated", " ".join([f"All {len(result)} bins estimated.", *result.notes]))
+
+
+def table(result: FrequencyResponse) -> str:
+    """A few frequencies of every entry of G, and the outcome."""
+    lines = [
+        f"Frequency response by {result.method}: {len(result)} bins, "
+        f"{result.frequencies[0]:.4g} to {result.frequencies[-1]:.4g} Hz",
+        f"{'output':<14}{'input':<14}{'f [Hz]':>12}{'|G|':>12}{'phase [deg]':>13}{'radius 95 %':>13}  suspect",
+    ]
+    radius = result.confidence_radius(0.95)
+    chosen = np.unique(np.geomspace(1, len(result), 4).astype(int) - 1)
+    for o, output in enumerate(result.output_names):
+        for i, name in enumerate(result.input_names):
+            for f in chosen:
+                g = result.response[o, i, f]
+                numbers = f"{result.frequencies[f]:>12.4g}{abs(g):>12.4g}{np.degrees(np.angle(g)):>13.1f}"
+                doubt = "yes" if result.suspect[f] else "no"
+                lines.append(f"{output:<14}{name:<14}{numbers}{radius[o, i, f]:>13.3g}  {doubt}")
+    return "\n".join([*lines, str(result.outcome)])

@@ -1,0 +1,150 @@
+"""All claims about one system: its boxes certified, its limits found, every certificate verified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..certify import CurrentLimit, Runaway, RunawayFree, contraction, heater_heat, largest_current, runaway, runaway_free
+from ..errors import InputError
+from ..thermal import System
+from ..verification import Certificate, Verdict, verify
+from ._schema import Boxes
+
+METHODS = ("energy", "sum", "max")
+DIRECTIONS = ("symmetric", "cooling", "heating")
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A certificate with its independent check.
+
+    Parameters
+    ----------
+    key : str
+        File name without ending.
+    title : str
+        For people.
+    certificate : Certificate
+        What is claimed.
+    verdict : Verdict or None
+        Of `rt.verify`; None if there is nothing to verify because the claim does not hold.
+    required : bool
+        Whether the job's answer is no without it.
+    """
+
+    key: str
+    title: str
+    certificate: Certificate
+    verdict: Verdict | None
+    required: bool
+
+    @property
+    def good(self) -> bool:
+        """Holds and is verified."""
+        return self.certificate.holds and self.verdict is not None and self.verdict.valid
+
+
+@dataclass(frozen=True)
+class Certification:
+    """Everything that was certified about a system.
+
+    Parameters
+    ----------
+    system : System
+        About which.
+    boxes : Boxes
+        For which ranges.
+    checked : tuple of Checked
+        Certificates with verdicts; the required ones first.
+    limits : tuple of CurrentLimit
+        By method and direction.
+    runaway : Runaway or None
+        None without set-points.
+    safe : RunawayFree
+        The claim of no thermal runaway.
+    """
+
+    system: System
+    boxes: Boxes
+    checked: tuple[Checked, ...]
+    limits: tuple[CurrentLimit, ...]
+    runaway: Runaway | None
+    safe: RunawayFree
+
+    @property
+    def holds(self) -> bool:
+        """Whether everything required holds and is verified."""
+        return all(c.good for c in self.checked if c.required)
+
+
+def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None] = lambda stage: None) -> Certification:
+    """Certify a system in its boxes and verify every certificate.
+
+    Parameters
+    ----------
+    system : System
+        Whose.
+    boxes : Boxes
+        Ranges of the claims.
+    progress : callable, optional
+        Called with a sentence before every stage.
+
+    Returns
+    -------
+    Certification
+
+    Raises
+    ------
+    InputError
+        Ranges that do not fit the system, a module or heater without a range.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> done = rt.project.certify_system(rt.systems.two_module(), rt.project.Boxes(
+    ...     current={"m1": (0.0, 1.0), "m2": (0.0, 1.0)}))
+    >>> done.holds
+    True
+    """
+    current = _currents(system, boxes)
+    heat = heater_heat(system) if boxes.heat is None else boxes.heat
+    progress("certifying the temperature box")
+    box = contraction(system, current=current, temperature=boxes.temperature, method=boxes.method)
+    progress("certifying that no trajectory leaves its box")
+    safe = runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, method=boxes.method)
+    found = [("contraction", "Contraction in the stated box", box, True),
+             ("box", "The box is never left", safe.invariance, True)]
+    if safe.contraction is not safe.invariance:
+        found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
+    limits = []
+    for method in METHODS if system.modules else ():
+        for direction in DIRECTIONS:
+            progress(f"searching the largest {direction} current, method {method}")
+            limit = largest_current(system, temperature=boxes.temperature, direction=direction, method=method)
+            limits.append(limit)
+            if limit.certificate.holds:
+                found.append((f"limit_{method}_{direction}", f"Largest {direction} current, method {method}",
+                              limit.certificate, False))
+    limit_of_load = None
+    if boxes.setpoint:
+        progress("searching the runaway limit")
+        limit_of_load = runaway(system, setpoint=boxes.setpoint)
+        found += [(f"runaway_{name}", f"Closed-form runaway limit of {name}", cert, False)
+                  for name, cert in limit_of_load.certificates.items()]
+    progress("verifying every certificate")
+    checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
+                    for key, title, cert, required in found)
+    return Certification(system, boxes, checked, tuple(limits), limit_of_load, safe)
+
+
+def _currents(system: System, boxes: Boxes) -> dict[str, tuple[float, float]]:
+    if boxes.current is not None:
+        return boxes.current
+    ranges = {}
+    for name, module in system.modules.items():
+        if module.current_limits is None:
+            raise InputError(f"module {name!r} has no current range", where=f"[modules.{name}] current_limits",
+                             remedy="Declare current_limits, or give the range to certify.")
+        ranges[name] = module.current_limits
+    return ranges

@@ -1,0 +1,75 @@
+"""Output folders that appear only when complete."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import InputError
+
+MARKER = "summary.json"  # every finished output folder has one
+
+
+@contextmanager
+def output_folder(path: str | Path) -> Iterator[Path]:
+    """Write into a temporary folder beside `path`, which takes its place when the block ends well.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where the results go. An earlier result there is replaced; anything else is refused.
+
+    Yields
+    ------
+    Path
+        Folder to write into.
+
+    Raises
+    ------
+    InputError
+        Something else is in the way, or the place cannot be written.
+
+    Examples
+    --------
+    >>> with output_folder("results") as folder:
+    ...     _ = (folder / "summary.json").write_text("{}")
+    >>> sorted(p.name for p in Path("results").iterdir())
+    ['summary.json']
+    """
+    target = Path(path)
+    check_free(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        partial = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(target),
+                         remedy="Choose another folder with --out.") from None
+    try:
+        yield partial
+        partial.chmod(0o755)
+        if target.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{target.name}.old.", dir=target.parent))
+            target.rename(old / "result")
+            partial.rename(target)
+            shutil.rmtree(old)
+        else:
+            partial.rename(target)
+    finally:  # also on Ctrl-C: nothing half-written stays
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def check_free(target: Path) -> None:
+    """Refuse to overwrite what is not an earlier result.
+
+    Parameters
+    ----------
+    target : Path
+        Output folder.
+    """
+    if target.is_dir() and not (target / MARKER).is_file() and any(target.iterdir()):
+        raise InputError("is a folder with other things in it", where=str(target), remedy="Choose another with --out.")
+    if target.exists() and not target.is_dir():
+        raise InputError("is a file", where=str(target), remedy="Choose another folder with --out.")

@@ -1,0 +1,201 @@
+"""PROJECT.toml: which system, which records, what to calibrate, what to certify."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..errors import InputError
+from ..thermal import FitRange, System, fit_in_kelvin, read_system
+
+_MAX_BYTES = 10_000_000
+_ZERO = 273.15
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Pair = tuple[Number, Number]
+Method = Literal["energy", "sum", "max"]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ProjectTable(_Table):
+    """[project]: files are relative to the project file."""
+
+    name: str
+    system: str
+    train: list[str] = []
+    validation: list[str] = []
+    label: str = ""
+    median_filter: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+
+
+class CalibrateTable(_Table):
+    """[calibrate]: what `rt.calibrate` may do."""
+
+    initial: Literal["free", "measured", "system"] = "free"
+    loss: Literal["linear", "soft_l1", "huber"] = "linear"
+    parameters: dict[str, dict[str, Number]] = {}
+
+
+class CertifyTable(_Table):
+    """[certify]: the boxes of the claims, temperatures in the unit of the system file."""
+
+    temperature: Pair | None = None
+    ambient: dict[str, Pair] = {}
+    current: dict[str, Pair] | None = None
+    heat: dict[str, Pair] | None = None
+    setpoint: dict[str, Number] = {}
+    method: Method = "energy"
+
+
+class _File(_Table):
+    project: ProjectTable
+    calibrate: CalibrateTable = CalibrateTable()
+    certify: CertifyTable = CertifyTable()
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """What is to be certified, kelvin.
+
+    Parameters
+    ----------
+    temperature : tuple of float
+        Box of the current limits [K].
+    ambient, current, heat : dict
+        Ranges by name [K], [A], [W]; `heat` None means the heaters' declared limits.
+    setpoint : dict
+        Regulated cold faces [K].
+    method : str
+        Norm of the contraction.
+    """
+
+    temperature: tuple[float, float] = (278.15, 358.15)
+    ambient: dict[str, tuple[float, float]] | None = None
+    current: dict[str, tuple[float, float]] | None = None
+    heat: dict[str, tuple[float, float]] | None = None
+    setpoint: dict[str, float] | None = None
+    method: Method = "energy"
+
+
+@dataclass(frozen=True)
+class Project:
+    """A job: a system, its records, what to calibrate and what to certify.
+
+    Parameters
+    ----------
+    name, label : str
+        For the report; the label stands over everything, for example "SIMULATED DATA".
+    system : System
+        Nominal system with its [fit] ranges.
+    train, validation : tuple of Path
+        Record files.
+    median_filter : float or None
+        Length of a median filter for the outputs [s], None for none.
+    initial, loss : str
+        As in `rt.calibrate`.
+    boxes : Boxes
+        What to certify.
+    files : tuple of Path
+        Every input file, for the hashes of the report.
+    """
+
+    name: str
+    label: str
+    system: System
+    train: tuple[Path, ...]
+    validation: tuple[Path, ...]
+    median_filter: float | None
+    initial: str
+    loss: str
+    boxes: Boxes
+    files: tuple[Path, ...]
+
+
+def read_project(path: str | Path) -> Project:
+    """Read a project file and the system it names.
+
+    Parameters
+    ----------
+    path : str or Path
+        PROJECT.toml.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    InputError
+        Naming file, table, key and remedy.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.read_project(rt.project.demo_project()).name
+    'Two-module setup (simulated demo)'
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError("is larger than 10 MB", where=str(path), remedy="Is this the right file?")
+        data = _File(**tomllib.loads(path.read_bytes().decode("utf-8-sig")))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
+    except ValidationError as error:
+        raise _refusal(error, path) from None
+    folder, head = path.parent, data.project
+    system_file = _beside(folder, head.system, path)
+    system = _with_fit(read_system(system_file), data.calibrate.parameters, path)
+    train, validation = (tuple(_beside(folder, name, path) for name in names) for names in (head.train, head.validation))
+    return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
+                   data.calibrate.loss, _boxes(system, data.certify), (path, system_file, *train, *validation))
+
+
+def _beside(folder: Path, name: str, project: Path) -> Path:
+    file = folder / name
+    if not file.is_file():
+        raise InputError(f"{name!r} does not exist", where=f"{project} [project]",
+                         remedy="Paths are relative to the project file.")
+    return file
+
+
+def _with_fit(system: System, ranges: dict[str, dict[str, float]], path: Path) -> System:
+    if not ranges:
+        return system
+    try:
+        fit = {name: FitRange(**bounds) for name, bounds in fit_in_kelvin(ranges, system.temperature_unit).items()}
+        return System(**{**dict(system), "fit": fit})
+    except ValidationError as error:
+        raise _refusal(error, path) from None
+    except InputError as error:
+        raise InputError(error.what, where=f"{path} [calibrate.parameters] {error.where}", expected=error.expected,
+                         remedy=error.remedy) from None
+
+
+def _boxes(system: System, table: CertifyTable) -> Boxes:
+    zero = _ZERO if system.temperature_unit == "degC" else 0.0
+
+    def kelvin(pair: Pair) -> tuple[float, float]:
+        return round(pair[0] + zero, 9), round(pair[1] + zero, 9)
+
+    return Boxes(temperature=kelvin(table.temperature) if table.temperature else Boxes().temperature,
+                 ambient={name: kelvin(pair) for name, pair in table.ambient.items()}, current=table.current,
+                 heat=table.heat, setpoint={name: round(value + zero, 9) for name, value in table.setpoint.items()},
+                 method=table.method)
+
+
+def _refusal(error: ValidationError, path: Path) -> InputError:
+    faults: list[Any] = error.errors(include_url=False)
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    place = ".".join(str(word) for word in fault["loc"])
+    what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
+        fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
+    return InputError(what, where=str(path), remedy="See the documentation, \"Project file\", or start from the demo's.")

@@ -1,0 +1,130 @@
+"""Readings that jump away and come back: counted and said, never altered unless a median filter is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter as running_median
+
+from ..errors import InputError
+from ._checks import Array, positive_number
+from ._record import Record
+
+_NEIGHBOURS = 5  # a jump of up to two samples cannot move the median of five
+_NOISE = 8.0  # times the noise: one false alarm in 10^15 samples of Gaussian noise
+_QUANTA = 4.0  # quantisation steps that a sound reading may jump
+_MAD = 1.4826  # median absolute deviation of a Gaussian, to its standard deviation
+
+
+def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
+    """Single-sample outliers in the outputs: away from the median of five neighbours, and back after two samples.
+
+    A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
+    deviations (from the median absolute deviation) and by more than 4 quantisation steps.
+
+    Parameters
+    ----------
+    record : Record
+        Its outputs are examined; nothing is changed.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Output name to the rows of its glitches; outputs without any are left out.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> T1 = 300.0 + 0.01 * np.arange(50)
+    >>> T1[20] += 30.0
+    >>> record = rt.Record(sample_time=1.0, inputs=np.ones(50), outputs=T1, input_names=["Q1"], output_names=["T1"])
+    >>> rt.signals.find_glitches(record)
+    {'T1': array([20])}
+    """
+    _require_record(record)
+    found = {name: glitch_rows(record[name]) for name in record.output_names}
+    return {name: rows for name, rows in found.items() if rows.size}
+
+
+def median_filter(record: Record, window: float) -> Record:
+    """Replace the outputs by their centred running median.
+
+    Parameters
+    ----------
+    record : Record
+        Its inputs stay as they are.
+    window : float
+        Width [s]; the median is over all samples within half of it. At the ends the first and last sample are repeated.
+
+    Returns
+    -------
+    Record
+        With a note that says so.
+
+    Raises
+    ------
+    InputError
+        A window that is not positive, holds a single sample, or is longer than the record.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> T1 = np.full(50, 300.0)
+    >>> T1[20] = 330.0
+    >>> record = rt.Record(sample_time=1.0, inputs=np.ones(50), outputs=T1, input_names=["Q1"], output_names=["T1"])
+    >>> float(rt.signals.median_filter(record, 9.0)["T1"].max())
+    300.0
+    """
+    _require_record(record)
+    samples = window_samples(window, record.sample_time, record.n_samples, "window")
+    outputs = np.empty_like(record.outputs)
+    for i in range(outputs.shape[1]):
+        outputs[:, i] = filtered(record.outputs[:, i], samples)
+    return record._changed(outputs=outputs, notes=(*record.notes, filter_note(window, samples)))
+
+
+def glitch_rows(column: Array) -> NDArray[np.intp]:
+    """Rows of the glitches of one channel."""
+    if len(column) < _NEIGHBOURS:
+        return np.empty(0, dtype=np.intp)
+    # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
+    residual = np.abs(column - running_median(column, size=_NEIGHBOURS, mode="mirror"))
+    # Half of the residuals of noisy data are not zero; where they are, the quantisation step is the scale.
+    noise = _MAD * float(np.median(residual))
+    rounding = 1e-9 * float(np.abs(column).max())
+    return np.flatnonzero(residual > max(_NOISE * noise, _QUANTA * _quantum(column), rounding))
+
+
+def filtered(column: Array, samples: int) -> Array:
+    """Running median over an odd number of samples."""
+    smooth: Array = running_median(np.ascontiguousarray(column), size=samples, mode="nearest")
+    return smooth
+
+
+def window_samples(window: float, sample_time: float, n_samples: int, where: str) -> int:
+    """Odd number of samples within half a window on either side."""
+    width = positive_number(window, where, "s")
+    samples = 2 * int(width / (2 * sample_time) + 1e-9) + 1
+    if not 3 <= samples <= n_samples:
+        raise InputError(
+            f"{where} is {width:g} s, {samples} samples",
+            where=f"argument {where}",
+            expected=f"between {2 * sample_time:g} s (three samples) and {n_samples * sample_time:g} s (the record)",
+        )
+    return samples
+
+
+def filter_note(window: float, samples: int) -> str:
+    """What the filter did, in words."""
+    return f"outputs replaced by their running median over {window:g} s ({samples} samples), as asked"
+
+
+def _quantum(column: Array) -> float:
+    """Quantisation step: the usual distance between neighbouring values that occur."""
+    gaps = np.diff(np.unique(column))
+    return float(np.median(gaps)) if gaps.size else 0.0
+
+
+def _require_record(record: object) -> None:
+    if not isinstance(record, Record):
+        raise InputError(f"got {type(record).__name__}", where="argument record", expected="a robthermal.Record")

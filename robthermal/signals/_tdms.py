@@ -1,0 +1,93 @@
+"""National Instruments TDMS: channels by name, time from a channel or from the waveform increment."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ._checks import Array
+from ._source import equally_long, numeric, refuse_large
+
+_DAMAGED = (ValueError, KeyError, TypeError, OSError, EOFError, IndexError, struct.error, UnicodeDecodeError)
+
+
+class TdmsSource:
+    """A TDMS file, its list of channels read."""
+
+    def __init__(self, path: Path, max_bytes: float | None):
+        nptdms = _require_nptdms()
+        self.path = path
+        self._library = nptdms
+        try:
+            described = nptdms.TdmsFile.read_metadata(path)
+            self._group = {channel.name: group.name for group in described.groups() for channel in group.channels()}
+            found = [channel for group in described.groups() for channel in group.channels()]
+        except _DAMAGED as error:
+            raise InputError(f"this is no TDMS file ({error})", where=f"{path}") from None
+        refuse_large(path, 8.0 * sum(len(channel) for channel in found), "bytes unpacked", max_bytes)
+        names = [channel.name for channel in found]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise InputError(f"channel {twice!r} stands in several groups", where=f"{path}", remedy="Keep one of them.")
+        self._waveforms = {channel.name: _waveform(channel) for channel in found}
+        self._has_clock = any(name.split("[")[0].strip().lower() == "time" for name in names)
+        self._made_time = () if self._has_clock else ("time",)
+        self.headers = self._made_time + tuple(names)
+
+    def read(self, wanted: Sequence[str]) -> dict[str, Array]:
+        """The wanted columns; time is made from the waveform increment where there is no channel for it."""
+        names = [header for header in wanted if header not in self._made_time]
+        try:
+            with self._library.TdmsFile.open(self.path) as file:
+                raw = {name: np.asarray(file[self._group[name]][name][:]) for name in names}
+        except _DAMAGED as error:
+            raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from None
+        columns = {name: numeric(column, name, self.path) for name, column in raw.items()}
+        equally_long(columns, self.path)
+        if self._made_time and names:
+            columns = {"time": self._made(names, len(columns[names[0]])), **columns}
+        return columns
+
+    def row(self, index: int) -> str:
+        """Words for a data row, counted from 0."""
+        return f"row {index}"
+
+    def _made(self, names: Sequence[str], n: int) -> Array:
+        increments = {self._waveforms[name] for name in names}
+        if len(increments) > 1:
+            raise InputError(
+                f"the channels have different increments and offsets: {sorted(increments, key=str)} s",
+                where=f"{self.path}",
+                expected="one sampling for all channels",
+            )
+        increment, offset = increments.pop()
+        if increment is None or increment <= 0.0:
+            raise InputError(
+                "there is no time: neither a channel 'time' nor the property wf_increment",
+                where=f"{self.path}",
+                remedy="Write a channel 'time' [s].",
+            )
+        rows: Array = np.arange(n, dtype=np.float64)
+        return offset + increment * rows
+
+
+def _waveform(channel: Any) -> tuple[float | None, float]:
+    increment = channel.properties.get("wf_increment")
+    return (None if increment is None else float(increment), float(channel.properties.get("wf_start_offset", 0.0)))
+
+
+def _require_nptdms() -> Any:
+    try:
+        # Imported here: an optional extra.
+        import nptdms
+    except ImportError:
+        raise InputError(
+            "TDMS files need the package npTDMS, which is not installed",
+            remedy="Install it with: pip install 'robthermal[tdms]'",
+        ) from None
+    return nptdms

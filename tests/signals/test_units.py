@@ -1,0 +1,36 @@
+"""Celsius and kelvin against decimal arithmetic."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robthermal.signals._units import celsius_to_kelvin, kelvin_to_celsius
+
+ZERO = Decimal("273.15")
+
+
+@given(st.integers(-10**12, 10**12), st.integers(0, 12))
+def test_short_decimals_convert_as_decimals(digits: int, places: int) -> None:
+    decimal = Decimal(digits).scaleb(-places)
+    if abs(decimal) < 800:
+        assert float(celsius_to_kelvin(float(decimal))) == float(decimal + ZERO)
+        assert float(kelvin_to_celsius(float(decimal))) == float(decimal - ZERO)
+
+
+@given(st.floats(150.0, 540.0))
+def test_round_trip_is_exact(kelvin: float) -> None:
+    assert float(celsius_to_kelvin(kelvin_to_celsius(kelvin))) == kelvin
+
+
+def test_arrays_keep_shape_and_mixed_lengths() -> None:
+    kelvin = celsius_to_kelvin(np.array([[20.58, 1 / 3], [-40.0, 25.1]]))
+    np.testing.assert_array_equal(kelvin, [[293.73, 1 / 3 + 273.15], [233.15, 298.25]])
+
+
+def test_wild_numbers_pass_through_for_the_checks_to_refuse() -> None:
+    assert np.isnan(celsius_to_kelvin(np.nan)) and np.isinf(celsius_to_kelvin(np.inf))
+    assert celsius_to_kelvin(1e300) == 1e300
