@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import certify as certify
     from . import errors as errors
     from . import identify as identify
+    from . import project as project
     from . import report as report
     from . import signals as signals
     from . import systems as systems
@@ -38,7 +39,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "errors", "identify", "report", "signals", "systems", "thermal", "verification")
+_ROOMS = ("calibration", "certify", "errors", "identify", "project", "report", "signals", "systems", "thermal", "verification")
 
 _HOME = {  # public name: the room it lives in
     "Certificate": "verification",

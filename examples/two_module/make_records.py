@@ -35,7 +35,7 @@ def make(levels_1: list[float], levels_2: list[float], dwell: float, seed: int, 
     truth = rt.systems.two_module().with_parameters(TRUTH)
     currents = np.column_stack([rt.signals.staircase(levels, dwell, sample_time=SAMPLE_TIME)
                                 for levels in (levels_1, levels_2)])
-    inputs = np.column_stack([currents, ambient(len(currents), rng)])
+    inputs = np.column_stack([currents, np.round(ambient(len(currents), rng), 3)])
     drive = rt.Record(sample_time=SAMPLE_TIME, inputs=inputs, outputs=np.zeros((len(inputs), 0)),
                       input_names=["m1", "m2", "room"], output_names=[])
     clean = rt.thermal.simulate(truth, drive)

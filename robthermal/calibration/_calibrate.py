@@ -112,11 +112,11 @@ def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterati
     v = problem.v0
     noise = dict(declared) | _levels(problem, v, unknown, loss)
     _refuse_idle(problem, v)
-    left = max_iterations
+    left, enough = max_iterations, min(1e-6, 0.01 / problem.n_readings)  # of the cost: a small part of its own scatter
     for _ in range(_ROUNDS):
         problem.weigh = [scaled(np.array([noise[name] for name in one.sensors])) for one in problem.data]
         run = least_squares(problem.vector, v, problem.jacobian, bounds=problem.bounds, x_scale="jac",
-                            loss=scipy_loss(loss, problem.n_readings), max_nfev=left, ftol=1e-9, xtol=1e-9, gtol=1e-9)
+                            loss=scipy_loss(loss, problem.n_readings), max_nfev=left, ftol=enough, xtol=1e-9, gtol=1e-9)
         v, left = run.x, left - run.nfev
         new = _levels(problem, v, unknown, loss)
         settled = all(abs(new[name] / noise[name] - 1.0) < _SETTLED for name in unknown)

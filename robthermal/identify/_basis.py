@@ -48,13 +48,16 @@ class LocalBasis:
             x = offsets / self.half_width
         return np.stack([x**s for s in range(self.size)], axis=-1)
 
-    def weights(self, bins: Array, offsets: Array) -> Array:
-        """D(k)/D(k+r), with `bins` (B,) counted from 1 and `offsets` (B, m) or (m,); ones when there are no poles."""
-        bins = np.asarray(bins, dtype=float)[:, None]
-        weights = np.ones(np.broadcast_shapes(bins.shape, offsets.shape), dtype=complex)
+    def denominator(self, bins: Array) -> Array:
+        """D = prod(z - gamma_i) at (fractional) bins; one when there are no poles."""
+        D = np.ones(np.shape(bins), dtype=complex)
         for pole in self.poles:  # z - gamma = gamma expm1(j theta - p T_s): no cancellation for slow poles at low bins
-            weights *= np.expm1(1j * self.step * bins - pole) / np.expm1(1j * self.step * (bins + offsets) - pole)
-        return weights
+            D *= np.exp(pole) * np.expm1(1j * self.step * bins - pole)
+        return D
+
+    def weights(self, bins: Array, offsets: Array) -> Array:
+        """D(k)/D(k+r), with `bins` (B,) counted from 1 and `offsets` (B, m)."""
+        return np.asarray(self.denominator(bins)[:, None] / self.denominator(bins[:, None] + offsets))
 
 
 def window_starts(bins: Array, n_bins: int, n_points: int) -> Array:

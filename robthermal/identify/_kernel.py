@@ -76,28 +76,25 @@ class Kernel:
         """The same with prescribed poles: the transient functions differ between bins and are orthogonalised first."""
         size, n_u, n_y, m = self.basis.size, self.n_u, self.n_y, self.basis.n_points
         part, width = self._slices(start, stop), stop - start
-        row_weights = self._row_weights(start, stop)
-        functions = self.powers.T[:, :, None] * row_weights
-        descending = functions[::-1].copy()
+        # D(k)/D(k+r): the denominator of every bin once, then its windows.
+        D = self.basis.denominator(np.arange(start - self.basis.half_width, stop + self.basis.half_width, dtype=float))
+        row_weights = _windows(1.0 / D, m).view(complex) * D[self.basis.half_width : -self.basis.half_width]
+        descending = self.powers.T[::-1, :, None] * row_weights
+        functions = descending.copy()
         for s in range(size):
             _remove(functions[s], functions[s + 1 :], np.zeros(width))
         columns = np.empty((size * n_u + n_y, len(self.spectra) * m, width), dtype=complex)
         for place, spectrum in enumerate(self.spectra):
             mine = slice(place * m, (place + 1) * m)
             for i in range(n_u):
-                columns[i : size * n_u : n_u, mine] = descending * _windows(spectrum.U[i, part], m).view(complex)
+                U = _windows(spectrum.U[i, part], m).view(complex)
+                for s in range(size):
+                    np.multiply(descending[s], U, out=columns[s * n_u + i, mine])
             for o in range(n_y):
                 columns[size * n_u + o, mine] = _windows(spectrum.Y[o, part], m).view(complex)
-            for s in range(size):
-                coefficients = np.multiply(functions[s].conj(), columns[:, mine]).sum(axis=1)
-                columns[:, mine] -= functions[s] * coefficients[:, None]
+            for function in functions:
+                _project_out(function, columns[:, mine])
         return columns
-
-    def _row_weights(self, start: int, stop: int) -> Array:
-        """D(k)/D(k+r) as (m, B)."""
-        bins = np.arange(start, stop, dtype=float)
-        offsets = np.arange(-self.basis.half_width, self.basis.half_width + 1.0)
-        return np.ascontiguousarray(self.basis.weights(bins, offsets).T)
 
     def _input_energy(self, start: int, stop: int) -> Array:
         """Energy of each input in each window, all records together, (n_u, B)."""
@@ -143,9 +140,14 @@ def _remove(column: Array, others: Array, floor: Array) -> tuple[Array, Array]:
     Returns the norms (B,), zero where the energy is not above `floor` (nothing is removed there), and the
     coefficients (n, B).
     """
-    square = (column.real**2 + column.imag**2).sum(axis=0)
+    square = np.einsum("rb,rb->b", column.real, column.real) + np.einsum("rb,rb->b", column.imag, column.imag)
     norms = np.sqrt(np.where(square > floor, square, 0.0))
     column *= np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
+    return norms, _project_out(column, others)
+
+
+def _project_out(column: Array, others: Array) -> Array:
+    """Remove the normalised `column` (rows, B) from `others` (n, rows, B) in place; the coefficients (n, B)."""
     conjugate = column.conj()
     coefficients = np.empty((others.shape[0], column.shape[1]), dtype=complex)
     work = np.empty_like(column)
@@ -154,7 +156,7 @@ def _remove(column: Array, others: Array, floor: Array) -> tuple[Array, Array]:
         np.add.reduce(work, axis=0, out=coefficients[place])
         np.multiply(column, coefficients[place], out=work)
         other -= work
-    return norms, coefficients
+    return coefficients
 
 
 def _invert_triangle(triangle: Array) -> Array:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import zipfile
+import zlib
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import io
+from scipy.io.matlab import MatReadError
 
 from robthermal.errors import InputError
 
@@ -33,6 +36,10 @@ _ARRAYS = (
 )
 _LISTS = ("input_names", "output_names", "notes")
 _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
+_UNREADABLE = (
+    *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError),
+    *(MatReadError, zipfile.BadZipFile, zlib.error),
+)
 _SUFFIXES = (".json", ".mat", ".npz")
 
 
@@ -60,7 +67,7 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
         raise InputError(f"no such file: {path}", where="path")
     try:
         content = {".json": _read_json, ".npz": _read_npz, ".mat": _read_mat}[path.suffix](path)
-    except (ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError) as error:
+    except _UNREADABLE as error:
         raise InputError(
             f"cannot be read: {error}", where=str(path), expected="a file written by FrequencyResponse.save"
         ) from error

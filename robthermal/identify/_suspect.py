@@ -44,16 +44,14 @@ def _median_ratio(q: Array) -> Array:
 
 def _reference(row: Array, gap: int, reach: int) -> Array:
     """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
-    n = row.size
-    medians = np.full(n, np.inf)
-    view, step = sliding_window_view(row, reach), 2**16
-    for first in range(0, view.shape[0], step):  # a part at a time: medians sort copies
-        part = view[first : first + step]
-        medians[first : first + part.shape[0]] = np.median(part, axis=1)
+    # Medians of every eighth window only: the reference moves by less than a half width, at an eighth of the work.
+    n, stride = row.size, max(1, reach // 8)
+    view = sliding_window_view(row, reach)[::stride]
+    parts = [np.median(view[first : first + 2**13], axis=1) for first in range(0, len(view), 2**13)]
+    medians = np.concatenate(parts)
     place = np.arange(n)
-    right, left = place + gap, place - gap - reach + 1
-    # Near the ends the reference moves inwards instead of vanishing.
-    on_right = np.where(right <= n - reach, medians[np.minimum(right, n - reach)], np.inf)
+    right, left = -(-(place + gap) // stride), (place - gap - reach + 1) // stride
+    on_right = np.where(right < len(view), medians[np.minimum(right, len(view) - 1)], np.inf)
     on_left = np.where(left >= 0, medians[np.maximum(left, 0)], np.inf)
     lower = np.minimum(on_right, on_left)
     return np.where(np.isfinite(lower), lower, np.median(row))

@@ -83,7 +83,12 @@ class CsvSource:
         return lines
 
     def _cells(self, text: str) -> list[str]:
-        return next(csv.reader([text], delimiter=self._separator, skipinitialspace=True))
+        if '"' not in text:
+            return text.split(self._separator)
+        try:
+            return next(csv.reader([text], delimiter=self._separator, skipinitialspace=True))
+        except csv.Error:  # a cell of more than 128 KiB, say: wrong in any case, and named by the caller
+            return text.split(self._separator)
 
     def _check_header(self) -> None:
         where = f"{self.path} line {self._header_line}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 ZERO_CELSIUS = 273.15
+_REST = float(Fraction("273.15") - Fraction(273.15))  # what the float 273.15 lacks: 2.3e-14
 LOWEST_KELVIN = 150.0  # a reading below this, declared kelvin, is Celsius
 HIGHEST_CELSIUS = 250.0  # a reading above this, declared Celsius, is kelvin
 
@@ -20,8 +22,8 @@ def celsius_to_kelvin(temperature: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     temperature : array_like
-        [°C]. Readings with up to 12 decimals are converted as decimal numbers; longer ones by one floating addition,
-        which `kelvin_to_celsius` undoes exactly between 137 K and 546 K.
+        [°C]. Up to 12 decimals count as a decimal number; longer ones are added with one rounding. To Celsius and back
+        is exact between 210 K and 400 K.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def kelvin_to_celsius(temperature: ArrayLike) -> NDArray[np.float64]:
 
 def _shift(temperature: ArrayLike, sign: float) -> NDArray[np.float64]:
     x = np.asarray(temperature, dtype=np.float64)
-    shifted: NDArray[Any] = np.array(x + sign * ZERO_CELSIUS)
+    shifted: NDArray[Any] = _added(x, sign)
     waiting = np.abs(x) < 900.0  # 900 * 10^12 < 2^53: the scaled integers below are exact
     for decimals in range(_MOST_DECIMALS + 1):
         scale = 10.0**decimals  # exact up to 10^22
@@ -75,3 +77,12 @@ def _shift(temperature: ArrayLike, sign: float) -> NDArray[np.float64]:
         if not waiting.any():
             break
     return shifted
+
+
+def _added(x: NDArray[np.float64], sign: float) -> NDArray[np.float64]:
+    """x + sign * 273.15 with one rounding (Knuth's two-sum; the lost digits are added back)."""
+    with np.errstate(invalid="ignore"):  # infinite readings become NaN here, and are refused by name elsewhere
+        total = x + sign * ZERO_CELSIUS
+        part = total - x
+        lost = (x - (total - part)) + (sign * ZERO_CELSIUS - part)
+        return np.array(total + (lost + sign * _REST))

@@ -202,6 +202,9 @@ class Assembly:
         ...          rt.thermal.Layer("pad", 0.010, "POM", lumps=3)], area=1.6e-3)
         ('plate1', 'pad1', 'pad2', 'pad3')
         """
+        if not parts or isinstance(parts[0], Contact) or isinstance(parts[-1], Contact):
+            raise InputError("begins or ends with a contact, or has no layer", where="argument parts",
+                             remedy="Join its outer faces with Assembly.join(…, contact_resistance=…).")
         names: list[str] = []
         contact = 0.0
         for number, part in enumerate(parts, start=1):
@@ -216,9 +219,6 @@ class Assembly:
                 self.join(names[-1], new[0], contact_resistance=contact)
                 contact = 0.0
             names += new
-        if contact or not names:
-            raise InputError("begins or ends with a contact, or has no layer", where="argument parts",
-                             remedy="Join its outer faces with Assembly.join(…, contact_resistance=…).")
         return tuple(names)
 
     def join(self, a: str, b: str, *, area: float | None = None, contact_resistance: float = 0.0,

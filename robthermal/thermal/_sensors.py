@@ -54,6 +54,8 @@ def reading_slopes(eq: Equations, states: Array, rates: Rates, slopes: Array, ra
                 later = _delayed(states[:, state], _of(rates, state), sensor.delay + step, h)
                 sooner = _delayed(states[:, state], _of(rates, state), max(sensor.delay - step, 0.0), h)
                 out[:, i, column] += sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
+            elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rates is not None:
+                out[1:, i, column] -= sensor.gain * rates[1][1:, state]  # a short lag τ reads x - τ ẋ
             elif parameter == f"ambients.{first}.temperature":
                 out[:, i, column] += 1.0 - sensor.gain
     return out

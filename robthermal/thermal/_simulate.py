@@ -198,7 +198,8 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
         slopes = along.along(path, u, start_slope(eq, record, initial, names, integrator.nz))
     meters = path.z[:, n + lags:]
     states, h = path.z[:, :n + lags], record.sample_time
-    rates = _rates(eq, states, u) if any(s.delay for s in eq.system.sensors.values()) else None
+    by_rate = any(s.delay for s in eq.system.sensors.values()) or any(n.endswith((".delay", ".time_constant")) for n in names)
+    rates = _rates(eq, states, u) if by_rate else None
     readings = read_sensors(eq, states, rates, h)
     sensitivity = np.zeros((len(u), readings.shape[1], 0))
     if slopes is not None:

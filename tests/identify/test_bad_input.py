@@ -99,7 +99,7 @@ def test_degree(name: str, bad: Any) -> None:
         ESTIMATORS[name](record(), degree=bad)
 
 
-@local
+@pytest.mark.parametrize("name", ["lpm", "lrm", "lrmp", "closed_loop"])
 def test_a_window_wider_than_the_record(name: str) -> None:
     with pytest.raises(rt.InputError, match="half_width"):
         ESTIMATORS[name](record(), half_width=80)
@@ -202,10 +202,11 @@ def test_etfe_needs_as_many_records_as_inputs() -> None:
 
 
 def test_an_input_that_no_window_can_tell_from_the_transient_is_refused() -> None:
-    # One line per window is not enough to tell a plant of degree 2 from nothing at the bins between the lines,
-    # but a single pair of neighbouring lines at one end leaves whole inputs without any determined bin.
-    n = np.arange(200)
-    drift = np.cos(2 * np.pi * n / 200)  # one line only, bin 1; degree 2 in a shifted window
+    # A single line determines G at that line and nowhere else; a line beyond the last bin nowhere at all.
+    drift = np.cos(2 * np.pi * np.arange(200) / 200)
     G = rt.identify.lpm(record(u=np.hstack([U, drift[:, None]])))
     assert np.isnan(G.response[0, 1, 1:]).all()
     assert "u1" in " ".join(G.notes)
+    nyquist = np.where(np.arange(200) % 2, 1.0, -1.0)
+    with pytest.raises(rt.InputError, match="'u0' cannot be told from the transient"):
+        rt.identify.lpm(record(u=nyquist))

@@ -135,7 +135,7 @@ def test_joint_region_of_a_row_needs_the_gram_block_unconjugated() -> None:
 def test_joint_covariance_of_neighbouring_bins_equals_the_scatter() -> None:
     rng, bins = np.random.default_rng(5), np.array([100, 102, 105, 117])
     u, samples, predicted = rng.normal(size=400), [], []
-    for _ in range(2000):
+    for _ in range(1000):
         record = rt.Record(
             sample_time=1.0, inputs=u, outputs=rng.normal(size=400), input_names=["u"], output_names=["y"]
         )
@@ -146,7 +146,7 @@ def test_joint_covariance_of_neighbouring_bins_equals_the_scatter() -> None:
     scatter = np.einsum("na,nb->ab", samples, np.conj(samples)) / len(samples)
     predicted = np.mean(predicted, axis=0)
     scale = np.sqrt(np.outer(np.diag(scatter).real, np.diag(scatter).real))
-    assert np.abs((scatter - predicted) / scale).max() < 0.15
+    assert np.abs((scatter - predicted) / scale).max() < 0.2
     assert abs(predicted[0, 1]) > 0.4 * scale[0, 1]
     assert predicted[0, 3] == 0.0  # 17 bins apart: no shared data
     np.testing.assert_allclose(np.diag(G.joint_covariance(bins)), G.covariance[0, 0, bins])

@@ -97,10 +97,11 @@ offset = -0.2
 
 
 def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
-    record = drive(60)
+    record = drive(24)
     full = full.with_parameters({"lumps.plate.initial": 296.0})
-    names = [name for name in full.parameter_names if not name.endswith((".noise", ".disturbance"))]
-    assert len(names) >= 35
+    names = [name for name in full.parameter_names if not name.endswith((".noise", ".disturbance"))
+             and name not in ("sensors.T_plate.time_constant", "sensors.T_plate.delay")]  # at 0: tested one-sided below
+    assert len(names) >= 33
     exact = rt.thermal.trajectory(full, record, sensitivities=names, tolerance=1e-6).sensitivity
     for column, name in enumerate(names):
         value = full.parameter(name)
@@ -113,6 +114,16 @@ def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
         difference = (readings(-2) - 8 * readings(-1) + 8 * readings(1) - readings(2)) / (12 * step)
         scale = np.abs(difference).max()
         assert np.abs(difference - exact[..., column]).max() <= 1e-5 * scale + 1e-7, name
+
+
+@pytest.mark.parametrize("field", ["time_constant", "delay"])
+def test_a_sensor_without_lag_or_delay_still_has_that_derivative(full, drive, field):
+    record, name, step = drive(40), f"sensors.T_plate.{field}", 1e-3
+    run = rt.thermal.trajectory(full, record, sensitivities=[name])
+    moved = rt.thermal.trajectory(full.with_parameters({name: step}), record)
+    difference = (moved.readings - run.readings)[:, 0] / step
+    assert run.sensitivity[:, 0, 0] == pytest.approx(difference, abs=0.02 * np.abs(difference).max())
+    assert np.abs(difference).max() > 0.1
 
 
 def test_ambient_that_the_record_lacks_is_a_parameter(full, drive):

@@ -12,8 +12,10 @@ import certificate_truth as truth
 import numpy as np
 import pytest
 import scipy.linalg
+from flint import arb, arb_mat
 
 from robthermal.verification import establish, verify
+from robthermal.verification._definite import is_positive_preconditioned
 
 
 def module(hot, cold, **slopes):
@@ -102,19 +104,21 @@ def test_convection_alone(gain, exponent):
     network["links"][0]["natural"] = {"gain": gain, "exponent": exponent}
     region = {"temperature": [280.0, 350.0], "current": {}}
     for method in ("sum", "max"):
-        evidence = {"method": method, "rate": 0.0, "weights": [1.0, 1.3]}
+        evidence = {"method": method, "rate": 0.0, "weights": [1.0, 2.0]}
         found = establish("contraction", system=network, region=region, evidence=evidence, made_by={})
         assert found.holds
         assert verify(found).margins["rate"] == pytest.approx(sampled_margin(network, region, evidence), rel=1e-6)
 
 
-def test_radiation_alone_in_the_energy_norm():
+@pytest.mark.parametrize("spans", [([280.0, 420.0], [280.0, 280.0]), ([280.0, 280.0], [280.0, 420.0]),
+                                   ([280.0, 420.0], [280.0, 420.0])])
+def test_radiation_alone_in_the_energy_norm(spans):
     """Hot radiates to cold more steeply than back: J is not symmetric, and a weak path to ambient is not enough."""
     network = system([module("a", "b")], conductance=0.0)
     network["modules"] = {}
     network["links"][0]["radiation"] = 5e-9
-    region, verdicts = {"temperature": [280.0, 350.0], "current": {}}, []
-    for conductance in np.geomspace(1e-3, 1.0, 30):
+    region, verdicts = {"temperature": dict(zip("ab", spans, strict=True)), "current": {}}, []
+    for conductance in np.geomspace(1e-3, 3.0, 60):
         for link in network["links"][1:]:
             link["conductance"] = float(conductance)
         found = establish("contraction", system=network, region=region, evidence={"method": "energy", "rate": 0.0},
@@ -125,13 +129,13 @@ def test_radiation_alone_in_the_energy_norm():
     assert (False, False) in verdicts and (True, True) in verdicts
 
 
-def flow_extremes(network, region):
+def flow_extremes(network, region, room):
     """Least inward heat flow over all faces, partner temperatures on a grid."""
     T, I = truth.boxes(network, region)  # noqa: E741 - the current
     least = np.inf
     for a, b in itertools.product(np.linspace(*T[0], 71), np.linspace(*T[1], 71)):
         for current in np.linspace(*I[0], 5):
-            flow = truth.heat(network, np.array([a, b]), {"m0": current}, {"room": 300.0})
+            flow = truth.heat(network, np.array([a, b]), {"m0": current}, {"room": room})
             for k, x in enumerate((a, b)):
                 if x == T[k, 1]:
                     least = min(least, -flow[k])
@@ -140,16 +144,24 @@ def flow_extremes(network, region):
     return least
 
 
-@pytest.mark.parametrize("slope", [-0.01, 0.01, -0.02])
-def test_invariance_with_a_conductance_that_changes_sign(slope):
+@pytest.mark.parametrize(("slope", "room"), [(-0.02, 350.0), (0.02, 280.0), (-0.01, 300.0)])
+def test_invariance_with_a_conductance_that_changes_sign(slope, room):
     """K(T) = 0 inside the box: the worst temperature of the partner is an inner one."""
     network = system([module("a", "b", conductance=slope)])
-    region = {"temperature": [250.0, 380.0], "current": {"m0": [-0.1, 0.1]}, "ambient": {"room": [300.0, 300.0]}}
+    region = {"temperature": [250.0, 380.0], "current": {"m0": [-0.1, 0.1]}, "ambient": {"room": [room, room]}}
     found = establish("invariance", system=network, region=region, evidence={}, made_by={})
-    proven, true = verify(found).margins.get("heat"), flow_extremes(network, region)
+    proven, true = verify(found).margins.get("heat"), flow_extremes(network, region, room)
     if found.holds:
         assert proven <= true + 1e-9
     else:
         proven = float(found.reason.split(" can be ")[1].split(" W")[0])
         assert proven <= true + 1e-9
     assert proven > true - 1.0
+
+
+@pytest.mark.parametrize("hint", [np.eye(2), np.diag([1e8, 1e-8]), np.array([[1.0, 0.999999], [0.999999, 1.0]])])
+def test_a_wrong_hint_proves_nothing(hint):
+    """The float preconditioner is only a hint: an indefinite matrix is never called positive definite."""
+    for off in ("1.5", "-2", "1.0000000000000000000001", "1"):
+        assert not is_positive_preconditioned(arb_mat(2, 2, [arb(1), arb(off), arb(off), arb(1)]), hint)
+    assert is_positive_preconditioned(arb_mat(2, 2, [arb(1), arb("0.5"), arb("0.5"), arb(1)]), np.eye(2))

@@ -1,0 +1,115 @@
+"""Command-line values to boxes and file lists."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import InputError
+from ..thermal import System
+from ._schema import Boxes
+
+_ZERO = 273.15
+_METHODS = ("energy", "sum", "max")
+
+
+def boxes_from_text(system: System, *, temperature: tuple[float, float] | None = None, current: Sequence[str] = (),
+                    ambient: Sequence[str] = (), setpoint: Sequence[str] = (), method: str = "energy") -> Boxes:
+    """Boxes from command-line values.
+
+    Parameters
+    ----------
+    system : System
+        Whose temperature unit and names apply.
+    temperature : tuple of float, optional
+        Box of all lumps [unit of the file].
+    current, ambient : sequence of str
+        ``NAME=LO:HI`` [A], [unit of the file].
+    setpoint : sequence of str
+        ``NAME=VALUE`` [unit of the file].
+    method : str
+        "energy", "sum" or "max".
+
+    Returns
+    -------
+    Boxes
+
+    Raises
+    ------
+    InputError
+        A value that does not read, an unknown method.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.boxes_from_text(rt.systems.two_module(), current=["m1=0:1.5", "m2=0:1.5"]).current
+    {'m1': (0.0, 1.5), 'm2': (0.0, 1.5)}
+    """
+    if method not in _METHODS:
+        raise InputError(f"method is {method!r}", where="--method", expected="energy, sum or max")
+    zero = _ZERO if system.temperature_unit == "degC" else 0.0
+    default = {name: m.current_limits for name, m in system.modules.items() if m.current_limits is not None}
+    currents = {**default, **dict(_range(text, "--current") for text in current)}
+    surroundings = dict(_range(text, "--ambient") for text in ambient)
+    points = dict(_value(text, "--setpoint") for text in setpoint)
+    return Boxes(temperature=_shift(temperature, zero) if temperature else Boxes().temperature, current=currents,
+                 ambient={name: _shift(pair, zero) for name, pair in surroundings.items()},
+                 setpoint={name: round(value + zero, 9) for name, value in points.items()},
+                 method=method)  # type: ignore[arg-type]  # checked above
+
+
+def certificate_files(paths: Sequence[Path]) -> list[Path]:
+    """Certificate files among files and folders.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files, or folders with certificates in them or in their ``certificates`` folder.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        A folder without certificates.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> rt.project.certificate_files([Path("c.json")]) == [Path("c.json")]
+    True
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted((path / "certificates").glob("*.json")) or sorted(path.glob("*.json"))
+            if not inside:
+                raise InputError("holds no certificates", where=str(path), expected="*.json, or certificates/*.json")
+            found += inside
+        else:
+            found.append(path)
+    return found
+
+
+def _shift(pair: tuple[float, float], zero: float) -> tuple[float, float]:
+    return round(pair[0] + zero, 9), round(pair[1] + zero, 9)
+
+
+def _range(text: str, option: str) -> tuple[str, tuple[float, float]]:
+    name, _, values = text.rpartition("=")
+    try:
+        low, high = (float(value) for value in values.split(":"))
+    except ValueError:
+        raise InputError(f"{text!r}", where=option, expected="NAME=LO:HI, for example m1=0:1.5") from None
+    return name, (low, high)
+
+
+def _value(text: str, option: str) -> tuple[str, float]:
+    name, _, value = text.rpartition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise InputError(f"{text!r}", where=option, expected="NAME=VALUE, for example m1=5") from None

@@ -1,0 +1,131 @@
+"""What the report of a job says: sections with figures and tables made from finished results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from ..calibration import Fit
+from ..report import Figure, Section, Table, box_ranges, current_limits, measured_against_model
+from ._claims import Certification
+from ._job import Comparison
+
+_ZERO = 273.15
+
+
+def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> Section:
+    """Model against data: residuals before and after, every record drawn."""
+    rows = [{"record": f"{c.kind}: {c.record.name}", "sensor": name, "nominal model [K]": before,
+             "calibrated model [K]": c.rmse(c.calibrated)[name]}
+            for c in comparisons for name, before in c.rmse(c.nominal).items()]
+    table = pd.DataFrame(rows)
+    text = ("Both models run free: they start from the first readings and see only the currents, heaters and ambients. "
+            "The table gives the root-mean-square residual of every sensor.")
+    if fit is not None:
+        text += f"\n\n{fit.outcome.text}"
+    figures = tuple(_comparison_figure(c) for c in comparisons)
+    return Section("Model against data", text, figures=figures, tables=(Table(table, "Residuals, root mean square."),),
+                   anchor="model")
+
+
+def _comparison_figure(c: Comparison) -> Figure:
+    names = _worst(c, 4)
+    figure = measured_against_model(c.record.time, {n: c.record[n] for n in names},
+                                    {n: c.calibrated[n] for n in names}, title=f"{c.kind}: {c.record.name}")
+    caption = f"Measured (dots) and calibrated model (lines), {c.kind} record; the {len(names)} sensors with the largest residual."
+    return Figure.draw(figure, alt=f"Time plot of measured and simulated temperatures, {c.kind} record, with residuals below.",
+                       caption=caption)
+
+
+def _worst(c: Comparison, count: int) -> list[str]:
+    rmse = c.rmse(c.calibrated)
+    return sorted(rmse, key=lambda name: -rmse[name])[:count]
+
+
+def parameter_section(fit: Fit) -> Section:
+    """Calibrated parameters with their uncertainty, and what the data do not determine."""
+    text = "Estimated from the training records; standard deviations are for the residuals as they are."
+    if fit.undetermined:
+        text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
+    table = Table(fit.table().reset_index(names="parameter"), "Calibrated parameters.")
+    return Section("Calibrated parameters", text, tables=(table,), anchor="parameters")
+
+
+def limit_section(result: Certification) -> Section:
+    """Current limits by method and direction, beside the runaway limit and the declared ones."""
+    low, high = result.boxes.temperature
+    rows = [{"direction": limit.direction, "method": limit.method, "largest certified current [A]": limit.current,
+             "proven": "yes" if limit.certificate.holds else "no"} for limit in result.limits]
+    lines = {f"declared limit of {name}": limits[1] for name, limits in result.system.current_limits.items() if limits}
+    if result.runaway is not None:
+        lines |= {f"I* of {name}": value for name, value in result.runaway.current.items()}
+    figure = Figure.draw(current_limits([f"{li.direction}, {li.method}" for li in result.limits],
+                                        [li.current for li in result.limits], lines),
+                         alt="Bar chart of the largest certified current by direction and method.",
+                         caption="Largest certified current; the lines are the declared limits and the runaway limit I*.")
+    text = (f"Every module may have any current in the range, at any time and independently, while all lumps are between "
+            f"{low - _ZERO:.6g} and {high - _ZERO:.6g} °C. The three methods are three norms; any one is a proof, so the "
+            "largest value of a direction may be used.")
+    return Section("Current limits", text, figures=(figure,), tables=(Table(pd.DataFrame(rows), "Certified currents."),),
+                   anchor="limits")
+
+
+def runaway_section(result: Certification) -> Section | None:
+    """Load curve of regulated modules."""
+    if result.runaway is None:
+        return None
+    ax = result.runaway.plot()
+    figure = Figure.draw(ax.figure, alt="Load taken from the cold face against current, with the fold marked.",
+                         caption="More current takes more heat only up to the fold.")
+    text = ("With its cold face regulated, a module takes more heat with more current only up to I*; a load above q* has no "
+            f"equilibrium and the hot side runs away. Limit the controller's current below I*. {result.runaway.outcome.text}")
+    return Section("Runaway limit of the regulated machine", text, figures=(figure,),
+                   tables=(Table(result.runaway.table().reset_index(names="module"), "Runaway limits."),), anchor="runaway")
+
+
+def box_section(result: Certification) -> Section | None:
+    """The box that is never left."""
+    box = result.safe.temperature
+    if not box:
+        return None
+    low, high = (np.array([pair[side] for pair in box.values()]) - _ZERO for side in (0, 1))
+    figure = Figure.draw(box_ranges(list(box), low, high), alt="Range of every lump temperature in the box.",
+                         caption="Range that each lump cannot leave, °C.")
+    text = ("For the stated currents, heats and ambients, in whatever sequence, no lump leaves its range once all are "
+            "inside. The ranges bound what the model can do, also far outside the temperatures at which its parameters "
+            "were measured; they are not a prediction of what it will do.")
+    return Section("The box that is never left", text, figures=(figure,),
+                   tables=(Table(result.safe.table().reset_index(names="lump"), "The box."),), anchor="box")
+
+
+def certificate_section(result: Certification) -> Section:
+    """Every certificate with its verdict."""
+    rows = [{"certificate": f"certificates/{c.key}.json", "claim": c.title, "proven": "yes" if c.certificate.holds else "no",
+             "verified": "yes" if c.good else "no",
+             "margin": ", ".join(f"{key} {value:.3g}" for key, value in (c.verdict.margins if c.verdict else {}).items()),
+             "check [s]": c.verdict.seconds if c.verdict else float("nan")} for c in result.checked]
+    text = ("Each file holds every number its claim depends on. robthermal verify re-derives the claim from the file alone, "
+            "in ball arithmetic, without any solver.")
+    return Section("Certificates", text, tables=(Table(pd.DataFrame(rows), "Certificates and their independent check."),),
+                   anchor="certificates")
+
+
+def certification_sections(result: Certification) -> Iterator[Section]:
+    """Sections about one certification, in order."""
+    if result.limits:
+        yield limit_section(result)
+    for section in (runaway_section(result), box_section(result)):
+        if section is not None:
+            yield section
+    yield certificate_section(result)
+
+
+ASSUMPTIONS = (
+    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below 0.1).",
+    "Module properties vary linearly with the mean of the two face temperatures; half of the Joule heat goes to each face.",
+    "Currents are imposed (current drive). Heats not in the network stay within the stated ranges.",
+    "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of them.",
+    "Temperatures and currents stay in the stated ranges; for the box that is never left this is itself proven.",
+)

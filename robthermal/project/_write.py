@@ -1,0 +1,169 @@
+"""Write the results of a job: report, certificates, JUnit, calibrated system."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+
+from ..report import Claim, Report, file_hash, versions, write_html, write_json, write_junit
+from ..thermal import System, write_system
+from ._claims import Certification, Checked
+from ._folder import output_folder
+from ._job import JobResult
+from ._sections import ASSUMPTIONS, certification_sections, comparison_section, parameter_section
+
+_ZERO = 273.15
+
+
+def write_job(result: JobResult, out: str | Path) -> Report:
+    """Write everything the main job found into a folder, which appears only when complete.
+
+    Parameters
+    ----------
+    result : JobResult
+        From `run_job`.
+    out : str or Path
+        Output folder.
+
+    Returns
+    -------
+    Report
+        What report.html shows.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds something else.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.write_job(rt.project.run_job(project), "results")  # doctest: +SKIP
+    """
+    project = result.project
+    sections = [comparison_section(result.comparisons, result.fit)] if result.comparisons else []
+    if result.fit is not None:
+        sections.append(parameter_section(result.fit))
+    sections.extend(certification_sections(result.certification))
+    report = Report(title=project.name, subtitle=_subtitle(result.system), label=project.label,
+                    claims=claims(result.certification), sections=tuple(sections),
+                    provenance=provenance(project.files), assumptions=ASSUMPTIONS, generated=_now())
+    with output_folder(out) as folder:
+        write_certification(result.certification, report, folder)
+        write_system(result.system, folder / "calibrated.toml")
+        if result.fit is not None:
+            result.fit.table().to_csv(folder / "parameters.csv", index_label="parameter")
+    return report
+
+
+def write_certify(result: Certification, files: tuple[Path, ...], out: str | Path) -> Report:
+    """Write a certification without data; as `write_job`.
+
+    Parameters
+    ----------
+    result : Certification
+        From `certify_system`.
+    files : tuple of Path
+        Input files, for their hashes.
+    out : str or Path
+        Output folder.
+
+    Returns
+    -------
+    Report
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> done = rt.project.certify_system(rt.systems.tclab(), rt.project.Boxes())
+    >>> rt.project.write_certify(done, (), "certified").holds
+    True
+    """
+    report = Report(title=result.system.name, subtitle=_subtitle(result.system), label="", claims=claims(result),
+                    sections=tuple(certification_sections(result)), provenance=provenance(files),
+                    assumptions=ASSUMPTIONS, generated=_now())
+    with output_folder(out) as folder:
+        write_certification(result, report, folder)
+    return report
+
+
+def write_certification(result: Certification, report: Report, folder: Path) -> None:
+    """Certificates, report.html, junit.xml and summary.json into an existing folder.
+
+    Parameters
+    ----------
+    result : Certification
+        Whose certificates.
+    report : Report
+        What to show.
+    folder : Path
+        Where.
+    """
+    (folder / "certificates").mkdir()
+    for checked in result.checked:
+        checked.certificate.save(folder / "certificates" / f"{checked.key}.json")
+    write_html(report, folder / "report.html")
+    write_junit(report, folder / "junit.xml")
+    write_json(report, folder / "summary.json")
+
+
+def claims(result: Certification) -> tuple[Claim, ...]:
+    """Required claims of a certification, for the first screen; the others are in the table of certificates."""
+    return tuple(_claim(checked, result) for checked in result.checked if checked.required)
+
+
+def provenance(files: tuple[Path, ...]) -> Mapping[str, str]:
+    """Versions, and the SHA-256 of every input file by its name."""
+    return {**versions(), **{f"SHA-256 of {file.name}": file_hash(file) for file in files}}
+
+
+def _claim(checked: Checked, result: Certification) -> Claim:
+    cert, verdict = checked.certificate, checked.verdict
+    margins = verdict.margins if verdict else {}
+    reason = cert.reason if not cert.holds else ("" if checked.good else verdict.reason if verdict else "not verified")
+    return Claim(title=checked.title, sentence=cert.claim, holds=cert.holds, verified=checked.good, box=_box(result, checked),
+                 margin=_margin(checked, margins), how=_HOW.get(cert.kind, cert.kind), reason=reason,
+                 file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
+
+
+_HOW = {
+    "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
+    "invariance": "On every face of the box the heat flows inwards (Nagumo); re-derived in ball arithmetic.",
+}
+
+
+def _box(result: Certification, checked: Checked) -> str:
+    currents = checked.certificate.region.get("current", {})
+    parts = [f"{name}: {float(low):g} to {float(high):g} A" for name, (low, high) in currents.items()]
+    box = checked.certificate.region.get("temperature")
+    if isinstance(box, Mapping):
+        ends = [float(value) for pair in box.values() for value in pair]
+        parts.append(f"every lump in its own range, overall {min(ends) - _ZERO:.1f} to {max(ends) - _ZERO:.1f} °C")
+    elif box is not None:
+        parts.append(f"all lumps {float(box[0]) - _ZERO:.6g} to {float(box[1]) - _ZERO:.6g} °C")
+    ambient = checked.certificate.region.get("ambient", {})
+    parts += [f"{name}: {float(lo) - _ZERO:.6g} to {float(hi) - _ZERO:.6g} °C" for name, (lo, hi) in ambient.items()]
+    heat = checked.certificate.region.get("heat", {})
+    parts += [f"heat into {name}: {float(lo):g} to {float(hi):g} W" for name, (lo, hi) in heat.items()]
+    return "; ".join(parts)
+
+
+def _margin(checked: Checked, margins: Mapping[str, float]) -> str:
+    if not checked.good:
+        return "none"
+    if checked.certificate.kind == "contraction":
+        rate = float(checked.certificate.evidence["rate"])
+        return f"differences die out with a time constant of at most {1 / rate:.4g} s (rate {rate:.4g} 1/s)"
+    return ", ".join(f"at least {value:.3g} W flow inwards on every face" if key == "heat" else f"{key} {value:.3g}"
+                     for key, value in margins.items())
+
+
+def _subtitle(system: System) -> str:
+    parts = [f"{len(system.lumps)} lumps", f"{len(system.modules)} modules", f"{len(system.inputs)} heaters",
+             f"{len(system.sensors)} sensors"]
+    return f"{system.name}: " + ", ".join(part for part in parts if not part.startswith("0 "))
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
