@@ -34,21 +34,19 @@ class Correlation:
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
 
 
-def correlation_of(segments: list[Array], inflate: float) -> Correlation:
+def correlation_of(segments: list[Array]) -> Correlation:
     """Fit by Burg's method, order by BIC; segments (n, n_sensors) of the same sensors are pooled.
 
     Parameters
     ----------
     segments : list of ndarray
         Weighted residuals.
-    inflate : float
-        Factor on the variance for the degrees of freedom the fit has used up.
     """
     n_sensors = segments[0].shape[1]
     polynomials = tuple(burg([e[:, s] for e in segments]) for s in range(n_sensors))
     v = np.concatenate([np.column_stack([lfilter(a, [1.0], e[:, s]) for s, a in enumerate(polynomials)])
                         for e in segments])
-    return Correlation(polynomials, inflate * v.T @ v / len(v))
+    return Correlation(polynomials, v.T @ v / len(v))
 
 
 def burg(segments: list[Array]) -> Array:

@@ -159,8 +159,8 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
         validation_temperatures=tuple(_by_lump(system, T) for T, _ in checks),
         train=tuple(score_of(one, r) for one, r in zip(problem.data, residuals, strict=True)),
         validation=tuple(score_of(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
-        whiteness={name: whiteness_of([weigh(r)[:, one.sensors.index(name)] for one, r, weigh
-                                       in zip(problem.data, residuals, problem.weigh, strict=True) if name in one.sensors])
+        whiteness={name: whiteness_of([r[:, one.sensors.index(name)] for one, r
+                                       in zip(problem.data, residuals, strict=True) if name in one.sensors])
                    for name in solution.noise},
         iterations=solution.iterations,
         outcome=Outcome(True, "converged", ""),
@@ -185,15 +185,15 @@ def _outcome(fit: Fit, solution: Solution) -> Outcome:
                        "Fix one of these parameters, give it a prior (sigma), or excite the system differently.")
     stuck = [name for name, at in zip(fit.parameters, fit.at_bound, strict=True) if at]
     if stuck:
-        return Outcome(True, "at_bound", f"Converged with {', '.join(stuck)} at a bound; standard deviations there ignore "
-                       "the bound. Widen it if the physics allow, else doubt the structure of the model.")
+        return Outcome(True, "at_bound", f"Converged with {', '.join(stuck)} at a bound; standard deviations there "
+                       "ignore the bound. Widen it if the physics allow, else doubt the structure of the model.")
     return Outcome(True, "converged", f"Converged in {solution.iterations} iterations.")
 
 
 def _check_options(system: System, initial: str, loss: str, max_iterations: int) -> None:
     if not isinstance(system, System):
-        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
-                         remedy="Read one with rt.read_system(path).")
+        raise InputError(f"system is a {type(system).__name__}", where="argument system",
+                         expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
     for name, value, allowed in (("initial", initial, STARTS), ("loss", loss, LOSSES)):
         if value not in allowed:
             raise InputError(f"{name} is {value!r}", where=f"argument {name}", expected="one of " + ", ".join(allowed))

@@ -42,21 +42,28 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
     p = len(problem.ranges.names)
     weighted = [(weigh(run.residual), weigh(run.by_parameter), weigh(run.by_start))
                 for run, weigh in zip(problem.runs(v), problem.weigh, strict=True)]
-    H, M = np.zeros((p, p)), np.zeros((p, p))
-    answered = []
+    H, G2, meat = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
+    answered, absorbed, power = [], 0.0, 0.0
+    starts: list[tuple[Array, Array]] = []
     for e, J, X in weighted:
         root = np.sqrt(score_slope(e, loss))[..., None]
         J2, X2 = (root * J).reshape(e.size, p), (root * X).reshape(e.size, X.shape[2])
-        G = np.linalg.solve(X2.T @ X2 + np.eye(X.shape[2]), X2.T @ J2)
+        own = X2.T @ X2 + np.eye(X.shape[2])
+        G = np.linalg.solve(own, X2.T @ J2)
         rest = J2 - X2 @ G
         H += rest.T @ rest + G.T @ G
-        M += G.T @ G
+        G2 += G.T @ G
         answered.append(J - X @ G)
+        starts.append((X, own))
     for alike in _same_sensors(problem):
         psi = [score(weighted[i][0], loss) for i in alike]
-        correlation = correlation_of(psi, _inflation(problem))
-        M += sum(correlation.meat(answered[i]) for i in alike)
-    return _with_priors(problem, v, H, M)
+        correlation = correlation_of(psi)
+        meat += sum(correlation.meat(answered[i]) for i in alike)
+        absorbed += sum(float(np.trace(np.linalg.solve(own, correlation.meat(X))))
+                        for X, own in (starts[i] for i in alike) if X.shape[2])
+        power += sum(float(np.sum(e**2)) for e in psi)
+    absorbed += float(np.trace(np.linalg.pinv(H, rcond=_ZERO, hermitian=True) @ meat))
+    return _with_priors(problem, v, H, G2 + meat * _inflation(power, absorbed))
 
 
 def _same_sensors(problem: Problem) -> list[list[int]]:
@@ -66,10 +73,13 @@ def _same_sensors(problem: Problem) -> list[list[int]]:
     return list(groups.values())
 
 
-def _inflation(problem: Problem) -> float:
-    used = len(problem.ranges.names) + sum(min(s.n_free, len(one.sensors))
-                                           for s, one in zip(problem.starts, problem.data, strict=True))
-    return problem.n_readings / max(problem.n_readings - used, 1)
+def _inflation(power: float, absorbed: float) -> float:
+    """Factor on Cov(ψ) for the part of the noise the fit has absorbed: E[Σψ²] = tr Σ - tr(projection Σ).
+
+    Slow noise is absorbed far more than white noise is, which counting parameters would miss. Limited to 4: beyond that
+    the record is too short for any honest statement about its noise.
+    """
+    return power / max(power - absorbed, power / 4.0) if power else 1.0
 
 
 def _with_priors(problem: Problem, v: Array, H: Array, M: Array) -> Information:
@@ -77,7 +87,8 @@ def _with_priors(problem: Problem, v: Array, H: Array, M: Array) -> Information:
     scale = np.outer(unit, unit)
     H, M, P = H * scale, M * scale, problem.prior_information(v) * scale
     values, vectors = eigh(H)
-    spread = np.array([_variance(value, vector, M, values[-1]) for value, vector in zip(values, vectors.T, strict=True)])
+    spread = np.array([_variance(value, vector, M, values[-1])
+                       for value, vector in zip(values, vectors.T, strict=True)])
     open_ = tuple(vectors[:, i] for i in np.flatnonzero(spread > 1.0))
     bounds = np.diag((unit / problem.ranges.spread) ** 2)
     H, M = H + P, M + P

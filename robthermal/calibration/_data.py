@@ -71,10 +71,10 @@ def refuse_same(training: list[Data], validation: list[Data]) -> None:
     for one in validation:
         for other in training:
             a, b = one.record, other.record
-            if one.sensors == other.sensors and a.inputs.shape == b.inputs.shape and np.array_equal(a.inputs, b.inputs) \
-                    and np.array_equal(one.readings, other.readings):
-                raise InputError(f"the validation record {a.name!r} is the training record", where="argument validation",
-                                 expected="data the fit has not seen",
+            if (one.sensors == other.sensors and np.array_equal(a.inputs, b.inputs)
+                    and np.array_equal(one.readings, other.readings)):
+                raise InputError(f"the validation record {a.name!r} is the training record",
+                                 where="argument validation", expected="data the fit has not seen",
                                  remedy="Split a record with record.split(time), or measure another.")
 
 

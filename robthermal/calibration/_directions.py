@@ -23,7 +23,7 @@ def _sparse(basis: Array) -> Array:
     B = basis.copy()
     for row in range(len(B)):
         rest = np.abs(B[row:])
-        below, column = np.unravel_index(int(rest.argmax()), rest.shape)
+        below, column = divmod(int(rest.argmax()), rest.shape[1])
         B[[row, row + below]] = B[[row + below, row]]
         B[row] /= B[row, column]
         others = np.arange(len(B)) != row
@@ -33,7 +33,7 @@ def _sparse(basis: Array) -> Array:
 
 def _sentence(ranges: Ranges, direction: Array) -> str:
     direction = direction / direction[np.abs(direction).argmax()]
-    seen = np.flatnonzero(np.abs(direction) > _VISIBLE)
+    seen = np.flatnonzero(np.abs(direction) > _VISIBLE).tolist()
     names = [ranges.names[i] for i in seen]
     if len(names) == 1:
         return f"{names[0]} is not determined"
@@ -41,7 +41,8 @@ def _sentence(ranges: Ranges, direction: Array) -> str:
         parts = direction[seen]
         listed = f"{', '.join(names[:-1])} and {names[-1]}"
         if np.all(np.abs(parts - 1.0) < 0.1):
-            return f"{listed} are determined only as {'their ratio' if len(names) == 2 else 'ratios: a common factor is open'}"
+            what = "their ratio" if len(names) == 2 else "ratios: a common factor is open"
+            return f"{listed} are determined only as {what}"
         if len(names) == 2 and abs(parts.sum()) < 0.1:
             return f"{listed} are determined only as their product"
     moves = ", ".join(f"{name} {_move(ranges, i, direction[i])}" for i, name in zip(seen, names, strict=True))
@@ -50,4 +51,6 @@ def _sentence(ranges: Ranges, direction: Array) -> str:
 
 def _move(ranges: Ranges, i: int, part: float) -> str:
     """A tenth of the direction."""
-    return f"{100 * (np.exp(0.1 * part) - 1):+.1f} %" if ranges.logarithmic[i] else f"{0.1 * part * ranges.unit[i]:+.3g}"
+    if ranges.logarithmic[i]:
+        return f"{100 * (np.exp(0.1 * part) - 1):+.1f} %"
+    return f"{0.1 * part * ranges.unit[i]:+.3g}"

@@ -25,7 +25,8 @@ def draw(columns: list[Column], n_fitted: int) -> NDArray[Any]:
         above, below = axes[:, place]
         for i, (name, residual) in enumerate(residuals.items()):
             above.plot(record.time, record[name] - 273.15, ".", color=f"C{i}", markersize=2, alpha=0.4)
-            above.plot(record.time, record[name] + residual - 273.15, color=f"C{i}", label=f"{name}, {score.rmse[name]:.3g} K")
+            label = f"{name}, {score.rmse[name]:.3g} K"
+            above.plot(record.time, record[name] + residual - 273.15, color=f"C{i}", label=label)
             below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
         above.set(title=f"{'fitted' if place < n_fitted else 'validation'}: {score.record}", ylabel="temperature [°C]")
         above.legend(fontsize="small", title="model, RMSE")

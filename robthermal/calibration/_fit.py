@@ -121,8 +121,9 @@ class Fit:
         ndarray of matplotlib.axes.Axes, shape (2, n_records)
             Training records first, then validation.
         """
-        return draw([*zip(self.data, self.residuals, self.train, strict=True),
-                     *zip(self.validation_data, self.validation_residuals, self.validation, strict=True)], len(self.data))
+        fitted = zip(self.data, self.residuals, self.train, strict=True)
+        unseen = zip(self.validation_data, self.validation_residuals, self.validation, strict=True)
+        return draw([*fitted, *unseen], len(self.data))
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but signals, ready for JSON: no infinities, no arrays.
@@ -151,8 +152,8 @@ class Fit:
         for (name, value), std, at in zip(self.parameters.items(), self.std.values(), self.at_bound, strict=True):
             lines.append(f"{name:<{wide}}  {value:>12.6g}  {std:>9.2g}{'  at bound' if at else ''}")
         for kind, scores in (("fitted", self.train), ("validation", self.validation)):
-            lines += [f"{kind} {score.record}: " + ", ".join(f"{name} {rmse:.3g} K" for name, rmse in score.rmse.items())
-                      for score in scores]
+            for one in scores:
+                lines.append(f"{kind} {one.record}: " + ", ".join(f"{name} {e:.3g} K" for name, e in one.rmse.items()))
         return "\n".join([*lines, str(self.outcome)])
 
 

@@ -59,7 +59,8 @@ class Problem:
     @property
     def v0(self) -> Array:
         """Starting point."""
-        return np.concatenate([self.ranges.coordinates(self.ranges.start), np.zeros(sum(s.n_free for s in self.starts))])
+        n_free = sum(s.n_free for s in self.starts)
+        return np.concatenate([self.ranges.coordinates(self.ranges.start), np.zeros(n_free)])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -99,7 +100,8 @@ class Problem:
             run = trajectory(system, one.record, sensitivities=[*self.ranges.names, *free])
             J = run.sensitivity[:, one.columns]
             p = len(self.ranges.names)
-            out.append(Run(run.readings[:, one.columns] - one.readings, J[..., :p] * slopes, J[..., p:] * start.sigma))
+            by_start: Array = np.multiply(J[..., p:], start.sigma)
+            out.append(Run(run.readings[:, one.columns] - one.readings, J[..., :p] * slopes, by_start))
         return out
 
     def vector(self, v: Array) -> Array:

@@ -68,7 +68,7 @@ class Ranges:
         return (q - low < near) | (high - q < near)
 
 
-NONE = Ranges((), *(np.zeros(0) for _ in range(4)), np.zeros(0, bool))
+NONE = Ranges((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def chosen_ranges(system: System, parameters: Choice) -> Ranges:
@@ -89,11 +89,13 @@ def _table(system: System, parameters: Choice) -> dict[str, FitRange]:
     if parameters is None:
         if not system.fit:
             raise InputError("nothing to calibrate: the system has no fit table", where="argument parameters",
-                             remedy='Add [fit] to the system file, or pass parameters={"links.a-b.conductance": (0.1, 10.0)}.')
+                             remedy="Add [fit] to the system file, or pass a mapping, "
+                                    'parameters={"links.a-b.conductance": (0.1, 10.0)}.')
         return dict(system.fit)
     if isinstance(parameters, str):
         raise InputError(f"parameters is the text {parameters!r}", where="argument parameters",
-                         expected="a list of names or a mapping from name to (lower, upper)", remedy="Put it in a list.")
+                         expected="a list of names or a mapping from name to (lower, upper)",
+                         remedy="Put it in a list.")
     if isinstance(parameters, Mapping):
         table = {name: _as_range(name, limits) for name, limits in parameters.items()}
     else:

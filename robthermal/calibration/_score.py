@@ -40,7 +40,8 @@ class Score:
 def score_of(one: Data, residual: Array) -> Score:
     """Score of residuals (n, n_sensors) [K]."""
     rmse = dict(zip(one.sensors, np.sqrt(np.mean(residual**2, axis=0)).tolist(), strict=True))
-    return Score(one.label, rmse, {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)})
+    percent = {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)}
+    return Score(one.label, rmse, percent)
 
 
 def _percent(y: Array, residual: Array) -> float:

@@ -43,8 +43,8 @@ def initial_of(system: System, one: Data, start: Start) -> Initial:
     """Initial temperatures of a record.
 
     The centre is the nearest sensor's first reading (by thermal resistance); with "system", the file's `initial` where
-    it has one. A free start has a prior of max(5 K, spread of the first readings): the lumps without a sensor are hardly
-    determined by data, and without a prior the directions nobody can see would spoil the conditioning.
+    it has one. A free start has a prior of max(5 K, spread of the first readings): the lumps without a sensor are
+    hardly determined by data, and without a prior the directions nobody can see would spoil the conditioning.
     """
     mean = first_temperatures(system if start == "system" else _without_initial(system), one)
     if start != "free":

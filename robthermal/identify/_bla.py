@@ -13,7 +13,7 @@ from robthermal.errors import InputError
 from robthermal.signals import Record
 
 from ._etfe import check_equal_lengths, least_squares_over
-from ._records import as_records, check_excitation, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -102,6 +102,7 @@ def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_w
             np.einsum("oof->of", between.noise).real,
             np.full(lines.size, between.degrees_of_freedom),
             -(-half_width // n_periods),
+            rounding_of([r.outputs for r in records]),
         ),
         input_names=first.input_names,
         output_names=first.output_names,

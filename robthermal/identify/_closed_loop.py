@@ -16,7 +16,7 @@ from robthermal.signals import Record
 from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -94,6 +94,7 @@ def closed_loop(
     basis = LocalBasis(half_width=half_width, degree=degree, n_samples=max(len(r) for r in records))
     pairs = zip(records, references, strict=True)
     spectra = [spectrum_of(ref, np.hstack([r.outputs, r.inputs])) for r, ref in pairs]
+    rounding = rounding_of([np.hstack([r.outputs, r.inputs]) for r in records])
     both = _Both(LocalEstimate(spectra, basis), n_y)
     quotient = _matrix(both) if inverse == "matrix" else _elementwise(both)
     frequencies = np.arange(1, both.estimate.n_bins + 1) / (basis.n_samples * records[0].sample_time)
@@ -106,7 +107,8 @@ def closed_loop(
         noise_covariance=quotient.noise,
         degrees_of_freedom=both.found.degrees_of_freedom,
         transient=lambda bins: both.transient(quotient.response, bins, inverse),
-        suspect=quotient.singular | suspect_bins(both.found.variance, both.found.degrees_of_freedom, half_width),
+        suspect=quotient.singular
+        | suspect_bins(both.found.variance, both.found.degrees_of_freedom, half_width, rounding),
         ratio_uncertainty=quotient.ratio_uncertainty,
         input_names=records[0].input_names,
         output_names=records[0].output_names,

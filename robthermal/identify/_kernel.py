@@ -1,8 +1,9 @@
 """Interior windows of equal records, many at a time: modified Gram-Schmidt with the bins along the last axis.
 
-The columns of every window are [transient | U x^R ... U x^1 | U x^0 | Y]. After orthogonalisation, G and its block of
-(K^H K)^-1 follow from the last n_u columns alone, and what is left of Y is the residual: no Q, no solution with the
-whole triangle, and no normal equations, whose squared condition number would spoil the residual of clean data.
+The columns of every window are [transient | U_1 x^R ... U_1 x^1 | U_2 x^R ... | U x^0 | Y]. After
+orthogonalisation, G and its block of (K^H K)^-1 follow from the last n_u columns alone, and what is left of Y is the
+residual: no Q, no solution with the whole triangle, and no normal equations, whose squared condition number would
+spoil the residual of clean data.
 For polynomials the transient is removed by one constant matrix, the orthonormal complement of the powers.
 """
 
@@ -42,12 +43,13 @@ class Kernel:
         self.n_u, self.n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
         offsets = np.arange(-basis.half_width, basis.half_width + 1.0)
         self.powers = basis.powers(offsets)  # (m, R+1)
+        self.n_columns = self.n_u * basis.size + self.n_y
         self.degrees_of_freedom = len(spectra) * (basis.n_points - basis.size) - self.n_u * basis.size
         if not basis.poles.size:
             complement = np.linalg.qr(self.powers, mode="complete")[0][:, basis.size :].T
-            descending = self.powers.T[::-1, None, :]
-            self.project_input = (complement * descending).reshape(-1, basis.n_points)
-            self.project_output = np.ascontiguousarray(complement)
+            descending = self.powers.T[:0:-1, None, :]
+            self.project_powers = (complement * descending).reshape(-1, basis.n_points)
+            self.project_constant = np.ascontiguousarray(complement)
 
     def solve(self, start: int, stop: int, *, full_noise: bool) -> ChunkFit:
         """Windows centred at bins start ... stop-1, counted from 1; all of them must fit between the edges."""
@@ -60,21 +62,23 @@ class Kernel:
 
     def _polynomial(self, start: int, stop: int) -> Array:
         """Columns with the transient projected out, (n_columns, rows, B)."""
-        size, n_u, n_y, m = self.basis.size, self.n_u, self.n_y, self.basis.n_points
-        part, width, rows = self._slices(start, stop), stop - start, m - self.basis.size
-        columns = np.empty((size * n_u + n_y, len(self.spectra) * rows, width), dtype=complex)
+        degree, n_u, m = self.basis.degree, self.n_u, self.basis.n_points
+        part, rows = self._slices(start, stop), m - self.basis.size
+        columns = np.empty((self.n_columns, len(self.spectra) * rows, stop - start), dtype=complex)
         for place, spectrum in enumerate(self.spectra):
-            mine = slice(place * rows, (place + 1) * rows)
+            mine = columns[:, place * rows : (place + 1) * rows]
             for i in range(n_u):
-                made = self.project_input @ _windows(spectrum.U[i, part], m)
-                columns[i : size * n_u : n_u, mine] = made.view(complex).reshape(size, rows, width)
-            for o in range(n_y):
-                columns[size * n_u + o, mine] = (self.project_output @ _windows(spectrum.Y[o, part], m)).view(complex)
+                windows = _windows(spectrum.U[i, part], m)
+                if degree:
+                    _multiply(self.project_powers, windows, mine[i * degree : (i + 1) * degree])
+                _multiply(self.project_constant, windows, mine[degree * n_u + i, None])
+            for o in range(self.n_y):
+                _multiply(self.project_constant, _windows(spectrum.Y[o, part], m), mine[degree * n_u + n_u + o, None])
         return columns
 
     def _rational(self, start: int, stop: int) -> Array:
         """The same with prescribed poles: the transient functions differ between bins and are orthogonalised first."""
-        size, n_u, n_y, m = self.basis.size, self.n_u, self.n_y, self.basis.n_points
+        size, degree, n_u, m = self.basis.size, self.basis.degree, self.n_u, self.basis.n_points
         part, width = self._slices(start, stop), stop - start
         # D(k)/D(k+r): the denominator of every bin once, then its windows.
         D = self.basis.denominator(np.arange(start - self.basis.half_width, stop + self.basis.half_width, dtype=float))
@@ -82,18 +86,19 @@ class Kernel:
         descending = self.powers.T[::-1, :, None] * row_weights
         functions = descending.copy()
         for s in range(size):
-            _remove(functions[s], functions[s + 1 :], np.zeros(width))
-        columns = np.empty((size * n_u + n_y, len(self.spectra) * m, width), dtype=complex)
+            _remove(functions[s], functions[s + 1 :], 0.0)
+        columns = np.empty((self.n_columns, len(self.spectra) * m, width), dtype=complex)
         for place, spectrum in enumerate(self.spectra):
-            mine = slice(place * m, (place + 1) * m)
+            mine = columns[:, place * m : (place + 1) * m]
             for i in range(n_u):
                 U = _windows(spectrum.U[i, part], m).view(complex)
-                for s in range(size):
-                    np.multiply(descending[s], U, out=columns[s * n_u + i, mine])
-            for o in range(n_y):
-                columns[size * n_u + o, mine] = _windows(spectrum.Y[o, part], m).view(complex)
+                for s in range(degree):
+                    np.multiply(descending[s], U, out=mine[i * degree + s])
+                np.multiply(descending[degree], U, out=mine[degree * n_u + i])
+            for o in range(self.n_y):
+                mine[size * n_u + o] = _windows(spectrum.Y[o, part], m).view(complex)
             for function in functions:
-                _project_out(function, columns[:, mine])
+                _remove(function, mine, 0.0)
         return columns
 
     def _input_energy(self, start: int, stop: int) -> Array:
@@ -102,9 +107,9 @@ class Kernel:
         energy = np.zeros((self.n_u, stop - start))
         for spectrum in self.spectra:
             U = spectrum.U[:, part]
-            power = U.real**2 + U.imag**2
-            for shift in range(m):
-                energy += power[:, shift : shift + stop - start]
+            sums = np.cumsum(U.real**2 + U.imag**2, axis=1)
+            energy += sums[:, m - 1 :]
+            energy[:, 1:] -= sums[:, :-m]
         return energy
 
     def _orthogonalise(self, columns: Array, energy: Array, *, full_noise: bool) -> ChunkFit:
@@ -113,7 +118,8 @@ class Kernel:
         doubtful = np.zeros(width, dtype=bool)
         triangle = np.empty((n_u, columns.shape[0], width), dtype=complex)  # rows of R that belong to U x^0
         for c in range(n_k):
-            norms, coefficients = _remove(columns[c], columns[c + 1 :], _DOUBTFUL * energy[c % n_u])
+            of_input = c // self.basis.degree if c < n_k - n_u else c - n_k + n_u
+            norms, coefficients = _remove(columns[c], columns[c + 1 :], _DOUBTFUL * energy[of_input])
             doubtful |= norms == 0.0
             if c >= n_k - n_u:
                 triangle[c - n_k + n_u, c] = norms
@@ -122,10 +128,11 @@ class Kernel:
         response = np.einsum("ijb,job->oib", inverse, triangle[:, n_k:])
         gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
         residual = columns[n_k:]
-        if full_noise:
+        if full_noise and self.n_y > 1:
             noise = np.stack([np.multiply(residual, row.conj()).sum(axis=1) for row in residual], axis=1)
         else:
-            noise = (residual.real**2 + residual.imag**2).sum(axis=1)
+            noise = np.stack([_energy(row) for row in residual])
+            noise = noise[None] if full_noise else noise
         return ChunkFit(response, gram, noise / self.degrees_of_freedom, doubtful)
 
 
@@ -134,29 +141,39 @@ def _windows(spectrum: Array, m: int) -> Array:
     return np.ascontiguousarray(sliding_window_view(spectrum, spectrum.size - m + 1)).view(float)
 
 
-def _remove(column: Array, others: Array, floor: Array) -> tuple[Array, Array]:
-    """Normalise `column` (rows, B) and remove it from `others` (n, rows, B), both in place.
+def _multiply(left: Array, windows: Array, out: Array) -> None:
+    """Real matrix times complex windows (as pairs of real numbers) into `out` (n, rows, B), in place if possible."""
+    if out.flags.c_contiguous:
+        np.matmul(left, windows, out=out.view(float).reshape(left.shape[0], -1))
+    else:
+        out[...] = (left @ windows).view(complex).reshape(out.shape)
 
-    Returns the norms (B,), zero where the energy is not above `floor` (nothing is removed there), and the
-    coefficients (n, B).
+
+def _energy(column: Array) -> Array:
+    """Sum of |.|^2 over the rows of (rows, B), through the pairs of real numbers: squares of .real would be strided."""
+    pairs = column.view(float)
+    sums = (pairs * pairs).sum(axis=0)
+    return np.asarray(sums[0::2] + sums[1::2])
+
+
+def _remove(column: Array, others: Array, floor: Array | float) -> tuple[Array, Array]:
+    """Remove `column` (rows, B) from `others` (n, rows, B) in place, where its energy is above `floor`.
+
+    Returns the row of the triangular factor: the norms of the column (B,), zero where it is not above the floor and
+    nothing was removed, and the coefficients of the others (n, B).
     """
-    square = np.einsum("rb,rb->b", column.real, column.real) + np.einsum("rb,rb->b", column.imag, column.imag)
+    square = _energy(column)
     norms = np.sqrt(np.where(square > floor, square, 0.0))
-    column *= np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
-    return norms, _project_out(column, others)
-
-
-def _project_out(column: Array, others: Array) -> Array:
-    """Remove the normalised `column` (rows, B) from `others` (n, rows, B) in place; the coefficients (n, B)."""
-    conjugate = column.conj()
+    inverse = np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
     coefficients = np.empty((others.shape[0], column.shape[1]), dtype=complex)
-    work = np.empty_like(column)
+    conjugate, work = column.conj(), np.empty_like(column)
     for place, other in enumerate(others):
         np.multiply(conjugate, other, out=work)
         np.add.reduce(work, axis=0, out=coefficients[place])
-        np.multiply(column, coefficients[place], out=work)
+        coefficients[place] *= inverse
+        np.multiply(column, coefficients[place] * inverse, out=work)
         other -= work
-    return coefficients
+    return norms, coefficients
 
 
 def _invert_triangle(triangle: Array) -> Array:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,11 +15,13 @@ from robthermal.errors import InputError
 from ._basis import LocalBasis
 from ._kernel import Kernel
 from ._records import Spectrum
+from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
 
 Array = NDArray[Any]
 
-_CHUNK = 1024  # interior bins at a time: small enough for the cache, large enough to share out over threads
+_CHUNK_BYTES = 2**21  # columns of a chunk of interior bins: small enough for the cache
+_CHUNK_MOST = 2048  # and not so many bins that threads would wait for each other
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
 _FULL_NOISE_BYTES = 2**29  # above this the full noise covariance is computed only for the bins asked for
 
@@ -148,16 +148,19 @@ class LocalEstimate:
     def _solve_interior(self, kernel: Kernel, found: LocalArrays, exact: Array, start: int) -> None:
         first = max(start, self.basis.half_width + 1)
         last = min(start + exact.size, self.n_bins - self.basis.half_width + 1)
+        points = len(self.spectra) * self.basis.n_points
+        chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
 
         def solve(a: int) -> None:
-            b = min(a + _CHUNK, last)
+            b = min(a + chunk, last)
             fit = kernel.solve(a, b, full_noise=found.noise is not None)
             part = slice(a - start, b - start)
             found.response[..., part], found.gram[..., part] = fit.response, fit.gram
             _store_noise(found, part, fit.noise)
             exact[part] = fit.doubtful
 
-        run_all(solve, range(first, last, _CHUNK))
+        starts = range(first, last, chunk)
+        run_all(solve, starts, worth=len(starts) >= 4)
 
     def _solve_exactly(self, found: LocalArrays, bins: Array, place: Array) -> None:
         fit = solve_windows(regression(self.spectra, self.basis, bins))
@@ -173,14 +176,3 @@ def _store_noise(found: LocalArrays, part: Any, noise: Array) -> None:
     found.variance[:, part] = np.einsum("oob->ob", noise).real
     if found.noise is not None:
         found.noise[..., part] = noise
-
-
-def run_all(task: Callable[[int], None], items: range) -> None:
-    """`task` over `items`, on as many threads as the process may use: numpy releases the interpreter inside a chunk."""
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if len(items) < 4 or processors == 1:
-        for item in items:
-            task(item)
-        return
-    with ThreadPoolExecutor(max_workers=processors) as pool:
-        list(pool.map(task, items))

@@ -13,7 +13,7 @@ from robthermal.signals import Record
 
 from ._basis import LocalBasis
 from ._local import LocalArrays, LocalEstimate
-from ._records import as_records, check_excitation, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -73,7 +73,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
     """The estimate of checked records with a given local basis, polynomial or with prescribed poles."""
     estimate = LocalEstimate([spectrum_of(r.inputs, r.outputs) for r in records], basis)
     found = estimate.run()
-    first = records[0]
+    first, rounding = records[0], rounding_of([r.outputs for r in records])
     frequencies = np.arange(1, estimate.n_bins + 1) / (basis.n_samples * first.sample_time)
     notes = undetermined_inputs(found.response, frequencies, first.input_names)
     return FrequencyResponse(
@@ -85,7 +85,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
         degrees_of_freedom=found.degrees_of_freedom,
         transient=estimate.transient,
         coherence=lambda bins: _coherence(estimate, found, bins),
-        suspect=suspect_bins(found.variance, found.degrees_of_freedom, basis.half_width),
+        suspect=suspect_bins(found.variance, found.degrees_of_freedom, basis.half_width, rounding),
         input_names=first.input_names,
         output_names=first.output_names,
         sample_time=first.sample_time,

@@ -13,11 +13,12 @@ from robthermal.errors import InputError
 from robthermal.signals import Record
 
 from ._basis import LocalBasis
-from ._local import LocalEstimate, run_all
+from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
+from ._threads import run_all
 from ._windows import RANK_TOLERANCE, regression
 
 Array = NDArray[Any]
@@ -100,7 +101,7 @@ def lrm(
         bins = np.arange(first, min(first + _CHUNK, estimate.n_bins + 1))
         _solve_chunk(estimate, bins, found, denominator, iterations)
 
-    run_all(solve, range(1, estimate.n_bins + 1, _CHUNK))
+    run_all(solve, range(1, estimate.n_bins + 1, _CHUNK), worth=estimate.n_bins > 4 * _CHUNK)
     frequencies = np.arange(1, estimate.n_bins + 1) / (basis.n_samples * records[0].sample_time)
     notes = undetermined_inputs(found.response, frequencies, records[0].input_names)
     variance = np.einsum("oof->of", found.noise).real
@@ -111,7 +112,7 @@ def lrm(
         noise_covariance=found.noise,
         degrees_of_freedom=found.degrees_of_freedom,
         transient=found.transient,
-        suspect=suspect_bins(variance, found.degrees_of_freedom, half_width),
+        suspect=suspect_bins(variance, found.degrees_of_freedom, half_width, rounding_of([r.outputs for r in records])),
         input_names=records[0].input_names,
         output_names=records[0].output_names,
         sample_time=records[0].sample_time,

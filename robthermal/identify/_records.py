@@ -13,10 +13,13 @@ from scipy import fft
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
+from ._threads import run_all
+
 Array = NDArray[Any]
 
 _SILENT = 1e-12  # standard deviation relative to the largest value, below which a signal is constant to rounding
 _LINE_SILENT = 1e3  # a bin is excited when it exceeds this many times the rounding error of its signal
+_LONG = 50_000  # samples from which channels are transformed side by side
 _COPIES = 1e-12  # squared relative distance below which inputs are linear combinations of each other
 
 
@@ -83,7 +86,7 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
             )
     gram = np.zeros((len(names), len(names)))
     for signal in signals:
-        centred = signal - signal.mean(axis=0)
+        centred = signal - [column.mean() for column in signal.T]
         gram += centred.T @ centred
     scale = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
@@ -133,15 +136,23 @@ def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
 
 def rounding_level(signals: Array) -> Array:
     """Size of a spectral line, per channel of `signals` (n, channels), that may be nothing but rounding."""
-    largest = np.maximum(signals.max(axis=0), -signals.min(axis=0))
-    return np.asarray(_LINE_SILENT * np.finfo(float).eps * largest)
+    largest = [max(column.max(), -column.min()) for column in signals.T]  # by column: many times faster than axis=0
+    return np.asarray(_LINE_SILENT * np.finfo(float).eps * np.array(largest))
 
 
 def _half_spectrum(signals: Array) -> Array:
     n, channels = signals.shape
     bins = (n - 1) // 2
     half = np.empty((channels, bins), dtype=complex)
-    for c in range(channels):  # channel by channel: a record of ten million samples must not be copied whole
+
+    def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
         column = signals[:, c]
         half[c] = fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
+
+    run_all(transform, range(channels), worth=channels > 1 and n > _LONG)
     return half
+
+
+def rounding_of(signals: Sequence[Array]) -> Array:
+    """The largest rounding level per channel over several records."""
+    return np.max([rounding_level(one) for one in signals], axis=0)

@@ -336,13 +336,9 @@ class FrequencyResponse:
         return _response_text.outcome(self)
 
     def to_control(self) -> control.FrequencyResponseData:
-        """As a python-control object, bins that are not determined left out.
+        """As a python-control object, at angular frequencies [rad/s], bins that are not determined left out.
 
-        Returns
-        -------
-        control.FrequencyResponseData
-            Response at angular frequencies [rad/s]; the time base is left open (``dt=None``), so that it combines with
-            continuous-time and sampled models alike.
+        The time base is left open (``dt=None``), so that it combines with continuous-time and sampled models alike.
         """
         good = ~np.isnan(self.response).any(axis=(0, 1))
         return control.FrequencyResponseData(

@@ -9,14 +9,19 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import stats
 
+from ._threads import run_all
+
 Array = NDArray[Any]
 
 _LEVEL = 2e-3  # chance of a false alarm in one output of one bin, before the estimation error of the reference
+_MANY = 25_000  # bins from which outputs are compared side by side
 _REACH = 6  # width of the reference on either side, in half widths
 
 
-def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int) -> Array:
+def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, rounding: Array) -> Array:
     """Compare each noise variance (n_y, F) with the median of the bins next to its window, left and right.
+
+    A residual as small as the `rounding` (n_y,) of the data is no evidence of anything.
 
     The lower of the two medians counts, so that a hump between quiet neighbours (a resonance narrower than the window,
     the slowest pole near bin 0) is found, while a slope of the noise spectrum is not. Bins share data within
@@ -27,14 +32,18 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int) ->
     if n_f < gap + reach:
         gap, reach = min(gap, n_f // 2), max(1, n_f // 4)
     q = np.maximum(degrees_of_freedom, 1)
-    found = np.zeros(n_f, dtype=bool)
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
-    threshold = {int(v): stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in np.unique(q)}
-    limit = np.vectorize(threshold.__getitem__, otypes=[float])(q)
-    for row in variance:
-        found |= row > limit * _reference(row / _median_ratio(q), gap, reach)
-    return found
+    values, place = np.unique(q, return_inverse=True)
+    limit = np.array([stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in values])[place]
+    by_output = np.zeros((n_y, n_f), dtype=bool)
+
+    def compare(o: int) -> None:
+        reference = _reference(variance[o] / _median_ratio(q), gap, reach)
+        by_output[o] = variance[o] > limit * np.maximum(reference, rounding[o] ** 2)
+
+    run_all(compare, range(n_y), worth=n_y > 1 and n_f > _MANY)
+    return np.asarray(by_output.any(axis=0))
 
 
 def _median_ratio(q: Array) -> Array:
@@ -44,8 +53,8 @@ def _median_ratio(q: Array) -> Array:
 
 def _reference(row: Array, gap: int, reach: int) -> Array:
     """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
-    # Medians of every eighth window only: the reference moves by less than a half width, at an eighth of the work.
-    n, stride = row.size, max(1, reach // 8)
+    # Medians at every twelfth bin or so: the reference moves by little more than a half width.
+    n, stride = row.size, max(1, reach // 4)
     view = sliding_window_view(row, reach)[::stride]
     parts = [np.median(view[first : first + 2**13], axis=1) for first in range(0, len(view), 2**13)]
     medians = np.concatenate(parts)

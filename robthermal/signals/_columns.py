@@ -138,19 +138,25 @@ def _named(headers: Sequence[str], wanted: Sequence[str], where: str) -> tuple[s
         if name.lower() == "time" and name not in wanted:
             time.append(header)
             if unit is not None and unit not in _SECONDS:
-                raise InputError(f"the time column {header!r} is in {unit}", where=where, expected="seconds",
-                                 remedy="Convert it to seconds.")
+                raise InputError(
+                    f"the time column {header!r} is in {unit}",
+                    where=where,
+                    expected="seconds",
+                    remedy="Convert it to seconds.",
+                )
             continue
         if name in named:
-            raise InputError(f"columns {named[name]!r} and {header!r} have the same name", where=where,
-                             remedy="Rename one of them.")
+            raise InputError(
+                f"columns {named[name]!r} and {header!r} have the same name", where=where, remedy="Rename one of them."
+            )
         named[name] = header
         if unit is not None:
             units[name] = unit
     if len(time) != 1:
         what = f"there are {len(time)} time columns ({', '.join(time)})" if time else "there is no column 'time'"
-        raise InputError(what, where=where, expected="one column 'time' [s]",
-                         remedy=f"Columns in the file: {', '.join(headers)}.")
+        raise InputError(
+            what, where=where, expected="one column 'time' [s]", remedy=f"Columns in the file: {', '.join(headers)}."
+        )
     return time[0], named, units
 
 
@@ -174,8 +180,12 @@ def _refuse_misspelt(name: str, missing: Sequence[str], where: str) -> None:
 
 def _check_ampere(name: str, unit: str | None, where: str) -> None:
     if unit is not None and unit not in _AMPERE:
-        raise InputError(f"the current {name!r} is in [{unit}]", where=where, expected="ampere [A]",
-                         remedy="Convert it to ampere (1 A = 1000 mA).")
+        raise InputError(
+            f"the current {name!r} is in [{unit}]",
+            where=where,
+            expected="ampere [A]",
+            remedy="Convert it to ampere (1 A = 1000 mA).",
+        )
 
 
 def _check_temperature(name: str, unit: str | None, declared: str, where: str) -> None:
@@ -194,7 +204,5 @@ def _check_temperature(name: str, unit: str | None, declared: str, where: str) -
 def _temperature_unit(value: str | None, default: str) -> str:
     unit = default if value is None else value
     if unit not in ("K", "degC"):
-        raise InputError(
-            f"temperature_unit is {unit!r}", where="argument temperature_unit", expected="'K' or 'degC'"
-        )
+        raise InputError(f"temperature_unit is {unit!r}", where="argument temperature_unit", expected="'K' or 'degC'")
     return unit

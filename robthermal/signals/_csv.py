@@ -93,8 +93,12 @@ class CsvSource:
     def _check_header(self) -> None:
         where = f"{self.path} line {self._header_line}"
         if all(_is_number(cell) for cell in self.headers):
-            raise InputError("the first row holds numbers", where=where, expected="a header row with column names",
-                             remedy="Add one, for example: time,heater,T1")
+            raise InputError(
+                "the first row holds numbers",
+                where=where,
+                expected="a header row with column names",
+                remedy="Add one, for example: time,heater,T1",
+            )
         for header in self.headers:
             if not header:
                 raise InputError("a column has no name", where=where, remedy="Name it, or remove a trailing separator.")

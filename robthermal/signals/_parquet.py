@@ -19,9 +19,9 @@ class ParquetSource:
         self.path = path
         try:
             self._file = parquet.ParquetFile(path)
-        except (pyarrow.ArrowException, OSError) as error:
+        except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
             raise InputError(f"this is no Parquet file ({error})", where=f"{path}") from None
-        self._broken = (pyarrow.ArrowException, OSError)
+        self._broken = (pyarrow.ArrowException, OSError, UnicodeDecodeError)
         self.headers = tuple(self._file.schema_arrow.names)
         # Compressed: a small file may hold a large table.
         refuse_large(path, 8.0 * self._file.metadata.num_rows * len(self.headers), "bytes unpacked", max_bytes)

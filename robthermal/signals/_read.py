@@ -98,8 +98,12 @@ def read_record(
     elif inputs is None and outputs is None:
         layout = layout_for_system(source.headers, system, temperature_unit, f"{file}")
     else:
-        raise InputError("a system and column names are given", where="arguments system, inputs and outputs",
-                         expected="one of the two", remedy="Use record.select(outputs=[...]) afterwards.")
+        raise InputError(
+            "a system and column names are given",
+            where="arguments system, inputs and outputs",
+            expected="one of the two",
+            remedy="Use record.select(outputs=[...]) afterwards.",
+        )
     names = layout.inputs + layout.outputs
     columns = _finite_columns(source, [layout.time, *(layout.headers[name] for name in names)])
     stamps, raw = columns[layout.time], {name: columns[layout.headers[name]] for name in names}
@@ -129,8 +133,9 @@ def _opened(path: Path, max_bytes: float | None) -> Source:
     limit = None if max_bytes is None else positive_number(max_bytes, "max_bytes", "B")
     suffix = path.suffix.lower()
     if suffix not in _SUFFIXES:
-        raise InputError(f"the file name ends in {path.suffix!r}", where=f"{path}",
-                         expected=f"one of {', '.join(_SUFFIXES)}")
+        raise InputError(
+            f"the file name ends in {path.suffix!r}", where=f"{path}", expected=f"one of {', '.join(_SUFFIXES)}"
+        )
     check_file(path, limit)
     if suffix == ".parquet":
         return ParquetSource(path, limit)

@@ -284,9 +284,7 @@ class Record:
             return self.inputs[:, self.input_names.index(name)]
         if name in self.output_names:
             return self.outputs[:, self.output_names.index(name)]
-        raise InputError(
-            f"there is no channel {name!r}", where="record[...]", remedy=suggestion(name, self.names)
-        )
+        raise InputError(f"there is no channel {name!r}", where="record[...]", remedy=suggestion(name, self.names))
 
     def _columns(self, names: Sequence[str]) -> Array:
         matrix = np.empty((self.n_samples, len(names)))
@@ -330,8 +328,12 @@ class Record:
 
 def _check_shapes(U: Array, Y: Array) -> None:
     if U.shape[1] == 0 and Y.shape[1] == 0:
-        raise InputError("the record has neither inputs nor outputs", where="arguments inputs and outputs",
-                         expected="at least one channel", remedy="Give input_names or output_names.")
+        raise InputError(
+            "the record has neither inputs nor outputs",
+            where="arguments inputs and outputs",
+            expected="at least one channel",
+            remedy="Give input_names or output_names.",
+        )
     if U.shape[0] != Y.shape[0]:
         raise InputError(
             f"inputs have {U.shape[0]} rows and outputs have {Y.shape[0]} rows: their lengths differ",

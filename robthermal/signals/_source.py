@@ -58,7 +58,7 @@ def check_file(path: Path, max_bytes: float | None) -> None:
 
 def refuse_large(path: Path, size: float, unit: str, max_bytes: float | None) -> None:
     """Refuse `size` [bytes] above the limit: given, or 2 GiB, or what the memory of this machine can hold."""
-    limit = min(_TWO_GIB, _memory() / _TEXT_TO_MEMORY) if max_bytes is None else max_bytes
+    limit = memory_limit(max_bytes)
     if size > limit:
         raise InputError(
             f"the data have {size:.4g} {unit}, more than the limit of {limit:.4g} (max_bytes)",
@@ -66,6 +66,11 @@ def refuse_large(path: Path, size: float, unit: str, max_bytes: float | None) ->
             expected="a record that fits into memory",
             remedy="Slice the file, or leave columns out; max_bytes= raises the limit.",
         )
+
+
+def memory_limit(max_bytes: float | None) -> float:
+    """Largest size of a record [bytes]."""
+    return min(_TWO_GIB, _memory() / _TEXT_TO_MEMORY) if max_bytes is None else max_bytes
 
 
 def _memory() -> float:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ._checks import Array
 from ._source import equally_long, numeric, refuse_large
 
-_DAMAGED = (ValueError, KeyError, TypeError, OSError, EOFError, IndexError, struct.error, UnicodeDecodeError)
+_DAMAGED = (ValueError, KeyError, TypeError, OSError, EOFError, IndexError, struct.error, NotImplementedError)
 
 
 class TdmsSource:
@@ -29,6 +29,8 @@ class TdmsSource:
             found = [channel for group in described.groups() for channel in group.channels()]
         except _DAMAGED as error:
             raise InputError(f"this is no TDMS file ({error})", where=f"{path}") from None
+        if not found:
+            raise InputError("this is no TDMS file, or it holds no channels", where=f"{path}")
         refuse_large(path, 8.0 * sum(len(channel) for channel in found), "bytes unpacked", max_bytes)
         names = [channel.name for channel in found]
         twice = next((name for name in names if names.count(name) > 1), None)

@@ -21,7 +21,7 @@ from scipy.linalg import expm
 from ._augmented import Augmented
 from ._terms import Array
 
-DEGREE = 7
+DEGREE = 5
 NODES = 0.5 * (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE))
 _MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))  # nodal values -> coefficients of (s/h)^k
 TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]  # nodal values -> last two Chebyshev coefficients

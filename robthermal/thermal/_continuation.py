@@ -67,15 +67,37 @@ def follow(F: Callable[[Array, float], Array], J: Callable[[Array, float], Array
         if direction @ tangent < 0.9:  # turned too far: the curve may have been left
             step /= 2
             continue
-        if (point[-1] - 1) * (new[-1] - 1) <= 0 and new[-1] != point[-1]:
-            crossings.append(_at_one(F, J, point, new))
-        point, tangent = new, direction
-        points.append(point)
+        passed = [new]
+        if tangent[-1] > 0 > direction[-1]:  # a fold in between: both crossings may hide inside the step
+            passed.insert(0, _fold(F, J, point, tangent, step, weight))
+        for after in passed:
+            if (point[-1] - 1) * (after[-1] - 1) <= 0 and after[-1] != point[-1]:
+                crossings.append(_at_one(F, J, point, after))
+            point = after
+            points.append(point)
+        tangent = direction
         if not inside(point[:-1]) or point[-1] < -0.05:
             break
         step = min(1.5 * step, _LARGEST)
     along = np.array(points)
     return Curve(along, crossings, float(along[:, -1].max()))
+
+
+def _fold(F: Callable[[Array, float], Array], J: Callable[[Array, float], Array], point: Array, tangent: Array,
+          step: float, weight: Array) -> Array:
+    """Point of largest λ within a step, by bisection on the sign of the tangent's λ."""
+    best, low, high = point, 0.0, step
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        trial = _correct(F, J, point + middle * tangent * weight, tangent, weight)
+        if trial is None:
+            high = middle
+            continue
+        rising = _tangent(J, trial, weight, tangent)[-1] > 0
+        low, high = (middle, high) if rising else (low, middle)
+        if trial[-1] > best[-1]:
+            best = trial
+    return best
 
 
 def _tangent(J: Callable[[Array, float], Array], point: Array, weight: Array, previous: Array) -> Array:

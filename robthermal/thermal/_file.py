@@ -124,7 +124,7 @@ def _text(path: Path) -> str:
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise InputError(f"is larger than {_MAX_BYTES // 1_000_000} MB", where=str(path),
-                             remedy="Large networks: use System.from_matrices.")
+                             remedy="Large networks: use rt.thermal.system_from_matrices.")
         text = path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
@@ -159,7 +159,7 @@ def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
     """Convert the temperatures of the file, after catching Celsius declared as kelvin and the reverse."""
     unit = data.get("temperature_unit")
     if unit not in ("K", "degC"):
-        raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"')
+        raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"', remedy='Write "degC" or "K".')
     for table, key in _TEMPERATURES.items():
         parts = data.get(table, {})
         if isinstance(parts, dict):

@@ -116,8 +116,7 @@ def _reading(path: Path) -> Iterator[None]:
 def _matrix(values: object, where: str) -> csr_array:
     """Real sparse matrix of whatever was stored."""
     try:
-        vector = isinstance(values, np.ndarray) and values.ndim == 1
-        matrix = csr_array(values.reshape(-1, 1) if vector else values)
+        matrix = csr_array(values.reshape(-1, 1) if isinstance(values, np.ndarray) and values.ndim == 1 else values)
     except (TypeError, ValueError) as error:
         raise InputError(f"is not a matrix ({error})", where=where, expected="a real matrix of at most two dimensions",
                          remedy="Write numbers only.") from None

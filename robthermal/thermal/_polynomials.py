@@ -174,11 +174,11 @@ def module_from_polynomials(polynomials: Polynomials, *, couples: int, i_max: fl
                          expected="(lower, upper) [K]", remedy="Exchange the two.")
     T, middle = np.linspace(low, high, _SAMPLES), 0.5 * (low + high)
     curves = polynomials.at(T, couples=couples, i_max=i_max)
-    fits = [_line(T - middle, y, name) for y, name in zip(curves, ("S", "R", "K"), strict=True)]
+    S, R, K = (_line(T - middle, y, name) for y, name in zip(curves, ("S", "R", "K"), strict=True))
     worst = [float(np.abs((line.value + line.slope * (T - middle)) / y - 1).max())
-             for line, y in zip(fits, curves, strict=True)]
+             for line, y in zip((S, R, K), curves, strict=True)]
     source = polynomials.source + (f" ({polynomials.caveat})" if polynomials.caveat else "")
-    return PolynomialFit(*fits, reference_temperature=middle, t_range=(low, high),
+    return PolynomialFit(S, R, K, reference_temperature=middle, t_range=(low, high),
                          residuals=(worst[0], worst[1], worst[2]), source=source)
 
 

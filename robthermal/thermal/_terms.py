@@ -7,6 +7,7 @@ All functions are vectorised: temperatures (..., n_terms), and analytic, so that
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -62,11 +63,33 @@ class ModuleTerm:
 
     def heat(self, Ta: Array, Tb: Array, current: Array) -> tuple[Array, Array]:
         """Heat into the hot and the cold face [W]."""
-        dT = 0.5 * (Ta + Tb) - self.T_ref
-        pump = (self.S + self.S_slope * dT) * current
-        joule = 0.5 * (self.R + self.R_slope * dT) * current * current
-        leak = self.K_slope * dT * (Ta - Tb)
+        total = Ta + Tb
+        pump = (self._S_rest + self._S_half * total) * current  # few operations: this is the innermost loop
+        joule = (self._R_rest + self._R_half * total) * (0.5 * current * current)
+        if not self._leaks:
+            return pump * Ta + joule, joule - pump * Tb
+        leak = self.K_slope * (0.5 * total - self.T_ref) * (Ta - Tb)
         return pump * Ta + joule - leak, joule - pump * Tb + leak
+
+    @cached_property
+    def _S_half(self) -> Array:
+        return 0.5 * self.S_slope
+
+    @cached_property
+    def _S_rest(self) -> Array:
+        return self.S - self.S_slope * self.T_ref
+
+    @cached_property
+    def _R_half(self) -> Array:
+        return 0.5 * self.R_slope
+
+    @cached_property
+    def _R_rest(self) -> Array:
+        return self.R - self.R_slope * self.T_ref
+
+    @cached_property
+    def _leaks(self) -> bool:
+        return bool(np.any(self.K_slope != 0))
 
     def slopes(self, Ta: Array, Tb: Array, current: Array) -> Slopes:
         """Entries hh, hc, ch, cc of the errata, with S′, R′ and K′."""

@@ -188,6 +188,12 @@ def claim_sentence(kind: str, system: Mapping[str, Any], region: Mapping[str, An
     ------
     InputError
         If the kind is unknown or a section is malformed.
+
+    Examples
+    --------
+    >>> system = {"capacity": [10.0], "rows": [0], "cols": [0], "values": [-0.5]}
+    >>> claim_sentence("network", system, {}, {"rate": 0.04, "weights": [1.0]})
+    'The thermal network of 1 lumps and 1 entries is stable: ... decays at least as exp(-rate t), rate = 0.04 1/s.'
     """
     if kind not in KINDS:
         raise InputError(f"kind {name_of(kind)}", where="kind", expected=f"one of {sorted(KINDS)}")

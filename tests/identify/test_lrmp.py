@@ -121,9 +121,9 @@ def test_a_model_gives_its_slowest_poles_as_many_as_the_window_permits(network) 
 
 def test_complex_poles_of_the_mechanical_example(network) -> None:
     # Evers (4.27): resonances at 5 and 20 rad/s, damping 0.05, T_s = 1/20 s, two periods of 60 s of a multisine.
-    G0 = sum(
-        (control.tf([w**2], [1, 2 * 0.05 * w, w**2]) for w in (5.0, 20.0)), start=control.tf([0], [1])
-    ).sample(1 / 20, "zoh")
+    G0 = sum((control.tf([w**2], [1, 2 * 0.05 * w, w**2]) for w in (5.0, 20.0)), start=control.tf([0], [1])).sample(
+        1 / 20, "zoh"
+    )
     rng, lines = np.random.default_rng(7), np.zeros(601, dtype=complex)
     lines[1:600] = np.exp(2j * np.pi * rng.random(599))
     u = np.tile(np.fft.irfft(lines, norm="forward"), 2)

@@ -122,9 +122,7 @@ def test_bla_two_inputs() -> None:
     for _ in range(6):
         U = np.stack([multisine(rng, 256, np.arange(1, 128), 3) for _ in range(2)], axis=1)
         Y = U @ [[1.0, 0.5], [-2.0, 4.0]] + 0.1 * rng.normal(size=(768, 2))
-        records.append(
-            rt.Record(sample_time=1.0, inputs=U, outputs=Y, input_names=["a", "b"], output_names=["x", "y"])
-        )
+        records.append(rt.Record(sample_time=1.0, inputs=U, outputs=Y, input_names=["a", "b"], output_names=["x", "y"]))
     G = rt.identify.bla(records, period=256)
     assert (G.degrees_of_freedom == 4).all()
     error = G.response - np.array([[1.0, -2.0], [0.5, 4.0]])[..., None]

@@ -174,9 +174,7 @@ def test_the_table_names_channels_and_the_outcome(estimate: FrequencyResponse) -
 def test_coherence_is_the_part_of_the_power_that_the_input_explains() -> None:
     rng = np.random.default_rng(2)
     u, v = rng.normal(size=(2, 4000))
-    G = rt.identify.lpm(
-        rt.Record(sample_time=1.0, inputs=u, outputs=u + v, input_names=["u"], output_names=["y"])
-    )
+    G = rt.identify.lpm(rt.Record(sample_time=1.0, inputs=u, outputs=u + v, input_names=["u"], output_names=["y"]))
     assert abs(G.coherence.mean() - 0.5) < 0.05
 
 

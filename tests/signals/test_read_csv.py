@@ -43,7 +43,7 @@ def read(path: Path, **options: object) -> Record:
         "# bench 3; run 7, again\n\n" + PLAIN.replace("1,2", "  # pause\n\n1,2") + "# end",
         PLAIN.replace("time,u,T", '"time","u","T"').replace("300", '"300"'),
         PLAIN.replace("2,3,302.5", "2.0,+3e0,3025E-1"),
-        "T,time,remark,u\n300,0,a b,1\n301,1,\"x, y\",2\n302.5,2,# odd,3\n",
+        'T,time,remark,u\n300,0,a b,1\n301,1,"x, y",2\n302.5,2,# odd,3\n',
     ],
 )
 def test_legal_spellings_give_one_record(write: Write, text: str) -> None:

@@ -144,7 +144,10 @@ BAD = {
     "name not text": ({"input_names": ["u1", 2]}, "input_names: name 1 is 2"),
     "name empty": ({"input_names": ["u1", " "]}, "input_names: name 1 is ' '"),
     "name twice": ({"input_names": ["u1", "u1"]}, "'u1' is used twice"),
-    "name in both": ({"output_names": ["T1", "u2", "T3"], "units": None}, "'u2' is used twice, for an input and for an"),
+    "name in both": (
+        {"output_names": ["T1", "u2", "T3"], "units": None},
+        "'u2' is used twice, for an input and for an",
+    ),
     "unit of nothing": ({"units": {"T9": "K"}}, "units: there is no channel 'T9'"),
     "unit no text": ({"units": {"T1": 1}}, "unit of 'T1' is 1"),
     "units no mapping": ({"units": ["K"]}, r"units is \['K'\]"),

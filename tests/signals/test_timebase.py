@@ -53,7 +53,9 @@ def test_jitter_is_resampled_without_error_for_straight_lines(seed: int, h: floa
     assert base.n_samples == n
     assert base.sample_time == pytest.approx((stamps[-1] - stamps[0]) / (n - 1), rel=1e-3)
     inner = base.grid <= stamps[-1]
-    np.testing.assert_allclose(base.interpolated(300.0 + 0.3 * stamps)[inner], 300.0 + 0.3 * base.grid[inner], rtol=1e-12)
+    np.testing.assert_allclose(
+        base.interpolated(300.0 + 0.3 * stamps)[inner], 300.0 + 0.3 * base.grid[inner], rtol=1e-12
+    )
     # Held: the rows in force; with stamps that do not drift, row k of the file stays row k.
     rows = base.held(np.arange(n, dtype=float)).astype(int)
     assert np.abs(stamps[rows] - base.grid).max() <= 0.53 * h

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -254,3 +256,13 @@ def test_material_table_is_complete_and_plausible() -> None:
     assert (np.diff([k[name] for name in ladder]) < 0).all()
     for name, limits in table["conductivity_range"].dropna().items():
         assert limits[0] <= k[name] <= limits[1], name
+
+
+@pytest.mark.parametrize("page", ["system", "modules"])
+def test_the_code_of_the_documentation_runs(page: str, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "explanations" / f"{page}.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+    assert blocks
+    for block in blocks:
+        exec(compile(block, f"{page}.md", "exec"), {})
+    assert capsys.readouterr().out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import hypothesis.strategies as st
@@ -266,6 +267,19 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "none.toml", tmp_path):
         with pytest.raises(rt.InputError, match="cannot be read.*Check the path"):
             read_system(path)
+
+
+def test_the_file_of_the_documentation_is_read_and_its_defaults_are_true() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "explanations" / "system.md").read_text(encoding="utf-8")
+    text = re.search(r"^```toml\n(.*?)^```", page, re.M | re.S)[1]
+    system = parse_system(text)
+    stated = ["disturbance = 0.0", "time_constant = 0.0", "offset = 0.0", "gain = 1.0 ", "delay = 0.0",
+              'name = "sink-room"']
+    assert all(text.count(line) >= 1 for line in stated)
+    bare = "\n".join(line for line in text.splitlines() if not line.startswith(tuple(stated)))
+    again = parse_system(bare)
+    assert [again.parameter(name) for name in system.parameter_names] == [
+        system.parameter(name) for name in system.parameter_names]
 
 
 def test_python_refuses_what_the_file_refuses() -> None:

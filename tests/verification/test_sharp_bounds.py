@@ -129,6 +129,25 @@ def test_radiation_alone_in_the_energy_norm(spans):
     assert (False, False) in verdicts and (True, True) in verdicts
 
 
+@pytest.mark.parametrize("spans", [([280.0, 420.0], [280.0, 280.0]), ([280.0, 280.0], [280.0, 420.0])])
+@pytest.mark.parametrize("evidence", [
+    {"method": "sum", "weights": [1.0, 1.2]}, {"method": "sum", "weights": [1.2, 1.0]},
+    {"method": "max", "weights": [1.0, 1.2]}, {"method": "max", "weights": [1.2, 1.0]},
+    {"method": "max", "weights": [1.0, 3.0]}, {"method": "lyapunov", "matrix": [[2.0, 0.7], [0.7, 3.0]]},
+    {"method": "lyapunov", "matrix": [[2.0, -0.7], [-0.7, 3.0]]}])
+def test_radiation_alone_in_the_other_norms(evidence, spans):
+    """One end's temperature is fixed, so that the slopes are the only unknown and the margin must be exact."""
+    network = system([module("a", "b")], conductance=0.0)
+    network["modules"] = {}
+    network["links"][0]["radiation"] = 2e-9
+    region = {"temperature": dict(zip("ab", spans, strict=True)), "current": {}}
+    found = establish("contraction", system=network, region=region, evidence={"rate": 0.0, **evidence}, made_by={})
+    true = sampled_margin(network, region, evidence)
+    assert found.holds == (true > 0)
+    if found.holds:
+        assert 0.99 * true < verify(found).margins["rate"] <= true * (1 + 1e-9)
+
+
 def flow_extremes(network, region, room):
     """Least inward heat flow over all faces, partner temperatures on a grid."""
     T, I = truth.boxes(network, region)  # noqa: E741 - the current

@@ -1,0 +1,78 @@
+"""Reports for people: one self-contained page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from itertools import count
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+
+from ._content import Claim, Report, Section
+from ._figure import Figure, inline
+from ._save import printable, save_text
+
+
+def write_html(report: Report, path: str | Path) -> Path:
+    """Write one HTML file that needs nothing else: no network, no script, no neighbouring file.
+
+    Parameters
+    ----------
+    report : Report
+        What to show. All its text is escaped.
+    path : str or Path
+        File to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, robthermal as rt
+    >>> claim = rt.report.Claim("Contraction", "Trajectories converge.", True, True, "m1: 0 to 1 A", "0.01 1/s", "energy norm")
+    >>> report = rt.report.Report("Set-up <1>", "", "", (claim,), (), {}, (), "today")
+    >>> path = rt.report.write_html(report, tempfile.mkdtemp() + "/report.html")
+    >>> "Set-up &lt;1&gt;" in path.read_text(encoding="utf-8")
+    True
+    """
+    counter = count(1)
+
+    def drawing(figure: Figure) -> str:  # not escaped: Figure has refused scripts and outside resources
+        return inline(figure, f"f{next(counter)}-")
+
+    page = _template("report.html").render(report=report, sections=_anchored(report.sections), drawing=drawing,
+                                           ranges=_ranges, style=_template("report.css").render())
+    return save_text(printable(page), path)
+
+
+@cache
+def _template(name: str) -> Template:
+    environment = Environment(loader=PackageLoader(__package__, "template"), autoescape=True, undefined=StrictUndefined,
+                              trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    return environment.get_template(name)
+
+
+def _ranges(claim: Claim) -> list[str]:
+    return [part.strip() for part in claim.box.split(";") if part.strip()]
+
+
+def _anchored(sections: Sequence[Section]) -> list[tuple[str, Section]]:
+    """Sections with addresses that are valid, and unique in the page."""
+    taken = {"top", "claims", "contents", "appendix", "assumptions", "provenance", "check"}
+    pairs = []
+    for section in sections:
+        plain = re.sub(r"[^a-z0-9]+", "-", (section.anchor or section.title).lower()).strip("-")
+        # No address of ours may begin like the ids of a drawing, f1-…
+        base = plain if plain and not re.match(r"f\d", plain) else f"section-{plain}".strip("-")
+        anchor = next(name for name in (base, *(f"{base}-{i}" for i in range(2, len(sections) + 9))) if name not in taken)
+        taken.add(anchor)
+        pairs.append((anchor, section))
+    return pairs

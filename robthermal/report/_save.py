@@ -1,0 +1,25 @@
+"""Text to files: characters that neither HTML nor XML may hold become visible marks."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ..errors import InputError
+
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+
+
+def printable(text: str) -> str:
+    """Text with the replacement character for every control character and half surrogate pair."""
+    return _UNPRINTABLE.sub("\ufffd", text)
+
+
+def save_text(text: str, path: str | Path) -> Path:
+    """Write UTF-8; one message if the place cannot be written."""
+    try:
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(path),
+                         remedy="Choose another place.") from None
+    return Path(path)

@@ -1,0 +1,56 @@
+"""House style of every drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
+
+# Okabe and Ito (2008): told apart with every common colour vision; without the yellow, too pale on white.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
+# Black and white become the ink and paper of the page (see _figure.inline), so that dark mode works.
+_STYLE = {
+    "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.0, "axes.titlesize": 10.0,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "figure.titlesize": 10.0, "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.5, "ytick.labelsize": 8.5, "legend.fontsize": 8.5, "legend.frameon": False,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.8, "axes.axisbelow": True,
+    "axes.grid": True, "grid.color": "#888888", "grid.alpha": 0.3, "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4, "figure.figsize": (WIDTH, 3.6), "figure.constrained_layout.use": True,
+    "figure.facecolor": "white", "axes.facecolor": "white", "text.color": "black", "axes.labelcolor": "black",
+    "xtick.color": "black", "ytick.color": "black", "axes.edgecolor": "black",
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the style of the report: sizes, grid, colours that do not rely on red and green.
+
+    Yields
+    ------
+    None
+        matplotlib's own settings come back at the end of the block.
+
+    Examples
+    --------
+    >>> import matplotlib, robthermal as rt
+    >>> with rt.report.house_style():
+    ...     matplotlib.rcParams["font.size"]
+    9.0
+    """
+    # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
+    import matplotlib
+
+    with matplotlib.rc_context({**_STYLE, "axes.prop_cycle": matplotlib.cycler(color=COLOURS)}):
+        yield
+
+
+def canvas(height: float, rows: int = 1, **options: Any) -> tuple[Any, Any]:
+    """Figure of the report's width and its axes, outside pyplot: nothing stays open if the caller drops it."""
+    # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
+    from matplotlib.figure import Figure as Drawing
+
+    drawing = Drawing(figsize=(WIDTH, height), layout="constrained")
+    return drawing, drawing.subplots(rows, 1, **options)

@@ -1,0 +1,125 @@
+"""Drawing of measured and simulated temperatures over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+from ._style import COLOURS, canvas, house_style
+
+_ZERO = 273.15
+_BINS = 700  # per trace: finer than a printed page resolves, small enough for a page with many figures
+
+Array = NDArray[np.float64]
+
+
+def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike], *,
+                           residual: bool = True, title: str = "") -> Any:
+    """Draw readings, the model's answer, and their difference.
+
+    Parameters
+    ----------
+    time : array_like
+        Sample times [s].
+    measured : mapping
+        {sensor: readings} [K]; NaN leaves a gap.
+    model : mapping
+        {sensor: simulated readings} [K], for the same sensors.
+    residual : bool, optional
+        Whether model − measured is drawn below.
+    title : str, optional
+        Heading.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Long records are thinned to the lowest and highest value of every 1/700 of the time, so no peak is lost.
+
+    Raises
+    ------
+    InputError
+        No sensors, a sensor without a model, arrays of different length.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> figure = rt.report.measured_against_model([0.0, 1.0], {"T1": [300.0, 301.0]}, {"T1": [300.1, 300.9]})
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['temperature [°C]', 'model − measured [K]']
+    """
+    t = np.asarray(time, dtype=float)
+    pairs = _pairs(t, measured, model)
+    scale, unit = _time_unit(t)
+    with house_style():
+        figure, axes = canvas(4.4 if residual else 3.0, 2 if residual else 1, sharex=True, squeeze=False,
+                              height_ratios=(2, 1) if residual else None)
+        above, below = axes[0, 0], axes[-1, 0]
+        for i, (name, (data, answer)) in enumerate(pairs.items()):
+            colour, dashes = COLOURS[i % len(COLOURS)], ("-", "--", ":")[i // len(COLOURS) % 3]
+            above.plot(*thin(t / scale, data - _ZERO), ".", color=colour, markersize=2.5, alpha=0.35, markeredgewidth=0)
+            above.plot(*thin(t / scale, answer - _ZERO), dashes, color=colour, label=name)
+            if residual:
+                below.plot(*thin(t / scale, answer - data), dashes, color=colour, linewidth=0.8)
+        above.set(ylabel="temperature [°C]", title=title)
+        _legend(above, len(pairs))
+        if residual:
+            below.axhline(0.0, color="black", linewidth=0.6)
+            below.set(ylabel="model − measured [K]")
+            figure.align_ylabels()
+        below.set(xlabel=f"time [{unit}]")
+        below.margins(x=0.01)
+    return figure
+
+
+def thin(time: Array, values: Array) -> tuple[Array, Array]:
+    """Lowest and highest finite value of every bin, in their order; short traces are left as they are.
+
+    A bin with no finite value keeps one NaN, so that gaps stay gaps.
+    """
+    if values.size <= 2 * _BINS:
+        return time, values
+    keep = []
+    for part in np.array_split(np.arange(values.size), _BINS):
+        good = part[np.isfinite(values[part])]
+        keep += sorted({good[values[good].argmin()], good[values[good].argmax()]}) if good.size else [part[0]]
+    return time[keep], values[keep]
+
+
+def _legend(axes: Any, count: int) -> None:
+    # Grey stand-ins say once what dots and lines are; the colours name the sensors. Above the data, never on them.
+    kinds = [axes.plot([], [], ".", color="#888888", label="measured")[0],
+             axes.plot([], [], "-", color="#888888", label="model")[0]]
+    lines = [line for line in axes.get_lines() if not line.get_label().startswith("_") and line not in kinds]
+    axes.legend(handles=[*kinds, *lines], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(count + 2, 6),
+                borderaxespad=0.1, columnspacing=1.2, handlelength=1.4)
+
+
+def _pairs(time: Array, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike]) -> dict[str, tuple[Array, Array]]:
+    if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
+        raise InputError("time is not an increasing sequence", where="measured_against_model",
+                         expected="at least two increasing times")
+    if not measured:
+        raise InputError("measured is empty", where="measured_against_model", expected="at least one sensor")
+    pairs = {}
+    for name, values in measured.items():
+        if name not in model:
+            raise InputError(f"model has no {name!r}", where="measured_against_model",
+                             expected=f"the sensors {', '.join(measured)}", remedy="Simulate the same sensors.")
+        pair = np.asarray(values, dtype=float), np.asarray(model[name], dtype=float)
+        for kind, array in zip(("measured", "model"), pair, strict=True):
+            if array.shape != time.shape:
+                raise InputError(f"{kind} {name!r} has shape {array.shape}", where="measured_against_model",
+                                 expected=f"one value per time, shape {time.shape}")
+        pairs[name] = pair
+    return pairs
+
+
+def _time_unit(time: Array) -> tuple[float, str]:
+    span = float(time[-1] - time[0])
+    if span > 4 * 3600.0:
+        return 3600.0, "h"
+    return (60.0, "min") if span > 600.0 else (1.0, "s")
