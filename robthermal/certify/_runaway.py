@@ -52,9 +52,10 @@ class Runaway:
     def plot(self) -> Any:
         """Plot the load curve with its fold; returns the matplotlib axes."""
         ax = self.curve.plot()
-        for name, current in self.current.items():
+        for i, (name, current) in enumerate(self.current.items()):
             ax.plot(current, self.load[name], "ko")
-            ax.annotate(f"  {current:.3g} A, {self.load[name]:.3g} W", (current, self.load[name]))
+            ax.annotate(f"{name}: {current:.3g} A, {self.load[name]:.3g} W", (current, self.load[name]), ha="right",
+                        xytext=(-10, -18 * (i + 1)), textcoords="offset points", arrowprops={"arrowstyle": "-"})
         return ax
 
 

@@ -165,14 +165,12 @@ def _remove(column: Array, others: Array, floor: Array | float) -> tuple[Array, 
     square = _energy(column)
     norms = np.sqrt(np.where(square > floor, square, 0.0))
     inverse = np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
-    coefficients = np.empty((others.shape[0], column.shape[1]), dtype=complex)
-    conjugate, work = column.conj(), np.empty_like(column)
-    for place, other in enumerate(others):
-        np.multiply(conjugate, other, out=work)
-        np.add.reduce(work, axis=0, out=coefficients[place])
-        coefficients[place] *= inverse
-        np.multiply(column, coefficients[place] * inverse, out=work)
-        other -= work
+    # All columns at once: long calls, during which another thread can have the interpreter.
+    work = column.conj() * others
+    coefficients = np.add.reduce(work, axis=1)
+    coefficients *= inverse
+    np.multiply(column, (coefficients * inverse)[:, None], out=work)
+    others -= work
     return norms, coefficients
 
 

@@ -120,6 +120,8 @@ def certification_sections(result: Certification) -> Iterator[Section]:
         if section is not None:
             yield section
     yield certificate_section(result)
+    yield Section("Exact claims", "\n\n".join(f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required),
+                  anchor="exact")
 
 
 ASSUMPTIONS = (

@@ -122,11 +122,19 @@ def _claim(checked: Checked, result: Certification) -> Claim:
     cert, verdict = checked.certificate, checked.verdict
     margins = verdict.margins if verdict else {}
     reason = cert.reason if not cert.holds else ("" if checked.good else verdict.reason if verdict else "not verified")
-    return Claim(title=checked.title, sentence=cert.claim, holds=cert.holds, verified=checked.good, box=_box(result, checked),
+    return Claim(title=checked.title, sentence=_SENTENCES[checked.key], holds=cert.holds, verified=checked.good, box=_box(result, checked),
                  margin=_margin(checked, margins), how=_HOW.get(cert.kind, cert.kind), reason=reason,
                  file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
 
 
+_SENTENCES = {  # the exact sentences, with all numbers, are in the section "Exact claims"
+    "contraction": "For every lump temperature and module current in the box, however the currents change, any two "
+                   "temperature histories approach each other: no thermal runaway inside this box.",
+    "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the currents, heats and "
+           "ambients do within theirs.",
+    "box_contraction": "Inside those ranges any two temperature histories approach each other too: together with the claim "
+                       "before, the machine cannot run away thermally from there.",
+}
 _HOW = {
     "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
     "invariance": "On every face of the box the heat flows inwards (Nagumo); re-derived in ball arithmetic.",

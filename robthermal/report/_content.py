@@ -52,7 +52,7 @@ class Claim:
     Examples
     --------
     >>> import robthermal as rt
-    >>> claim = rt.report.Claim("Contraction", "Trajectories converge.", True, None, "m1: 0 to 1 A", "0.01 1/s", "energy norm")
+    >>> claim = rt.report.Claim("Contraction", "Trajectories meet.", True, None, "m1: 0 to 1 A", "0.01 1/s", "energy")
     >>> claim.good, claim.why
     (False, 'the independent check was not run')
     """
@@ -100,7 +100,7 @@ class Claim:
             return self.reason
         if not self.holds:
             return "no proof was found"
-        return "the independent check was not run" if self.verified is None else "the independent check did not confirm it"
+        return f"the independent check {'was not run' if self.verified is None else 'did not confirm it'}"
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,8 @@ class Table:
             raise InputError(f"frame is a {type(self.frame).__name__}", where=f"table {self.caption!r}",
                              expected="a pandas DataFrame")
         if self.digits < 1:
-            raise InputError(f"digits is {self.digits!r}", where=f"table {self.caption!r}", expected="a whole number ≥ 1")
+            raise InputError(f"digits is {self.digits!r}", where=f"table {self.caption!r}",
+                             expected="a whole number ≥ 1")
 
     @property
     def header(self) -> list[str]:
@@ -167,8 +168,9 @@ class Table:
         plain = isinstance(self.frame.index, pd.RangeIndex) and self.frame.index.name is None
         if plain:
             return self.frame
-        index = self.frame.index.to_frame(name=[name or "" for name in self.frame.index.names], index=False)
-        return pd.concat([index, self.frame.reset_index(drop=True)], axis=1)
+        index = self.frame.index
+        levels = [pd.Series(index.get_level_values(i), name=name or "") for i, name in enumerate(index.names)]
+        return pd.concat([*levels, self.frame.reset_index(drop=True)], axis=1)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ._style import COLOURS, canvas, house_style
+from ._style import COLOURS, canvas, house_style, plain
 
 _DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 _MOST_BARS = 40  # more names than this cannot be read; a band over the index can
+_MOST_STEPS = 700  # of that band; each is the lowest and highest of its lumps
 
 
 def current_limits(names: Sequence[str], values: ArrayLike, lines: Mapping[str, float] | None = None) -> Any:
@@ -54,10 +55,11 @@ def current_limits(names: Sequence[str], values: ArrayLike, lines: Mapping[str, 
                   color=COLOURS[0], alpha=0.85)
         for row, value in zip(rows, currents, strict=True):
             place = min(value, 0.9 * right) if np.isfinite(value) else 0.0
-            axes.annotate(_amount(value), (max(place, 0.0), row), xytext=(4, 0), textcoords="offset points", va="center",
-                          fontsize=8.0, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})
+            axes.annotate(_amount(value), (max(place, 0.0), row), xytext=(4, 0), textcoords="offset points",
+                          va="center", fontsize=8.0, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})
         for i, (name, value) in enumerate(across.items()):
-            axes.axvline(value, color=COLOURS[1 + i % 3], linestyle=_DASHES[i % len(_DASHES)], label=f"{name}: {value:.3g} A")
+            axes.axvline(value, color=COLOURS[1 + i % 3], linestyle=_DASHES[i % len(_DASHES)],
+                         label=plain(f"{name}: {value:.3g} A"))
         _names(axes, names)
         axes.set(xlabel="current [A]", xlim=(min(0.0, *finite, 0.0), right))
         if across:
@@ -100,7 +102,9 @@ def box_ranges(names: Sequence[str], low: ArrayLike, high: ArrayLike, unit: str 
     with house_style():
         if len(names) > _MOST_BARS:
             figure, axes = canvas(3.0)
-            axes.fill_between(np.arange(len(names)), bottom, top, step="mid", color=COLOURS[0], alpha=0.5)
+            parts = np.array_split(np.arange(len(names)), min(len(names), _MOST_STEPS))
+            axes.fill_between([part[0] for part in parts], [bottom[part].min() for part in parts],
+                              [top[part].max() for part in parts], step="post", color=COLOURS[0], alpha=0.5)
             axes.set(xlabel="lump, in the order of the file", ylabel=f"temperature [{unit}]")
             return figure
         figure, axes = canvas(_height(len(names)))
@@ -111,6 +115,7 @@ def box_ranges(names: Sequence[str], low: ArrayLike, high: ArrayLike, unit: str 
                               va="center", fontsize=8.0)
         _names(axes, names)
         axes.set(xlabel=f"temperature [{unit}]")
+        axes.use_sticky_edges = False  # room for the numbers beside the bars
         axes.margins(x=0.1)
     return figure
 
@@ -152,13 +157,11 @@ def load_curve(curves: Mapping[str, tuple[ArrayLike, ArrayLike]], folds: Mapping
             if x.shape != y.shape or x.ndim != 1:
                 raise InputError(f"curve {name!r} has {x.shape} currents and {y.shape} loads", where="load_curve",
                                  expected="two sequences of one length")
-            axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=name)
-        for name, (current, load) in folds.items():
-            axes.plot(current, load, "o", color="black", markersize=5)
-            axes.annotate(f"I* = {current:.3g} A, q* = {load:.3g} W", (current, load), xytext=(0, 7),
-                          textcoords="offset points", ha="center", fontsize=8.5)
+            fold = f": fold at I* = {folds[name][0]:.3g} A, q* = {folds[name][1]:.3g} W" if name in folds else ""
+            axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=plain(name) + fold)
+        for i, at in enumerate(folds.values()):
+            axes.plot(*at, "os^Dv"[i % 5], color="black", markersize=5)
         axes.set(xlabel="current [A]", ylabel="heat from the cold face [W]")
-        axes.margins(y=0.15)
         axes.legend(loc="lower right")
     return figure
 
@@ -185,8 +188,7 @@ def _height(rows: int) -> float:
 
 
 def _names(axes: Any, names: Sequence[str]) -> None:
-    # "$" would start a formula in matplotlib; here it is a letter of a name.
-    axes.set_yticks(np.arange(len(names)), [name.replace("$", r"\$") for name in names])
+    axes.set_yticks(np.arange(len(names)), [plain(name) for name in names])
     axes.invert_yaxis()
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import cache
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -37,7 +37,7 @@ def write_html(report: Report, path: str | Path) -> Path:
     Examples
     --------
     >>> import tempfile, robthermal as rt
-    >>> claim = rt.report.Claim("Contraction", "Trajectories converge.", True, True, "m1: 0 to 1 A", "0.01 1/s", "energy norm")
+    >>> claim = rt.report.Claim("Contraction", "Trajectories meet.", True, True, "m1: 0 to 1 A", "0.01 1/s", "energy")
     >>> report = rt.report.Report("Set-up <1>", "", "", (claim,), (), {}, (), "today")
     >>> path = rt.report.write_html(report, tempfile.mkdtemp() + "/report.html")
     >>> "Set-up &lt;1&gt;" in path.read_text(encoding="utf-8")
@@ -57,11 +57,17 @@ def write_html(report: Report, path: str | Path) -> Path:
 def _template(name: str) -> Template:
     environment = Environment(loader=PackageLoader(__package__, "template"), autoescape=True, undefined=StrictUndefined,
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment.filters["units"] = _together
     return environment.get_template(name)
 
 
 def _ranges(claim: Claim) -> list[str]:
     return [part.strip() for part in claim.box.split(";") if part.strip()]
+
+
+def _together(text: str) -> str:
+    """A number and its unit stay on one line."""
+    return re.sub(r"(?<=\d) (?=(?:°C|mK|K|mA|A|mW|W|V|s|min|h|1/s|W/K|J/K|%)(?![\w/]))", "\u00a0", text)
 
 
 def _anchored(sections: Sequence[Section]) -> list[tuple[str, Section]]:
@@ -72,7 +78,8 @@ def _anchored(sections: Sequence[Section]) -> list[tuple[str, Section]]:
         plain = re.sub(r"[^a-z0-9]+", "-", (section.anchor or section.title).lower()).strip("-")
         # No address of ours may begin like the ids of a drawing, f1-…
         base = plain if plain and not re.match(r"f\d", plain) else f"section-{plain}".strip("-")
-        anchor = next(name for name in (base, *(f"{base}-{i}" for i in range(2, len(sections) + 9))) if name not in taken)
+        names = chain([base], (f"{base}-{i}" for i in count(2)))
+        anchor = next(name for name in names if name not in taken)
         taken.add(anchor)
         pairs.append((anchor, section))
     return pairs

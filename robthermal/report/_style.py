@@ -12,7 +12,7 @@ WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 # Black and white become the ink and paper of the page (see _figure.inline), so that dark mode works.
-_STYLE = {
+_STYLE: Any = {  # names are checked by matplotlib when they are set
     "font.family": "sans-serif", "font.sans-serif": ["DejaVu Sans"], "font.size": 9.0, "axes.titlesize": 10.0,
     "axes.titleweight": "bold", "axes.titlelocation": "left", "figure.titlesize": 10.0, "axes.labelsize": 9.0,
     "xtick.labelsize": 8.5, "ytick.labelsize": 8.5, "legend.fontsize": 8.5, "legend.frameon": False,
@@ -21,6 +21,7 @@ _STYLE = {
     "lines.linewidth": 1.4, "figure.figsize": (WIDTH, 3.6), "figure.constrained_layout.use": True,
     "figure.facecolor": "white", "axes.facecolor": "white", "text.color": "black", "axes.labelcolor": "black",
     "xtick.color": "black", "ytick.color": "black", "axes.edgecolor": "black",
+    "axes.prop_cycle": f"cycler(color={list(COLOURS)})",
 }
 
 
@@ -43,8 +44,13 @@ def house_style() -> Iterator[None]:
     # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
     import matplotlib
 
-    with matplotlib.rc_context({**_STYLE, "axes.prop_cycle": matplotlib.cycler(color=COLOURS)}):
+    with matplotlib.rc_context(_STYLE):
         yield
+
+
+def plain(text: str) -> str:
+    """Text in which a dollar is a dollar: matplotlib would read a formula between two."""
+    return text.replace("$", r"\$")
 
 
 def canvas(height: float, rows: int = 1, **options: Any) -> tuple[Any, Any]:

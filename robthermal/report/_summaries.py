@@ -36,7 +36,7 @@ def write_junit(report: Report, path: str | Path) -> Path:
     Examples
     --------
     >>> import tempfile, robthermal as rt
-    >>> claim = rt.report.Claim("Contraction", "Trajectories converge.", True, None, "m1: 0 to 1 A", "0.01 1/s", "energy norm")
+    >>> claim = rt.report.Claim("Contraction", "Trajectories meet.", True, None, "m1: 0 to 1 A", "0.01 1/s", "energy")
     >>> report = rt.report.Report("Set-up", "", "", (claim,), (), {}, (), "today")
     >>> path = rt.report.write_junit(report, tempfile.mkdtemp() + "/junit.xml")
     >>> 'failures="1"' in path.read_text(encoding="utf-8")
@@ -53,7 +53,8 @@ def write_junit(report: Report, path: str | Path) -> Path:
         ElementTree.SubElement(properties, "property", {"name": printable(name), "value": printable(value)})
     suite.extend(cases)
     ElementTree.indent(root)
-    return save_text('<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n", path)
+    body = ElementTree.tostring(root, encoding="unicode")
+    return save_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n', path)
 
 
 def write_json(report: Report, path: str | Path) -> Path:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ._style import COLOURS, canvas, house_style
+from ._style import COLOURS, canvas, house_style, plain
 
 _ZERO = 273.15
-_BINS = 700  # per trace: finer than a printed page resolves, small enough for a page with many figures
+_BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     Returns
     -------
     matplotlib.figure.Figure
-        Long records are thinned to the lowest and highest value of every 1/700 of the time, so no peak is lost.
+        Long records are thinned to the lowest and highest value of every 1/400 of the time, so no peak is lost.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     >>> import robthermal as rt
     >>> figure = rt.report.measured_against_model([0.0, 1.0], {"T1": [300.0, 301.0]}, {"T1": [300.1, 300.9]})
     >>> [axes.get_ylabel() for axes in figure.axes]
-    ['temperature [°C]', 'model − measured [K]']
+    ['temperature [°C]', 'model −\\nmeasured [K]']
     """
     t = np.asarray(time, dtype=float)
     pairs = _pairs(t, measured, model)
@@ -60,19 +60,32 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         above, below = axes[0, 0], axes[-1, 0]
         for i, (name, (data, answer)) in enumerate(pairs.items()):
             colour, dashes = COLOURS[i % len(COLOURS)], ("-", "--", ":")[i // len(COLOURS) % 3]
-            above.plot(*thin(t / scale, data - _ZERO), ".", color=colour, markersize=2.5, alpha=0.35, markeredgewidth=0)
-            above.plot(*thin(t / scale, answer - _ZERO), dashes, color=colour, label=name)
+            _dots(above, *thin(t / scale, data - _ZERO), colour)
+            above.plot(*thin(t / scale, answer - _ZERO), dashes, color=colour, label=plain(name))
             if residual:
                 below.plot(*thin(t / scale, answer - data), dashes, color=colour, linewidth=0.8)
-        above.set(ylabel="temperature [°C]", title=title)
+        above.set(ylabel="temperature [°C]", title=plain(title))
         _legend(above, len(pairs))
         if residual:
             below.axhline(0.0, color="black", linewidth=0.6)
-            below.set(ylabel="model − measured [K]")
+            below.set(ylabel="model −\nmeasured [K]")
             figure.align_ylabels()
         below.set(xlabel=f"time [{unit}]")
         below.margins(x=0.01)
     return figure
+
+
+def _dots(axes: Any, time: Array, values: Array, colour: str) -> None:
+    """Dots as one path of zero-length strokes: a fifth of the size that one marker element per dot has."""
+    # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    good = np.isfinite(values)
+    points = np.repeat(np.column_stack([time[good], values[good]]), 2, axis=0)
+    path = Path(points, np.tile([Path.MOVETO, Path.LINETO], int(good.sum())))
+    path.should_simplify = False  # it would remove the strokes
+    axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=2.4, alpha=0.4, capstyle="round"))
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
@@ -98,7 +111,9 @@ def _legend(axes: Any, count: int) -> None:
                 borderaxespad=0.1, columnspacing=1.2, handlelength=1.4)
 
 
-def _pairs(time: Array, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike]) -> dict[str, tuple[Array, Array]]:
+def _pairs(
+    time: Array, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike]
+) -> dict[str, tuple[Array, Array]]:
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
         raise InputError("time is not an increasing sequence", where="measured_against_model",
                          expected="at least two increasing times")

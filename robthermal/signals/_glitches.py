@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter as running_median
+from scipy.ndimage import rank_filter
 
 from ..errors import InputError
 from ._checks import Array, positive_number
@@ -13,6 +14,7 @@ from ._record import Record
 _NEIGHBOURS = 5  # a jump of up to two samples cannot move the median of five
 _NOISE = 8.0  # times the noise: one false alarm in 10^15 samples of Gaussian noise
 _QUANTA = 4.0  # quantisation steps that a sound reading may jump
+_SWING = 4.0  # times the spread of the middle three of seven neighbours
 _MAD = 1.4826  # median absolute deviation of a Gaussian, to its standard deviation
 
 
@@ -20,7 +22,8 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
     """Single-sample outliers in the outputs: away from the median of five neighbours, and back after two samples.
 
     A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
-    deviations (from the median absolute deviation) and by more than 4 quantisation steps.
+    deviations (from the median absolute deviation), by more than 4 quantisation steps, and by more than 4 times the
+    spread of its neighbours: a real swing moves them too.
 
     Parameters
     ----------
@@ -89,10 +92,13 @@ def glitch_rows(column: Array) -> NDArray[np.intp]:
         return np.empty(0, dtype=np.intp)
     # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
     residual = np.abs(column - running_median(column, size=_NEIGHBOURS, mode="mirror"))
-    # Half of the residuals of noisy data are not zero; where they are, the quantisation step is the scale.
-    noise = _MAD * float(np.median(residual))
+    # On a steep stretch the median is the sample itself and hides the noise; second differences see it there too.
+    bends = np.abs(np.diff(column, 2)) / np.sqrt(6.0)
+    noise = _MAD * max(float(np.median(residual)), float(np.median(bends)))
     rounding = 1e-9 * float(np.abs(column).max())
-    return np.flatnonzero(residual > max(_NOISE * noise, _QUANTA * _quantum(column), rounding))
+    # A fast but real swing bends its neighbours too; a glitch leaves them where they were.
+    spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
+    return np.flatnonzero(residual > np.maximum(max(_NOISE * noise, _QUANTA * _quantum(column), rounding), _SWING * spread))
 
 
 def filtered(column: Array, samples: int) -> Array:

@@ -102,7 +102,7 @@ def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
     names = [name for name in full.parameter_names if not name.endswith((".noise", ".disturbance"))
              and name not in ("sensors.T_plate.time_constant", "sensors.T_plate.delay")]  # at 0: tested one-sided below
     assert len(names) >= 33
-    exact = rt.thermal.trajectory(full, record, sensitivities=names, tolerance=1e-6).sensitivity
+    exact = rt.thermal.trajectory(full, record, sensitivities=names, tolerance=1e-8).sensitivity
     for column, name in enumerate(names):
         value = full.parameter(name)
         step = 1e-4 * abs(value) if value and "temperature" not in name and "initial" not in name else 1e-3
