@@ -41,7 +41,8 @@ def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Ch
         Measured. Several records share the parameters; each has its own initial temperatures.
     parameters : iterable of str or mapping, optional
         What may change: names from the system's fit table, or a mapping from name to (lower, upper) or `FitRange`, in
-        the unit of the parameter, temperatures in kelvin. Default: the whole fit table.
+        the unit of the parameter, temperatures in kelvin. A tuple of names as key ties them: they share one value, which
+        the result calls "a = b". Default: the whole fit table.
     validation : Record or list of Record, optional
         Data the fit does not see; free runs on them are scored, with initial temperatures from their first tenth.
     initial : {"free", "measured", "system"}
@@ -141,7 +142,7 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
     known = information(problem, v, loss)
     slopes = ranges.slopes(values)
     residuals = problem.residuals(v)
-    system = problem.system.with_parameters(dict(zip(ranges.names, values.tolist(), strict=True)))
+    system = problem.system.with_parameters(ranges.assigned(values))
     checks = [validate(system, one, initial, solution.noise) for one in unseen]
     fit = Fit(
         system=system,
@@ -203,7 +204,7 @@ def _check_options(system: System, initial: str, loss: str, max_iterations: int)
 
 
 def _refuse_double_start(ranges: Ranges, initial: Start) -> None:
-    named = [name for name in ranges.names if name.startswith("lumps.") and name.endswith(".initial")]
+    named = [name for name in ranges.flat if name.startswith("lumps.") and name.endswith(".initial")]
     if named and initial != "system":
         raise InputError(f"{named[0]!r} is a parameter, but initial is {initial!r}", where="argument parameters",
                          remedy='Leave it out (a free start estimates it for every record), or use initial="system".')

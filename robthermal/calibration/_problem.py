@@ -83,7 +83,7 @@ class Problem:
 
     def systems(self, v: Array) -> list[System]:
         """System of every record: the parameters, and its own initial temperatures."""
-        values = dict(zip(self.ranges.names, self.parameters(v).tolist(), strict=True))
+        values = self.ranges.assigned(self.parameters(v))
         return [self.system.with_parameters({**start_values(self.system, T), **values}) for T in self.temperatures(v)]
 
     def residuals(self, v: Array) -> list[Array]:
@@ -97,11 +97,12 @@ class Problem:
         out = []
         for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
             free = list(start_values(system, start.mean)) if start.n_free else []
-            run = trajectory(system, one.record, sensitivities=[*self.ranges.names, *free])
+            flat = self.ranges.flat
+            run = trajectory(system, one.record, sensitivities=[*flat, *free])
             J = run.sensitivity[:, one.columns]
-            p = len(self.ranges.names)
-            by_start: Array = np.multiply(J[..., p:], start.sigma)
-            out.append(Run(run.readings[:, one.columns] - one.readings, J[..., :p] * slopes, by_start))
+            by_start: Array = np.multiply(J[..., len(flat):], start.sigma)
+            by_parameter = self.ranges.joined(J[..., :len(flat)]) * slopes
+            out.append(Run(run.readings[:, one.columns] - one.readings, by_parameter, by_start))
         return out
 
     def vector(self, v: Array) -> Array:

@@ -13,7 +13,8 @@ from ..errors import InputError
 from ..thermal import FitRange, System
 
 Array = NDArray[np.float64]
-Choice = Iterable[str] | Mapping[str, tuple[float, float] | FitRange] | None
+Key = str | tuple[str, ...]
+Choice = Iterable[str] | Mapping[Key, tuple[float, float] | FitRange] | Mapping[str, tuple[float, float] | FitRange] | None
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,9 @@ class Ranges:
     Parameters
     ----------
     names : tuple of str
-        Parameter names.
+        Parameter names; of tied parameters all names with " = " between.
+    members : tuple of tuple of str
+        The system's parameters behind each: one, or several that share one value.
     start, lower, upper : ndarray, shape (p,)
         Starting values and bounds, in the unit of each parameter.
     sigma : ndarray, shape (p,)
@@ -33,6 +36,7 @@ class Ranges:
     """
 
     names: tuple[str, ...]
+    members: tuple[tuple[str, ...], ...]
     start: Array
     lower: Array
     upper: Array
@@ -52,6 +56,20 @@ class Ranges:
         return np.where(self.logarithmic, values, 1.0)
 
     @property
+    def flat(self) -> list[str]:
+        """The system's parameters, in order."""
+        return [name for group in self.members for name in group]
+
+    def assigned(self, values: Array) -> dict[str, float]:
+        """What the system's parameters become."""
+        return {name: float(value) for group, value in zip(self.members, values, strict=True) for name in group}
+
+    def joined(self, sensitivity: Array) -> Array:
+        """Derivative by each estimated value, (..., p), from that by each of the system's parameters, (..., len(flat))."""
+        owner = np.repeat(np.arange(len(self.members)), [len(group) for group in self.members])
+        return sensitivity @ (owner[:, None] == np.arange(len(self.members))).astype(float)
+
+    @property
     def unit(self) -> Array:
         """What counts as one plausible step of each coordinate: a factor e, or a uniform spread over the bounds."""
         return np.where(self.logarithmic, 1.0, self.spread)
@@ -68,24 +86,28 @@ class Ranges:
         return (q - low < near) | (high - q < near)
 
 
-NONE = Ranges((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
+NONE = Ranges((), (), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, np.bool_))
 
 
 def chosen_ranges(system: System, parameters: Choice) -> Ranges:
-    """Ranges of a calibration: the system's fit table, some names of it, or a mapping from name to (lower, upper)."""
+    """Ranges of a calibration: the system's fit table, some names of it, or a mapping from names to (lower, upper)."""
     table = _table(system, parameters)
-    for name, limits in table.items():
-        _check(system, name, limits)
-    names = tuple(table)
-    start = np.array([system.parameter(name) for name in names])
+    members = tuple(key if isinstance(key, tuple) else (key,) for key in table)
+    for group, limits in zip(members, table.values(), strict=True):
+        for name in group:
+            _check(system, name, limits)
+        _check_tied(system, group)
+    _refuse_twice([name for group in members for name in group])
+    start = np.array([system.parameter(group[0]) for group in members])
     lower = np.array([limits.lower for limits in table.values()])
     upper = np.array([limits.upper for limits in table.values()])
     sigma = np.array([limits.sigma or np.inf for limits in table.values()])
-    temperature = np.array([name.endswith((".temperature", ".initial")) for name in names])
-    return Ranges(names, start, lower, upper, sigma, (lower > 0) & ~temperature)
+    temperature = np.array([group[0].endswith((".temperature", ".initial")) for group in members])
+    names = tuple(" = ".join(group) for group in members)
+    return Ranges(names, members, start, lower, upper, sigma, (lower > 0) & ~temperature)
 
 
-def _table(system: System, parameters: Choice) -> dict[str, FitRange]:
+def _table(system: System, parameters: Choice) -> dict[Key, FitRange]:
     if parameters is None:
         if not system.fit:
             raise InputError("nothing to calibrate: the system has no fit table", where="argument parameters",
@@ -97,7 +119,7 @@ def _table(system: System, parameters: Choice) -> dict[str, FitRange]:
                          expected="a list of names or a mapping from name to (lower, upper)",
                          remedy="Put it in a list.")
     if isinstance(parameters, Mapping):
-        table = {name: _as_range(name, limits) for name, limits in parameters.items()}
+        table: dict[Key, FitRange] = {key: _as_range(key, limits) for key, limits in parameters.items()}
     else:
         table = {name: _listed(system, name) for name in parameters}
     if not table:
@@ -106,6 +128,9 @@ def _table(system: System, parameters: Choice) -> dict[str, FitRange]:
 
 
 def _listed(system: System, name: str) -> FitRange:
+    if not isinstance(name, str):
+        raise InputError(f"parameters lists {name!r}", where="argument parameters", expected="names",
+                         remedy='Tie parameters in a mapping with their common bounds: {("a", "b"): (lower, upper)}.')
     if name not in system.fit:
         system.parameter(name)  # an unknown name is the better message
         raise InputError(f"{name!r} has no range in the fit table", where="argument parameters",
@@ -114,7 +139,7 @@ def _listed(system: System, name: str) -> FitRange:
     return system.fit[name]
 
 
-def _as_range(name: str, limits: tuple[float, float] | FitRange) -> FitRange:
+def _as_range(name: Key, limits: tuple[float, float] | FitRange) -> FitRange:
     if isinstance(limits, FitRange):
         return limits
     try:
@@ -126,6 +151,26 @@ def _as_range(name: str, limits: tuple[float, float] | FitRange) -> FitRange:
         raise InputError(f"the range of {name!r} is ({lower}, {upper})", where="argument parameters",
                          expected="finite bounds with lower < upper")
     return FitRange(lower=lower, upper=upper)
+
+
+def _check_tied(system: System, group: Key) -> None:
+    if not group:
+        raise InputError("an empty tuple is tied", where="argument parameters", expected="names of parameters")
+    values = {name: system.parameter(name) for name in group}
+    if len({name.rpartition(".")[2] for name in group}) > 1:
+        raise InputError(f"{' and '.join(map(repr, group))} are tied, but are not the same kind of quantity",
+                         where="argument parameters", expected="one kind, for example two conductances")
+    if len(set(values.values())) > 1:
+        listed = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+        raise InputError(f"tied parameters start at different values: {listed}", where="argument parameters",
+                         remedy="Give them one value first: system.with_parameters({...}).")
+
+
+def _refuse_twice(names: list[str]) -> None:
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise InputError(f"{twice[0]!r} is named twice", where="argument parameters",
+                         remedy="A parameter is either free or tied to others, once.")
 
 
 def _check(system: System, name: str, limits: FitRange) -> None:

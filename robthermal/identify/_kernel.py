@@ -9,12 +9,14 @@ For polynomials the transient is removed by one constant matrix, the orthonormal
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ._basis import LocalBasis
@@ -22,6 +24,7 @@ from ._records import Spectrum
 
 Array = NDArray[Any]
 
+_scratch = threading.local()
 _DOUBTFUL = 1e-14  # remaining energy of a regressor relative to its input; below it `_windows` decides the rank
 
 
@@ -64,7 +67,7 @@ class Kernel:
         """Columns with the transient projected out, (n_columns, rows, B)."""
         degree, n_u, m = self.basis.degree, self.n_u, self.basis.n_points
         part, rows = self._slices(start, stop), m - self.basis.size
-        columns = np.empty((self.n_columns, len(self.spectra) * rows, stop - start), dtype=complex)
+        columns = _buffer("columns", (self.n_columns, len(self.spectra) * rows, stop - start))
         for place, spectrum in enumerate(self.spectra):
             mine = columns[:, place * rows : (place + 1) * rows]
             for i in range(n_u):
@@ -83,11 +86,13 @@ class Kernel:
         # D(k)/D(k+r): the denominator of every bin once, then its windows.
         D = self.basis.denominator(np.arange(start - self.basis.half_width, stop + self.basis.half_width, dtype=float))
         row_weights = _windows(1.0 / D, m).view(complex) * D[self.basis.half_width : -self.basis.half_width]
-        descending = self.powers.T[::-1, :, None] * row_weights
-        functions = descending.copy()
+        shape = (size, m, width)
+        descending = np.multiply(self.powers.T[::-1, :, None], row_weights, out=_buffer("descending", shape))
+        functions = _buffer("functions", shape)
+        functions[...] = descending
         for s in range(size):
             _remove(functions[s], functions[s + 1 :], 0.0)
-        columns = np.empty((self.n_columns, len(self.spectra) * m, width), dtype=complex)
+        columns = _buffer("columns", (self.n_columns, len(self.spectra) * m, width))
         for place, spectrum in enumerate(self.spectra):
             mine = columns[:, place * m : (place + 1) * m]
             for i in range(n_u):
@@ -129,16 +134,28 @@ class Kernel:
         gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
         residual = columns[n_k:]
         if full_noise and self.n_y > 1:
-            noise = np.stack([np.multiply(residual, row.conj()).sum(axis=1) for row in residual], axis=1)
+            pairs = [_sum_rows((residual * row.conj()).view(float)).view(complex) for row in residual]
+            noise = np.stack(pairs, axis=1)
         else:
             noise = np.stack([_energy(row) for row in residual])
             noise = noise[None] if full_noise else noise
         return ChunkFit(response, gram, noise / self.degrees_of_freedom, doubtful)
 
 
+def _buffer(name: str, shape: tuple[int, ...]) -> Array:
+    """Complex array for use within one chunk, kept by each thread: fresh memory for every chunk costs more than it."""
+    size, kept = math.prod(shape), _scratch.__dict__
+    if name not in kept or kept[name].size < size:
+        kept[name] = np.empty(size, dtype=complex)
+    return np.asarray(kept[name][:size].reshape(shape))
+
+
 def _windows(spectrum: Array, m: int) -> Array:
-    """Row r holds the bins shifted by r, as pairs of real numbers: (m, 2B)."""
-    return np.ascontiguousarray(sliding_window_view(spectrum, spectrum.size - m + 1)).view(float)
+    """Row r holds the bins shifted by r, as pairs of real numbers: (m, 2B); valid until the next call."""
+    shape, strides = (m, spectrum.size - m + 1), (spectrum.itemsize, spectrum.itemsize)
+    found = _buffer("windows", shape)
+    np.copyto(found, as_strided(np.ascontiguousarray(spectrum), shape, strides, writeable=False))
+    return found.view(float)
 
 
 def _multiply(left: Array, windows: Array, out: Array) -> None:
@@ -149,10 +166,15 @@ def _multiply(left: Array, windows: Array, out: Array) -> None:
         out[...] = (left @ windows).view(complex).reshape(out.shape)
 
 
+def _sum_rows(values: Array) -> Array:
+    """Sum over the last axis but one, by BLAS: unlike np.sum it lets other threads run."""
+    return np.asarray(np.matmul(np.ones((1, values.shape[-2])), values)[..., 0, :])
+
+
 def _energy(column: Array) -> Array:
     """Sum of |.|^2 over the rows of (rows, B), through the pairs of real numbers: squares of .real would be strided."""
     pairs = column.view(float)
-    sums = (pairs * pairs).sum(axis=0)
+    sums = _sum_rows(np.multiply(pairs, pairs, out=_buffer("work", column.shape).view(float)))
     return np.asarray(sums[0::2] + sums[1::2])
 
 
@@ -166,8 +188,9 @@ def _remove(column: Array, others: Array, floor: Array | float) -> tuple[Array, 
     norms = np.sqrt(np.where(square > floor, square, 0.0))
     inverse = np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
     # All columns at once: long calls, during which another thread can have the interpreter.
-    work = column.conj() * others
-    coefficients = np.add.reduce(work, axis=1)
+    conjugate = np.conjugate(column, out=_buffer("conjugate", column.shape))
+    work = np.multiply(conjugate, others, out=_buffer("work", others.shape))
+    coefficients = _sum_rows(work.view(float)).view(complex)
     coefficients *= inverse
     np.multiply(column, (coefficients * inverse)[:, None], out=work)
     others -= work

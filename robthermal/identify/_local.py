@@ -20,7 +20,7 @@ from ._windows import points_per_record, regression, rows_of, solve_windows
 
 Array = NDArray[Any]
 
-_CHUNK_BYTES = 4000000  # columns of a chunk of interior bins: small enough for the cache
+_CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
 _CHUNK_MOST = 4096  # and not so many bins that threads would wait for each other
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
 _FULL_NOISE_BYTES = 2**29  # above this the full noise covariance is computed only for the bins asked for

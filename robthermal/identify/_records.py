@@ -19,7 +19,7 @@ Array = NDArray[Any]
 
 _SILENT = 1e-12  # standard deviation relative to the largest value, below which a signal is constant to rounding
 _LINE_SILENT = 1e3  # a bin is excited when it exceeds this many times the rounding error of its signal
-_LONG = 50_000  # samples from which channels are transformed side by side
+_SIDE_BY_SIDE = (50_000, 2_000_000)  # samples between which channels are transformed together: time against memory
 _COPIES = 1e-12  # squared relative distance below which inputs are linear combinations of each other
 
 
@@ -149,7 +149,7 @@ def _half_spectrum(signals: Array) -> Array:
         column = signals[:, c]
         half[c] = fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
 
-    run_all(transform, range(channels), worth=channels > 1 and n > _LONG)
+    run_all(transform, range(channels), worth=channels > 1 and _SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
     return half
 
 

@@ -250,11 +250,13 @@ class FrequencyResponse:
         """
         factor = quantile(p, self.degrees_of_freedom)
         with np.errstate(invalid="ignore", divide="ignore"):
-            radius = np.sqrt(factor * self.variance)
+            radius = factor * self.variance
+            np.sqrt(radius, out=radius)
             if self.ratio_uncertainty is not None:
                 left = 1.0 - np.sqrt(factor) * self.ratio_uncertainty
                 radius = np.where(left > 0.0, radius / left, np.inf)
-        return np.where(np.isnan(radius), np.inf, radius)
+        radius[np.isnan(radius)] = np.inf
+        return radius
 
     def joint_covariance(self, bins: ArrayLike) -> Array:
         """Covariance of G at several bins together: neighbouring estimates share data and are correlated.

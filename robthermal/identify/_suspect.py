@@ -14,7 +14,7 @@ from ._threads import run_all
 Array = NDArray[Any]
 
 _LEVEL = 2e-3  # chance of a false alarm in one output of one bin, before the estimation error of the reference
-_MANY = 25_000  # bins from which outputs are compared side by side
+_SIDE_BY_SIDE = (25_000, 1_000_000)  # bins between which outputs are compared together: time against memory
 _REACH = 6  # width of the reference on either side, in half widths
 
 
@@ -42,7 +42,7 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
         reference = _reference(variance[o] / _median_ratio(q), gap, reach)
         by_output[o] = variance[o] > limit * np.maximum(reference, rounding[o] ** 2)
 
-    run_all(compare, range(n_y), worth=n_y > 1 and n_f > _MANY)
+    run_all(compare, range(n_y), worth=n_y > 1 and _SIDE_BY_SIDE[0] < n_f < _SIDE_BY_SIDE[1])
     return np.asarray(by_output.any(axis=0))
 
 
@@ -53,8 +53,8 @@ def _median_ratio(q: Array) -> Array:
 
 def _reference(row: Array, gap: int, reach: int) -> Array:
     """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
-    # Medians at every twelfth bin or so: the reference moves by little more than a half width.
-    n, stride = row.size, max(1, reach // 4)
+    # Medians at half-overlapping windows only: the reference then moves by less than half its own width.
+    n, stride = row.size, max(1, reach // 2)
     view = sliding_window_view(row, reach)[::stride]
     parts = [np.median(view[first : first + 2**13], axis=1) for first in range(0, len(view), 2**13)]
     medians = np.concatenate(parts)

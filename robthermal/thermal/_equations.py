@@ -45,7 +45,7 @@ class Equations:
     >>> import robthermal as rt
     >>> eq = rt.thermal.Equations(rt.systems.two_module())
     >>> x, u = eq.initial(), eq.nominal()
-    >>> abs(eq.heat(x, u)).max() < 1e-12  # at rest at room temperature
+    >>> bool(abs(eq.heat(x, u)).max() < 1e-9)  # at rest at room temperature
     True
     """
 

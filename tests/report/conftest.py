@@ -36,8 +36,9 @@ def report(claim: Claim) -> Report:
                 Section("Limits", "Text.", figures=(bars,), anchor="model"),
                 Section("Æ", "Text.", figures=(ranges,)), Section("f1 x", "A drawing's ids begin so."))
     claims = (claim, replace(claim, title="Never left"))
-    return Report("Set-up " + ODD, "10 lumps", "SIMULATED DATA", claims, sections,
-                  {"robthermal": "0.1.0", "SHA-256 of " + ODD: "9f" * 32}, ("One temperature per lump " + ODD,), "today")
+    provenance = {"robthermal": "0.1.0", "SHA-256 of " + ODD: "9f" * 32}
+    return Report("Set-up " + ODD, "10 lumps", "SIMULATED DATA", claims, sections, provenance,
+                  ("One temperature per lump " + ODD,), "today")
 
 
 @pytest.fixture(scope="session")
