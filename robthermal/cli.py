@@ -67,8 +67,8 @@ def check(system: SystemFile, records: Annotated[list[Path] | None, typer.Argume
     found = rt.read_system(system)
     read = [rt.read_record(path, found) for path in records or []]
     constants = rt.thermal.time_constants(found)["time constant [s]"] if len(found.lumps) <= 2000 else None
-    summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links), "modules": list(found.modules),
-               "heaters": list(found.inputs), "sensors": list(found.sensors),
+    summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links),
+               "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
                "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
                "records": [{"name": r.name, "samples": len(r), "sample_time_s": r.sample_time, "notes": list(r.notes)}
                            for r in read]}
@@ -141,7 +141,8 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
 
 
 @app.command()
-def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")], as_json: Json = False) -> None:
+def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")],
+           as_json: Json = False) -> None:
     """Re-derive certificates from their files alone, in ball arithmetic. Exit 0 valid, 1 not valid, 2 unreadable.
 
     Example: robthermal verify certified/certificates/*.json
@@ -151,7 +152,8 @@ def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json
     for path in rt.project.certificate_files(certificates):
         try:
             verdict = rt.verify(rt.Certificate.load(path))
-            rows.append({"file": str(path), "valid": verdict.valid, "reason": verdict.reason, "margins": verdict.margins})
+            rows.append({"file": str(path), "valid": verdict.valid, "reason": verdict.reason,
+                         "margins": verdict.margins})
             status = max(status, 0 if verdict.valid else 1)
         except InputError as error:
             rows.append({"file": str(path), "valid": None, "reason": str(error), "margins": {}})

@@ -25,11 +25,11 @@ class InputError(RobthermalError, ValueError):
 
     Examples
     --------
-    >>> raise InputError("capacity is -3.0 J/K", where="setup.toml [lumps.x1]",
+    >>> raise InputError("capacity is -3 J/K", where="setup.toml [lumps.x1]",
     ...                  expected="a positive number", remedy="Check the sign.")
     Traceback (most recent call last):
     ...
-    robthermal.errors.InputError: setup.toml [lumps.x1]: capacity is -3.0 J/K. Expected a positive number. Check the sign.
+    robthermal.errors.InputError: setup.toml [lumps.x1]: capacity is -3 J/K. Expected a positive number. Check the sign.
     """
 
     def __init__(self, what: str, *, where: str = "", expected: str = "", remedy: str = ""):

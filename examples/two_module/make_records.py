@@ -47,7 +47,8 @@ def make(levels_1: list[float], levels_2: list[float], dwell: float, seed: int, 
 def main(folder: Path) -> None:
     """Write both records."""
     folder.mkdir(parents=True, exist_ok=True)
-    train = make([0.0, 0.8, 0.3, 1.4, -0.4, 0.9, 0.2, 1.1], [0.0, 0.4, 1.1, 0.2, 1.3, -0.4, 0.7, 0.0], 900.0, 11, "train")
+    train = make([0.0, 0.8, 0.3, 1.4, -0.4, 0.9, 0.2, 1.1], [0.0, 0.4, 1.1, 0.2, 1.3, -0.4, 0.7, 0.0],
+                 900.0, 11, "train")
     validation = make([0.5, 1.2, -0.3, 0.8], [1.0, 0.1, 0.7, 1.3], 900.0, 12, "validation")
     for record in (train, validation):
         record.save(folder / f"{record.name}.csv", temperature_unit="degC",

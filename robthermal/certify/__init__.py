@@ -11,5 +11,5 @@ from ._network import network as network
 from ._runaway import Runaway as Runaway
 from ._runaway import runaway as runaway
 
-__all__ = ["CurrentLimit", "Runaway", "RunawayFree", "contraction", "heater_heat", "invariance", "largest_current", "network",
-           "runaway", "runaway_free"]
+__all__ = ["CurrentLimit", "Runaway", "RunawayFree", "contraction", "heater_heat", "invariance", "largest_current",
+           "network", "runaway", "runaway_free"]

@@ -18,10 +18,12 @@ Method = Literal["energy", "sum", "max"]
 METHODS = ("energy", "sum", "max")
 _SLACK = (1e-6, 1e-4, 1e-2, 0.1, 0.5)  # share of the rate given up when a proof fails, tried in turn
 _SMALLEST = 1e-12  # 1/s: a rate below this is not claimed
-_SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "HiGHS linear program", "max": "HiGHS linear program"}
+_SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "HiGHS linear program",
+            "max": "HiGHS linear program"}
 
 
-def contraction(system: System, *, current: Currents, temperature: Temperatures, method: Method = "energy") -> Certificate:
+def contraction(system: System, *, current: Currents, temperature: Temperatures,
+                method: Method = "energy") -> Certificate:
     """Certify that a network contracts for every temperature and current in a box.
 
     Parameters
@@ -47,8 +49,8 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
 
     References
     ----------
-    Lohmiller and Slotine, "On contraction analysis for nonlinear systems", Automatica 34 (1998); errata of Evers (2021),
-    "Thermal runaway".
+    Lohmiller and Slotine, "On contraction analysis for nonlinear systems", Automatica 34 (1998); errata of Evers
+    (2021), "Thermal runaway".
 
     Examples
     --------
@@ -70,8 +72,8 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
         found = best_weights(box, method)
         weights, rate = found if found is not None else (None, -np.inf)
     if not rate > _SMALLEST:
-        return not_certified("contraction", **parts, evidence={"method": method}, made_by=made_by(_SOLVERS[method], "none"),
-                             reason=_why_not(method, rate))
+        return not_certified("contraction", **parts, evidence={"method": method},
+                             made_by=made_by(_SOLVERS[method], "none"), reason=_why_not(method, rate))
     for slack in _SLACK:
         evidence: dict[str, Any] = {"method": method, "rate": _short(rate * (1 - slack))}
         if weights is not None:
@@ -84,11 +86,11 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
 
 def _why_not(method: str, rate: float) -> str:
     if method == "energy":
-        return (f"at some vertex of the box the symmetric part of the Jacobian grows at {-rate:.3g} 1/s: V = eᵀEe does not "
-                "decay there. Narrow the current or temperature range (rt.certify.largest_current tells how far).")
+        return (f"at some vertex of the box the symmetric part of the Jacobian grows at {-rate:.3g} 1/s: V = eᵀEe does "
+                "not decay there. Narrow the current or temperature range (rt.certify.largest_current tells how far).")
     norm = "column" if method == "sum" else "row"
-    return (f"the linear program finds no positive weights for which every {norm} sum is negative over the box. Narrow the "
-            "current or temperature range (rt.certify.largest_current tells how far), or try another method.")
+    return (f"the linear program finds no positive weights for which every {norm} sum is negative over the box. Narrow "
+            "the current or temperature range (rt.certify.largest_current tells how far), or try another method.")
 
 
 def _short(value: float) -> float:

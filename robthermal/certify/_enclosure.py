@@ -107,8 +107,8 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     box = invariant_box(system, currents, ambient or {}, heat)
     if box is None:
         region = region_section(system, current, (_COLDEST + 200, _HOTTEST))
-        reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump diverges. "
-                  "Narrow the currents, or improve the heat sink.")
+        reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
+                  "diverges. Narrow the currents, or improve the heat sink.")
         refused = not_certified("invariance", system=system_section(system), region=region, evidence={}, reason=reason,
                                 made_by=made_by("monotone iteration", "none"))
         return RunawayFree({}, refused, refused, Outcome(False, "not_certified", f"Not certified: {reason}"))
@@ -118,7 +118,32 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
 
 
 def heater_heat(system: System) -> dict[str, Interval]:
-    """Heat range of every heated lump [W] from the declared limits of the heaters."""
+    """Heat range of every heated lump from the declared limits of the heaters.
+
+    Parameters
+    ----------
+    system : System
+        Whose heaters.
+
+    Returns
+    -------
+    dict
+        {lump: (lower, upper)} [W]; heaters on one lump add up.
+
+    Raises
+    ------
+    InputError
+        A heater without limits.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}],
+    ...                 inputs={"foil": {"lump": "bar", "gain": 2.0, "limits": (0.0, 10.0)}})
+    >>> rt.certify.heater_heat(bar)
+    {'bar': (0.0, 20.0)}
+    """
     heat: dict[str, Interval] = {}
     for name, heater in system.inputs.items():
         if heater.limits is None:

@@ -70,7 +70,7 @@ def _top(dense: np.ndarray, blocks: list, choice: tuple) -> float:
 
 
 def _search(dense: np.ndarray, blocks: list, options: list) -> float:
-    """Coordinate ascent from every block's first and last vertex: a lower bound of the worst case, for the search only."""
+    """Coordinate ascent from every block's first and last vertex: a lower bound of the worst case, only to search."""
     worst = -np.inf
     for start in (0, -1):
         choice = [o[start] for o in options]

@@ -18,7 +18,8 @@ from ._sections import (
 
 
 def invariance(system: System, *, current: Currents, temperature: Temperatures,
-               ambient: Mapping[str, Interval] | None = None, heat: Mapping[str, Interval] | None = None) -> Certificate:
+               ambient: Mapping[str, Interval] | None = None,
+               heat: Mapping[str, Interval] | None = None) -> Certificate:
     """Certify that a temperature box is never left.
 
     Parameters
@@ -54,7 +55,8 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     """
     region = region_section(system, current, temperature)
     nominal = {name: (part.temperature, part.temperature) for name, part in system.ambients.items()}
-    region["ambient"] = named_ranges({**nominal, **(ambient or {})}, system.ambient_names, "ambient", "ambient", kelvin=True)
+    region["ambient"] = named_ranges({**nominal, **(ambient or {})}, system.ambient_names, "ambient", "ambient",
+                                     kelvin=True)
     if heat:
         region["heat"] = named_ranges(heat, system.lump_names, "heat", "lump")
     return establish("invariance", system=system_section(system), region=region, evidence={},

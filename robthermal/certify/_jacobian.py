@@ -60,7 +60,7 @@ def box_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian:
     index = {name: i for i, name in enumerate(system.lumps)}
     box = region["temperature"]
     ranges = {name: box[name] if isinstance(box, Mapping) else box for name in system.lumps}
-    nominal = {name: [a.temperature] * 2 for name, a in system.ambients.items()}
+    ends = {name: [a.temperature] * 2 for name, a in system.ambients.items()} | ranges
     base = eq.A.tolil()
     blocks: list[Block] = []
     for name, module in system.modules.items():
@@ -76,15 +76,17 @@ def box_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian:
             a, b = link.between
             if a not in index:
                 a, b = b, a
-            ends = [ranges.get(a, nominal.get(a)), ranges.get(b, nominal.get(b))]
-            blocks.append(Block(index[a], index.get(b, -1), _link_vertices(link, *ends, ambient=b not in index)))
+            vertices = _link_vertices(link, ends[a], ends[b], ambient=b not in index)
+            blocks.append(Block(index[a], index.get(b, -1), vertices))
     return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
 
 
 def _module_vertices(module: Any, hot: list[float], cold: list[float], current: list[float]) -> NDArray[np.float64]:
+    low, high = current
     concave = module.resistance.slope < 0
-    currents = np.linspace(*current, _CURRENTS) if concave else np.unique([*current, np.clip(0.0, *current)])
-    Th, Tc, I = (g.ravel() for g in np.meshgrid(np.unique(hot), np.unique(cold), currents, indexing="ij"))
+    currents = np.linspace(low, high, _CURRENTS) if concave else np.unique([low, high, np.clip(0.0, low, high)])
+    grid = np.meshgrid(np.unique(hot), np.unique(cold), currents, indexing="ij")
+    Th, Tc, I = (g.ravel() for g in grid)  # noqa: E741 - I is the current
     dT = 0.5 * (Th + Tc) - module.reference_temperature
     S, dS = module.seebeck.value + module.seebeck.slope * dT, module.seebeck.slope
     dR, dK = module.resistance.slope, module.conductance.slope

@@ -114,4 +114,5 @@ def _range(system: System, direction: str, c: float) -> dict[str, tuple[float, f
 
 def _outcome(c: float, direction: str, method: str, back_off: float) -> Outcome:
     given_up = f", {100 * back_off:g} % given up for the proof" if back_off else ""
-    return Outcome(True, "certified", f"Certified for {direction} currents up to {c:.4g} A (method {method}{given_up}).")
+    return Outcome(True, "certified",
+                   f"Certified for {direction} currents up to {c:.4g} A (method {method}{given_up}).")

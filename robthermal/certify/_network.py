@@ -103,7 +103,8 @@ def _checked(E: ArrayLike, A: Any) -> tuple[np.ndarray, csr_array]:
         raise InputError(f"A has shape {matrix.shape}", where="argument A", expected=f"({n}, {n}) like E")
     bad = np.flatnonzero(~(np.isfinite(capacity) & (capacity > 0)))
     if bad.size:
-        raise InputError(f"capacity {bad[0]} is {capacity[bad[0]]}", where="argument E", expected="positive finite numbers")
+        raise InputError(f"capacity {bad[0]} is {capacity[bad[0]]}", where="argument E",
+                         expected="positive finite numbers")
     matrix.sum_duplicates()
     entries = matrix.tocoo()
     if not np.isfinite(entries.data).all():

@@ -96,7 +96,8 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     load = dict(zip(setpoint, curve.load[-1].tolist(), strict=True))
     numbers = {name: _constants(curve, i, name) for i, name in enumerate(setpoint)}
     closed = {name: smallest_root(n) for name, n in numbers.items()}
-    certificates = {name: _certify(system, name, n, closed[name]) for name, n in numbers.items() if n["sink_conductance"] > 0}
+    certificates = {name: _certify(system, name, n, closed[name]) for name, n in numbers.items()
+                    if n["sink_conductance"] > 0}
     worst = max(abs(closed[name] / current[name] - 1) for name in setpoint)
     sloped = any(m.seebeck.slope or m.resistance.slope or m.conductance.slope for m in system.modules.values())
     why = " (their S, R, K vary with temperature, the closed form's do not)" if sloped else ""

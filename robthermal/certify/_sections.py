@@ -20,8 +20,8 @@ Temperatures = Interval | Mapping[str, Interval]
 def system_section(system: System) -> dict[str, Any]:
     """Every number of a thermal network that a claim depends on, kelvin."""
     if not isinstance(system, System):
-        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
-                         remedy="Read one with rt.read_system(path).")
+        raise InputError(f"system is a {type(system).__name__}", where="argument system",
+                         expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
     return {"name": system.name,
             "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
             "ambients": list(system.ambients),

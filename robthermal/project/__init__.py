@@ -18,5 +18,5 @@ from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "JobResult", "Project", "boxes_from_text",
-           "certificate_files", "certify_system", "check_free", "demo_project", "output_folder", "read_project", "run_job",
-           "write_certify", "write_job"]
+           "certificate_files", "certify_system", "check_free", "demo_project", "output_folder", "read_project",
+           "run_job", "write_certify", "write_job"]

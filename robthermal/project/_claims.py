@@ -5,14 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..certify import CurrentLimit, Runaway, RunawayFree, contraction, heater_heat, largest_current, runaway, runaway_free
+from ..certify import (
+    CurrentLimit,
+    Runaway,
+    RunawayFree,
+    contraction,
+    heater_heat,
+    largest_current,
+    runaway,
+    runaway_free,
+)
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, Verdict, verify
-from ._schema import Boxes
+from ._schema import Boxes, Direction, Method
 
-METHODS = ("energy", "sum", "max")
-DIRECTIONS = ("symmetric", "cooling", "heating")
+METHODS: tuple[Method, ...] = ("energy", "sum", "max")
+DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
 
 
 @dataclass(frozen=True)

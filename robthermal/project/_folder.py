@@ -68,6 +68,20 @@ def check_free(target: Path) -> None:
     ----------
     target : Path
         Output folder.
+
+    Raises
+    ------
+    InputError
+        A file, or a folder with other things in it.
+
+    Examples
+    --------
+    >>> check_free(Path("results"))  # nothing there: free
+    >>> _ = Path("results").write_text("mine")
+    >>> check_free(Path("results"))
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: results: is a file. Choose another folder with --out.
     """
     if target.is_dir() and not (target / MARKER).is_file() and any(target.iterdir()):
         raise InputError("is a folder with other things in it", where=str(target), remedy="Choose another with --out.")

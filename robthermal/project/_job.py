@@ -36,8 +36,20 @@ class Comparison:
     calibrated: Record
 
     def rmse(self, model: Record) -> dict[str, float]:
-        """Root-mean-square residual of every measured sensor [K]."""
-        return {name: float(np.sqrt(np.mean((self.record[name] - model[name]) ** 2))) for name in self.record.output_names}
+        """Root-mean-square residual of every measured sensor.
+
+        Parameters
+        ----------
+        model : Record
+            One of the simulations, `nominal` or `calibrated`.
+
+        Returns
+        -------
+        dict
+            By sensor [K].
+        """
+        return {name: float(np.sqrt(np.mean((self.record[name] - model[name]) ** 2)))
+                for name in self.record.output_names}
 
 
 @dataclass(frozen=True)
@@ -101,7 +113,8 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
     fit, system = None, project.system
     if train:
         progress(f"calibrating {len(project.system.fit)} parameters on {sum(r.n_samples for r in train)} samples")
-        fit = calibrate(project.system, train, validation=validation or None, initial=project.initial, loss=project.loss)
+        fit = calibrate(project.system, train, validation=validation or None, initial=project.initial,
+                        loss=project.loss)
         system = fit.system
     progress("comparing model and data")
     comparisons = tuple(Comparison(kind, record, simulate(project.system, record), simulate(system, record))

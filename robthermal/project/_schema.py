@@ -17,6 +17,9 @@ _ZERO = 273.15
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Pair = tuple[Number, Number]
 Method = Literal["energy", "sum", "max"]
+Direction = Literal["symmetric", "cooling", "heating"]
+Initial = Literal["free", "measured", "system"]
+Loss = Literal["linear", "soft_l1", "huber"]
 
 
 class _Table(BaseModel):
@@ -37,8 +40,8 @@ class ProjectTable(_Table):
 class CalibrateTable(_Table):
     """[calibrate]: what `rt.calibrate` may do."""
 
-    initial: Literal["free", "measured", "system"] = "free"
-    loss: Literal["linear", "soft_l1", "huber"] = "linear"
+    initial: Initial = "free"
+    loss: Loss = "linear"
     parameters: dict[str, dict[str, Number]] = {}
 
 
@@ -111,8 +114,8 @@ class Project:
     train: tuple[Path, ...]
     validation: tuple[Path, ...]
     median_filter: float | None
-    initial: str
-    loss: str
+    initial: Initial
+    loss: Loss
     boxes: Boxes
     files: tuple[Path, ...]
 
@@ -154,7 +157,8 @@ def read_project(path: str | Path) -> Project:
     folder, head = path.parent, data.project
     system_file = _beside(folder, head.system, path)
     system = _with_fit(read_system(system_file), data.calibrate.parameters, path)
-    train, validation = (tuple(_beside(folder, name, path) for name in names) for names in (head.train, head.validation))
+    train, validation = (tuple(_beside(folder, name, path) for name in names)
+                         for names in (head.train, head.validation))
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
                    data.calibrate.loss, _boxes(system, data.certify), (path, system_file, *train, *validation))
 
@@ -198,4 +202,5 @@ def _refusal(error: ValidationError, path: Path) -> InputError:
     place = ".".join(str(word) for word in fault["loc"])
     what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
         fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
-    return InputError(what, where=str(path), remedy="See the documentation, \"Project file\", or start from the demo's.")
+    return InputError(what, where=str(path),
+                      remedy="See the documentation, \"Project file\", or start from the demo's.")

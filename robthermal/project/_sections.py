@@ -9,7 +9,7 @@ import pandas as pd
 
 from ..calibration import Fit
 from ..report import Figure, Section, Table, box_ranges, current_limits, measured_against_model
-from ._claims import Certification
+from ._claims import Certification, Checked
 from ._job import Comparison
 
 _ZERO = 273.15
@@ -34,9 +34,10 @@ def _comparison_figure(c: Comparison) -> Figure:
     names = _worst(c, 4)
     figure = measured_against_model(c.record.time, {n: c.record[n] for n in names},
                                     {n: c.calibrated[n] for n in names}, title=f"{c.kind}: {c.record.name}")
-    caption = f"Measured (dots) and calibrated model (lines), {c.kind} record; the {len(names)} sensors with the largest residual."
-    return Figure.draw(figure, alt=f"Time plot of measured and simulated temperatures, {c.kind} record, with residuals below.",
-                       caption=caption)
+    alt = f"Time plot of measured and simulated temperatures, {c.kind} record, with residuals below."
+    caption = (f"Measured (dots) and calibrated model (lines), {c.kind} record; the {len(names)} sensors with the "
+               "largest residual.")
+    return Figure.draw(figure, alt=alt, caption=caption)
 
 
 def _worst(c: Comparison, count: int) -> list[str]:
@@ -64,12 +65,13 @@ def limit_section(result: Certification) -> Section:
     figure = Figure.draw(current_limits([f"{li.direction}, {li.method}" for li in result.limits],
                                         [li.current for li in result.limits], lines),
                          alt="Bar chart of the largest certified current by direction and method.",
-                         caption="Largest certified current; the lines are the declared limits and the runaway limit I*.")
-    text = (f"Every module may have any current in the range, at any time and independently, while all lumps are between "
-            f"{low - _ZERO:.6g} and {high - _ZERO:.6g} °C. The three methods are three norms; any one is a proof, so the "
-            "largest value of a direction may be used.")
-    return Section("Current limits", text, figures=(figure,), tables=(Table(pd.DataFrame(rows), "Certified currents."),),
-                   anchor="limits")
+                         caption="Largest certified current; the lines are the declared limits and the runaway limit "
+                                 "I*.")
+    text = ("Every module may have any current in the range, at any time and independently, while all lumps are "
+            f"between {low - _ZERO:.6g} and {high - _ZERO:.6g} °C. The three methods are three norms; any one is a "
+            "proof, so the largest value of a direction may be used.")
+    return Section("Current limits", text, figures=(figure,),
+                   tables=(Table(pd.DataFrame(rows), "Certified currents."),), anchor="limits")
 
 
 def runaway_section(result: Certification) -> Section | None:
@@ -79,10 +81,12 @@ def runaway_section(result: Certification) -> Section | None:
     ax = result.runaway.plot()
     figure = Figure.draw(ax.figure, alt="Load taken from the cold face against current, with the fold marked.",
                          caption="More current takes more heat only up to the fold.")
-    text = ("With its cold face regulated, a module takes more heat with more current only up to I*; a load above q* has no "
-            f"equilibrium and the hot side runs away. Limit the controller's current below I*. {result.runaway.outcome.text}")
-    return Section("Runaway limit of the regulated machine", text, figures=(figure,),
-                   tables=(Table(result.runaway.table().reset_index(names="module"), "Runaway limits."),), anchor="runaway")
+    text = ("With its cold face regulated, a module takes more heat with more current only up to I*; a load above q* "
+            "has no equilibrium and the hot side runs away. Limit the controller's current below I*. "
+            f"{result.runaway.outcome.text}")
+    table = Table(result.runaway.table().reset_index(names="module"), "Runaway limits.")
+    return Section("Runaway limit of the regulated machine", text, figures=(figure,), tables=(table,),
+                   anchor="runaway")
 
 
 def box_section(result: Certification) -> Section | None:
@@ -102,14 +106,19 @@ def box_section(result: Certification) -> Section | None:
 
 def certificate_section(result: Certification) -> Section:
     """Every certificate with its verdict."""
-    rows = [{"certificate": f"certificates/{c.key}.json", "claim": c.title, "proven": "yes" if c.certificate.holds else "no",
-             "verified": "yes" if c.good else "no",
-             "margin": ", ".join(f"{key} {value:.3g}" for key, value in (c.verdict.margins if c.verdict else {}).items()),
-             "check [s]": c.verdict.seconds if c.verdict else float("nan")} for c in result.checked]
-    text = ("Each file holds every number its claim depends on. robthermal verify re-derives the claim from the file alone, "
-            "in ball arithmetic, without any solver.")
-    return Section("Certificates", text, tables=(Table(pd.DataFrame(rows), "Certificates and their independent check."),),
+    table = pd.DataFrame([_certificate_row(c) for c in result.checked])
+    text = ("Each file holds every number its claim depends on. robthermal verify re-derives the claim from the file "
+            "alone, in ball arithmetic, without any solver.")
+    return Section("Certificates", text, tables=(Table(table, "Certificates and their independent check."),),
                    anchor="certificates")
+
+
+def _certificate_row(c: Checked) -> dict[str, object]:
+    margins = c.verdict.margins if c.verdict else {}
+    return {"certificate": f"certificates/{c.key}.json", "claim": c.title,
+            "proven": "yes" if c.certificate.holds else "no", "verified": "yes" if c.good else "no",
+            "margin": ", ".join(f"{key} {value:.3g}" for key, value in margins.items()),
+            "check [s]": c.verdict.seconds if c.verdict else float("nan")}
 
 
 def certification_sections(result: Certification) -> Iterator[Section]:
@@ -120,14 +129,17 @@ def certification_sections(result: Certification) -> Iterator[Section]:
         if section is not None:
             yield section
     yield certificate_section(result)
-    yield Section("Exact claims", "\n\n".join(f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required),
-                  anchor="exact")
+    claims = (f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required)
+    yield Section("Exact claims", "\n\n".join(claims), anchor="exact")
 
 
 ASSUMPTIONS = (
-    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below 0.1).",
-    "Module properties vary linearly with the mean of the two face temperatures; half of the Joule heat goes to each face.",
+    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below "
+    "0.1).",
+    "Module properties vary linearly with the mean of the two face temperatures; half of the Joule heat goes to each "
+    "face.",
     "Currents are imposed (current drive). Heats not in the network stay within the stated ranges.",
-    "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of them.",
+    "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of "
+    "them.",
     "Temperatures and currents stay in the stated ranges; for the box that is never left this is itself proven.",
 )

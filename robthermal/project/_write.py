@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 from ..report import Claim, Report, file_hash, versions, write_html, write_json, write_junit
@@ -122,8 +122,9 @@ def _claim(checked: Checked, result: Certification) -> Claim:
     cert, verdict = checked.certificate, checked.verdict
     margins = verdict.margins if verdict else {}
     reason = cert.reason if not cert.holds else ("" if checked.good else verdict.reason if verdict else "not verified")
-    return Claim(title=checked.title, sentence=_SENTENCES[checked.key], holds=cert.holds, verified=checked.good, box=_box(result, checked),
-                 margin=_margin(checked, margins), how=_HOW.get(cert.kind, cert.kind), reason=reason,
+    return Claim(title=checked.title, sentence=_SENTENCES[checked.key], holds=cert.holds, verified=checked.good,
+                 box=_box(result, checked), margin=_margin(checked, margins),
+                 how=_HOW.get(cert.kind, cert.kind), reason=reason,
                  file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
 
 
@@ -132,8 +133,8 @@ _SENTENCES = {  # the exact sentences, with all numbers, are in the section "Exa
                    "temperature histories approach each other: no thermal runaway inside this box.",
     "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the currents, heats and "
            "ambients do within theirs.",
-    "box_contraction": "Inside those ranges any two temperature histories approach each other too: together with the claim "
-                       "before, the machine cannot run away thermally from there.",
+    "box_contraction": "Inside those ranges any two temperature histories approach each other too: together with the "
+                       "claim before, the machine cannot run away thermally from there.",
 }
 _HOW = {
     "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
@@ -174,4 +175,4 @@ def _subtitle(system: System) -> str:
 
 
 def _now() -> str:
-    return datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")
+    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

@@ -98,7 +98,8 @@ def glitch_rows(column: Array) -> NDArray[np.intp]:
     rounding = 1e-9 * float(np.abs(column).max())
     # A fast but real swing bends its neighbours too; a glitch leaves them where they were.
     spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
-    return np.flatnonzero(residual > np.maximum(max(_NOISE * noise, _QUANTA * _quantum(column), rounding), _SWING * spread))
+    least = max(_NOISE * noise, _QUANTA * _quantum(column), rounding)
+    return np.flatnonzero(residual > np.maximum(least, _SWING * spread))
 
 
 def filtered(column: Array, samples: int) -> Array:

@@ -1,15 +1,18 @@
-"""Multisine: a periodic sum of sines with random phases."""
+"""Multisine: a periodic sum of sines, for one input."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import fft
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from ._checks import Array, finite_number, positive_number
+from ._checks import Array, positive_number
+from ._crest import low_crest_phases, schroeder_phases, wave_of
+from ._excitation_settings import Lines, given_lines, line_amplitudes, one_of, scaled, shifted, whole_number
+
+PHASES = ("random", "schroeder", "low_crest")
 
 
 def multisine(
@@ -21,10 +24,12 @@ def multisine(
     lines: Sequence[int] | None = None,
     rms: float | None = None,
     amplitude: float | None = None,
-    offset: float = 0.0,
+    offset: float | Literal["nonnegative"] = 0.0,
     periods: int = 1,
+    spectrum: Literal["linear", "logarithmic"] | ArrayLike = "linear",
+    phases: Literal["random", "schroeder", "low_crest"] = "random",
 ) -> NDArray[np.float64]:
-    """Sum of sines of equal amplitude and random phase, exactly periodic; its mean is the offset.
+    """Sum of sines with chosen amplitudes and random phases, exactly periodic; its mean is the offset. Evers (2.1).
 
     Parameters
     ----------
@@ -41,11 +46,18 @@ def multisine(
     rms : float, optional
         Standard deviation of the signal, in its unit. Give this or `amplitude`.
     amplitude : float, optional
-        Largest deviation from the offset, in the unit of the signal.
-    offset : float, optional
-        Mean of the signal, in its unit.
+        Largest deviation from the mean, in the unit of the signal.
+    offset : float or "nonnegative", optional
+        Mean of the signal, in its unit; "nonnegative" is the smallest mean for which no value is below zero.
     periods : int, optional
         How often the period is repeated.
+    spectrum : {"linear", "logarithmic"} or array_like, optional
+        Amplitudes of the lines: "linear" equal, power spread evenly over a linear frequency axis; "logarithmic"
+        proportional to 1/sqrt(frequency), power spread evenly over a logarithmic axis; or relative amplitudes [-], one
+        per line.
+    phases : {"random", "schroeder", "low_crest"}, optional
+        "random" are independent and uniform, as the best linear approximation assumes. "schroeder" follow from the
+        amplitudes (the seed has no effect). "low_crest" start at random and are changed until the peak is low.
 
     Returns
     -------
@@ -60,6 +72,7 @@ def multisine(
     ----------
     R. Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley-IEEE, 2012,
     sec. 2.2.
+    Evers (2021), (2.1), with f_k in Hz.
 
     Examples
     --------
@@ -69,75 +82,27 @@ def multisine(
     ((300,), True)
     >>> round(float(u.mean()), 9), round(float(u.std()), 9)
     (20.0, 2.0)
+
+    A heater can only heat, and its mean heat is the price of the peaks:
+
+    >>> common = dict(sample_time=1.0, band=(0.001, 0.1), rms=1.0, offset="nonnegative", seed=1)
+    >>> [round(float(rt.signals.multisine(1000, phases=p, **common).mean()), 1) for p in ("random", "low_crest")]
+    [2.9, 1.4]
     """
-    n, repeats = _whole(period, "period", 3), _whole(periods, "periods", 1)
-    h = positive_number(sample_time, "sample_time", "s")
-    _exactly_one("band", band, "lines", lines)
-    _exactly_one("rms", rms, "amplitude", amplitude)
-    excited = _lines_of_band(band, n, h) if band is not None else _checked_lines(lines, n)
-    spectrum = np.zeros(n // 2 + 1, dtype=complex)
-    phases = np.random.default_rng(_whole(seed, "seed", 0)).uniform(0.0, 2.0 * np.pi, len(excited))
-    spectrum[excited] = np.exp(1j * phases)
-    wave: Array = fft.irfft(spectrum, n)
-    if rms is not None:
-        wave *= positive_number(rms, "rms") / np.sqrt(np.mean(wave**2))
-    else:
-        wave *= positive_number(amplitude, "amplitude") / np.abs(wave).max()
-    return np.tile(finite_number(offset, "offset") + wave, repeats)
+    n, repeats = whole_number(period, "period", 3), whole_number(periods, "periods", 1)
+    excited = given_lines(band, lines, n, positive_number(sample_time, "sample_time", "s"))
+    amplitudes = line_amplitudes(spectrum, excited)
+    rng = np.random.default_rng(whole_number(seed, "seed", 0))
+    chosen = chosen_phases(phases, excited, amplitudes, rng.uniform(0.0, 2.0 * np.pi, excited.size), n)
+    wave = scaled(wave_of(excited, amplitudes, chosen, n), rms, amplitude)
+    return np.tile(shifted(wave, offset), repeats)
 
 
-def _lines_of_band(band: object, n: int, h: float) -> NDArray[np.intp]:
-    if not isinstance(band, (tuple, list, np.ndarray)) or len(band) != 2:
-        raise InputError(f"band is {band!r}", where="argument band", expected="(lowest, highest) frequency [Hz]")
-    low, high = finite_number(band[0], "band[0]", "Hz"), finite_number(band[1], "band[1]", "Hz")
-    if not 0.0 <= low <= high:
-        raise InputError(f"band is {(low, high)} Hz", where="argument band", expected="0 <= lowest <= highest")
-    if high >= 0.5 / h:
-        raise InputError(
-            f"band reaches {high:g} Hz",
-            where="argument band",
-            expected=f"frequencies below the Nyquist frequency, {0.5 / h:g} Hz",
-        )
-    # 1e-9: a limit such as 0.03 Hz lies on a line although 0.03 * n * h is not a whole number in floating point.
-    slack = 1e-9 * max(1.0, high * n * h)
-    first, last = max(1, int(np.ceil(low * n * h - slack))), int(np.floor(high * n * h + slack))
-    if last < first:
-        raise InputError(
-            f"no line lies between {low:g} Hz and {high:g} Hz",
-            where="argument band",
-            expected=f"a band that holds a multiple of {1.0 / (n * h):g} Hz, above zero",
-            remedy="Widen the band, or lengthen the period.",
-        )
-    return np.arange(first, last + 1)
-
-
-def _checked_lines(lines: object, n: int) -> NDArray[np.intp]:
-    if not isinstance(lines, (Sequence, range, np.ndarray)) or isinstance(lines, (str, bytes)) or not len(lines):
-        raise InputError(f"lines is {lines!r}", where="argument lines", expected="a list of line numbers")
-    numbers = [_whole(line, f"lines[{k}]", 1) for k, line in enumerate(lines)]
-    for line in numbers:
-        if 2 * line >= n:
-            raise InputError(
-                f"line {line} is not below the Nyquist frequency",
-                where="argument lines",
-                expected=f"lines from 1 to {(n - 1) // 2} for a period of {n} samples",
-            )
-        if numbers.count(line) > 1:
-            raise InputError(f"line {line} is given twice", where="argument lines", expected="lines given once")
-    return np.array(numbers, dtype=np.intp)
-
-
-def _whole(value: object, where: str, least: int) -> int:
-    number = finite_number(value, where)
-    if number != int(number) or number < least:
-        raise InputError(f"{where} is {value!r}", where=f"argument {where}", expected=f"a whole number from {least}")
-    return int(number)
-
-
-def _exactly_one(first: str, a: object, second: str, b: object) -> None:
-    if (a is None) == (b is None):
-        raise InputError(
-            f"{'neither' if a is None else 'both'} of {first} and {second} given",
-            where=f"arguments {first} and {second}",
-            expected="one of the two",
-        )
+def chosen_phases(
+    kind: object, lines: Lines, amplitudes: Array, random: Array, n: int, turns: ArrayLike = (0.0,)
+) -> Array:
+    """The phases of one of the three kinds; `random` are uniform, `turns` are added to all, experiment by experiment."""
+    word = one_of(kind, "phases", PHASES)
+    if word == "schroeder":
+        return schroeder_phases(lines, amplitudes)
+    return random if word == "random" else low_crest_phases(lines, amplitudes, random, n, turns)

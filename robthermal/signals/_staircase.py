@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ._checks import finite_number, positive_number
+from ._excitation_settings import held_samples
 
 
 def staircase(levels: ArrayLike, dwell: float, *, sample_time: float) -> NDArray[np.float64]:
@@ -39,13 +40,5 @@ def staircase(levels: ArrayLike, dwell: float, *, sample_time: float) -> NDArray
     if isinstance(levels, (str, bytes)) or np.ndim(levels) != 1 or np.size(levels) == 0:
         raise InputError(f"levels is {levels!r}", where="argument levels", expected="a list of at least one number")
     values = np.array([finite_number(level, f"levels[{k}]") for k, level in enumerate(np.asarray(levels).tolist())])
-    h, width = positive_number(sample_time, "sample_time", "s"), positive_number(dwell, "dwell", "s")
-    samples = round(width / h)
-    if samples < 1 or abs(samples * h - width) > 1e-6 * h * samples:
-        raise InputError(
-            f"dwell is {width!r} s and sample_time is {h!r} s",
-            where="argument dwell",
-            expected="a whole number of samples",
-            remedy=f"Use dwell={max(samples, 1) * h:.10g}.",
-        )
-    return np.repeat(values, samples)
+    h = positive_number(sample_time, "sample_time", "s")
+    return np.repeat(values, held_samples(dwell, "dwell", h))

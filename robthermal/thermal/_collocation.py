@@ -24,7 +24,8 @@ from ._terms import Array
 DEGREE = 5
 NODES = 0.5 * (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE))
 _MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))  # nodal values -> coefficients of (s/h)^k
-TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]  # nodal values -> last two Chebyshev coefficients
+# nodal values -> last two Chebyshev coefficients
+TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]
 
 
 @dataclass(frozen=True)

@@ -128,7 +128,8 @@ def _correct(F: Callable[[Array, float], Array], J: Callable[[Array, float], Arr
     return point if size < 1e-9 else None
 
 
-def _at_one(F: Callable[[Array, float], Array], J: Callable[[Array, float], Array], before: Array, after: Array) -> Array:
+def _at_one(F: Callable[[Array, float], Array], J: Callable[[Array, float], Array], before: Array,
+            after: Array) -> Array:
     """Newton at λ = 1 from the chord between two points."""
     share = (1 - before[-1]) / (after[-1] - before[-1])
     y = (before + share * (after - before))[:-1]

@@ -19,8 +19,8 @@ Initial = ArrayLike | Mapping[str, float] | None
 def held_inputs(eq: Equations, record: Record) -> Array:
     """Matrix u (n_samples, n_u) of a record, in the order of `System.exogenous_names`."""
     if not isinstance(record, Record):
-        raise InputError(f"record is a {type(record).__name__}", where="argument record", expected="a robthermal.Record",
-                         remedy="Read one with rt.read_record(path, system).")
+        raise InputError(f"record is a {type(record).__name__}", where="argument record",
+                         expected="a robthermal.Record", remedy="Read one with rt.read_record(path, system).")
     columns, missing = [], []
     for name, nominal in zip(eq.system.exogenous_names, eq.nominal(), strict=True):
         if name in record.input_names:
@@ -117,5 +117,6 @@ def _default(eq: Equations, record: Record) -> NDArray[np.float64]:
     ambient = record[first][0] if first in record.input_names else eq.system.ambients[first].temperature
     readings = _measured(eq, record)
     nearest = eq.system.nearest_lumps(readings)
-    return np.array([lump.initial if lump.initial is not None else readings[nearest[name]] if name in nearest else ambient
+    return np.array([lump.initial if lump.initial is not None
+                     else readings[nearest[name]] if name in nearest else ambient
                      for name, lump in eq.system.lumps.items()])

@@ -14,7 +14,6 @@ from scipy.sparse import coo_array, csr_array
 from ._parameters import locate
 from ._terms import Array, ModuleTerm, NaturalTerm, RadiationTerm, Term
 
-
 if TYPE_CHECKING:
     from ._system import System
 
@@ -130,7 +129,21 @@ class Equations:
         return np.array([first if lump.initial is None else lump.initial for lump in self.system.lumps.values()])
 
     def ends(self, term: Term, x: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Temperatures at both ends of every pair of a term, and the current [A] through it."""
+        """Temperatures at both ends of every pair of a term, and the current through it.
+
+        Parameters
+        ----------
+        term : Term
+            One of `terms`.
+        x, u : ndarray
+            As in `heat`.
+
+        Returns
+        -------
+        tuple of ndarray
+            Temperatures at the ends a and b [K], shape (..., n_terms), and the currents [A]; none if the term is not
+            the modules'.
+        """
         nodes = np.concatenate([x, u[..., u.shape[-1] - len(self.system.ambients):]], axis=-1)
         first = len(self.system.inputs)
         current = u[..., first: first + len(self.system.modules)]
@@ -160,7 +173,20 @@ class Equations:
         return total
 
     def jacobian(self, x: ArrayLike, u: ArrayLike) -> csr_array:
-        """∂f/∂x at one point, (n, n) [W/K]; same arguments as `heat`, one point."""
+        """∂f/∂x at one point.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            Temperatures [K].
+        u : array_like, shape (n_u,)
+            Exogenous values [unit, A, K].
+
+        Returns
+        -------
+        csr_array, shape (n, n)
+            [W/K].
+        """
         x, u = np.asarray(x), np.asarray(u)
         n, parts = len(self.system.lumps), [self.A]
         for term in self.terms:
@@ -170,7 +196,18 @@ class Equations:
         return csr_array(sum(parts[1:], start=parts[0]))
 
     def input_jacobian(self, x: ArrayLike, u: ArrayLike) -> csr_array:
-        """∂f/∂u at one point, (n, n_u) [W/unit, W/A, W/K]."""
+        """∂f/∂u at one point.
+
+        Parameters
+        ----------
+        x, u : array_like
+            As in `jacobian`.
+
+        Returns
+        -------
+        csr_array, shape (n, n_u)
+            [W/unit, W/A, W/K].
+        """
         x, u = np.asarray(x), np.asarray(u)
         n, nu = len(self.system.lumps), u.size
         first = len(self.system.inputs)
@@ -188,7 +225,18 @@ class Equations:
         return csr_array(sum(parts[1:], start=parts[0]))
 
     def rate(self, x: ArrayLike, u: ArrayLike) -> Array:
-        """ẋ = E⁻¹ f(x, u) [K/s]; same arguments as `heat`."""
+        """ẋ = E⁻¹ f(x, u).
+
+        Parameters
+        ----------
+        x, u : array_like
+            As in `heat`.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            [K/s].
+        """
         return self.heat(x, u) / self.capacity
 
     def parameter_heat(self, name: str, x: ArrayLike, u: ArrayLike) -> list[tuple[int, Array]]:
@@ -230,7 +278,8 @@ class Equations:
             s = term.slopes(*self.ends(term, x, u))
             for other, here, slope in ((term.a, term.b, s.ab), (term.b, term.a, s.ba)):
                 _add_to_lumps(total, other, np.where(here == node, slope, 0.0))
-        return [(i, total[..., i]) for i in np.flatnonzero(np.any(total.reshape(-1, total.shape[-1]) != 0, axis=0))]
+        touched = np.flatnonzero(np.any(total.reshape(-1, total.shape[-1]) != 0, axis=0))
+        return [(int(i), total[..., i]) for i in touched]
 
     def _pair_heat(self, table: str, part: str, field: str, x: Array, u: Array) -> list[tuple[int, Array]]:
         if table == "links":
@@ -247,6 +296,7 @@ class Equations:
         return [(node, flow) for node, flow in zip((a, b), flows, strict=True) if node < len(self.system.lumps)]
 
     def _term_parameter(self, table: str, part: str, field: str, x: Array, u: Array) -> tuple[Array, Array]:
+        kind: type[ModuleTerm | NaturalTerm | RadiationTerm]
         if table == "modules":
             kind, number = ModuleTerm, list(self.system.modules).index(part)
         elif field == "radiation":
@@ -263,8 +313,9 @@ class Equations:
 
 def _beside(left: csr_array, right: csr_array) -> coo_array:
     a, b = coo_array(left), coo_array(right)
-    return coo_array((np.concatenate([a.data, b.data]), (np.concatenate([a.row, b.row]),
-                      np.concatenate([a.col, b.col + left.shape[1]]))), shape=(left.shape[0], left.shape[1] + right.shape[1]))
+    rows, columns = np.concatenate([a.row, b.row]), np.concatenate([a.col, b.col + left.shape[1]])
+    return coo_array((np.concatenate([a.data, b.data]), (rows, columns)),
+                     shape=(left.shape[0], left.shape[1] + right.shape[1]))
 
 
 def _square(n: int, *entries: tuple[NDArray[np.intp], NDArray[np.intp], Array]) -> csr_array:
@@ -276,4 +327,4 @@ def _square(n: int, *entries: tuple[NDArray[np.intp], NDArray[np.intp], Array]) 
 def _add_to_lumps(total: Array, nodes: NDArray[np.intp], flow: Array) -> None:
     """Add flow (..., n_terms) to the lumps among nodes; several terms may share a lump."""
     keep = nodes < total.shape[-1]
-    np.add.at(total, (..., nodes[keep]), flow[..., keep])
+    np.add.at(total, (..., nodes[keep]), flow[..., keep])  # type: ignore[arg-type]  # numpy's stub knows no index tuple

@@ -159,7 +159,7 @@ class Integrator:
         return np.array(states), worst
 
     def solve_ports(self, base: Array, M: Array, start: Array, u: Array, samples: int) -> tuple[Array, bool]:
-        """Fixed point q = heat(base + M q), by Picard iteration: heats (samples, p + 1, n_q), and whether it converged."""
+        """Fixed point q = heat(base + M q), by Picard iteration: heats (samples, p + 1, n_q), whether it converged."""
         if not self.nq:
             return np.zeros((samples, DEGREE + 1, 0)), True
         np_ = self.ports.size
@@ -185,8 +185,8 @@ class Integrator:
         worst = int(np.argmax(np.abs(lumps - 300.0)))
         name = self.eq.system.lump_names[worst]
         raise Diverged(f"the simulation runs away at {k * self.h:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
-                       "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or limit "
-                       "the current (rt.certify.largest_current tells how much is safe).", time=k * self.h)
+                       "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
+                       "limit the current (rt.certify.largest_current tells how much is safe).", time=k * self.h)
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:

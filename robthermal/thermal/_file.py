@@ -132,7 +132,8 @@ def _text(path: Path) -> str:
         raise InputError("is not a text file in UTF-8", where=str(path), expected="a system file in TOML",
                          remedy="Is this the right file?") from None
     if not text.strip():
-        raise InputError("is empty", where=str(path), expected="a system file in TOML", remedy="Is this the right file?")
+        raise InputError("is empty", where=str(path), expected="a system file in TOML",
+                         remedy="Is this the right file?")
     return text
 
 
@@ -159,7 +160,8 @@ def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
     """Convert the temperatures of the file, after catching Celsius declared as kelvin and the reverse."""
     unit = data.get("temperature_unit")
     if unit not in ("K", "degC"):
-        raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"', remedy='Write "degC" or "K".')
+        raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"',
+                         remedy='Write "degC" or "K".')
     for table, key in _TEMPERATURES.items():
         parts = data.get(table, {})
         if isinstance(parts, dict):

@@ -26,7 +26,7 @@ _FINEST = 20
 
 @dataclass(frozen=True)
 class Run:
-    """Kept temperatures (n, n_keep), stored heat (n,), heat from ambients (n, n_a) and electrical energy (n, n_m) [J]."""
+    """Kept temperatures (n, n_keep), stored heat (n,), heat from ambients (n, n_a), electrical energy (n, n_m) [J]."""
 
     lumps: Array
     stored: Array
@@ -116,7 +116,7 @@ def run_implicit(eq: Equations, x0: Array, u: Array, h: float, tolerance: float,
         When no step length is short enough.
     """
     stepper, x, level = _Stepper(eq, h, tolerance), x0, 0
-    meters = np.zeros(len(eq.system.ambients) + len(eq.system.modules))
+    meters: Array = np.zeros(len(eq.system.ambients) + len(eq.system.modules))
     lumps, stored, energy = [x0[keep]], [0.0], [meters]
     for k in range(len(u) - 1):
         x, meters, level = _sample(stepper, x, u[k], meters, level, k)
@@ -141,8 +141,8 @@ def _sample(stepper: _Stepper, x: Array, u: Array, meters: Array, level: int, k:
             level += 1
             renewed = False
             if level > _FINEST:
-                raise Diverged(f"the simulation runs away at {k * stepper.h:.6g} s: no step is short enough. Check signs "
-                               "and units, or limit the current.", time=k * stepper.h)
+                raise Diverged(f"the simulation runs away at {k * stepper.h:.6g} s: no step is short enough. Check "
+                               "signs and units, or limit the current.", time=k * stepper.h)
             continue
         x, stages, error = result
         h = stepper.h / 2**level

@@ -38,7 +38,8 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     -------
     control.StateSpace
         Deviations from the operating point; inputs, states and outputs carry the names of the system (a lagged sensor
-        adds a state "NAME_lag"; without sensors the outputs are all lumps). Sensor delays are not part of a state space.
+        adds a state "NAME_lag"; without sensors the outputs are all lumps). Sensor delays are not part of a state
+        space.
 
     Raises
     ------
@@ -56,7 +57,8 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     x, u = _point(eq, temperatures), exogenous_point(eq, inputs or {})
     A, B = _matrices(eq, x, u)
     if not (np.isfinite(sample_time) and sample_time >= 0):
-        raise InputError(f"sample_time = {sample_time}", where="argument sample_time", expected="0 or a positive number [s]")
+        raise InputError(f"sample_time = {sample_time}", where="argument sample_time",
+                         expected="0 or a positive number [s]")
     if sample_time:
         both = np.zeros((A.shape[0] + B.shape[1],) * 2)
         both[:len(A)] = np.hstack([A, B]) * sample_time
@@ -80,8 +82,8 @@ def time_constants(system: System, temperatures: ArrayLike | Mapping[str, float]
     Returns
     -------
     pandas.DataFrame
-        Columns "time constant [s]" (negative: unstable), "lump" (where the mode is largest) and "share", its part of the
-        mode's stored heat.
+        Columns "time constant [s]" (negative: unstable), "lump" (where the mode is largest) and "share", its part of
+        the mode's stored heat.
 
     Examples
     --------

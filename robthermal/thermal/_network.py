@@ -82,8 +82,9 @@ def _modules_exist(system: System) -> None:
         pair = frozenset((module.hot, module.cold))
         if pair in pairs:
             raise InputError(f"modules {pairs[pair]!r} and {name!r} join the same two lumps, {module.hot!r} and "
-                             f"{module.cold!r}", where=where, remedy="Describe both as one module (in series: add their "
-                             "Seebeck coefficients, resistances and conductances), or give each faces of its own.")
+                             f"{module.cold!r}", where=where,
+                             remedy="Describe both as one module (in series: add their Seebeck coefficients, "
+                                    "resistances and conductances), or give each faces of its own.")
         pairs[pair] = name
 
 

@@ -187,7 +187,9 @@ class Module(Part):
 
 
 class Sensor(Part):
-    """A temperature sensor: reading = T_ref + gain (T_lagged - T_ref) + offset, T_ref the first ambient's nominal temperature.
+    """A temperature sensor: reading = T_ref + gain (T_lagged - T_ref) + offset.
+
+    T_ref is the first ambient's nominal temperature.
 
     Parameters
     ----------

@@ -131,7 +131,8 @@ def _check(model: Any, order: int | None, tolerance: float | None, method: str) 
     if (order is None) == (tolerance is None):
         raise InputError("give order or tolerance, one of them", where="arguments order, tolerance")
     if order is not None and not (isinstance(order, int) and 0 <= order < model.nstates):
-        raise InputError(f"order = {order}", where="argument order", expected=f"a whole number from 0 to {model.nstates - 1}")
+        raise InputError(f"order = {order}", where="argument order",
+                         expected=f"a whole number from 0 to {model.nstates - 1}")
     if tolerance is not None and not tolerance > 0:
         raise InputError(f"tolerance = {tolerance}", where="argument tolerance", expected="a positive number")
     if method not in ("balanced", "modal"):
@@ -212,7 +213,7 @@ def hinf_error(model: control.StateSpace, reduced: control.StateSpace) -> float:
     poles = np.abs(np.linalg.eigvals(A)) if len(A) else np.zeros(0)
     frequencies = np.concatenate([[0.0], poles])
     best = max((_gain(A, B, C, D, w) for w in frequencies), default=0.0)
-    best = max(best, np.linalg.norm(D, 2) if D.size else 0.0)
+    best = max(best, float(np.linalg.norm(D, 2)) if D.size else 0.0)
     for _ in range(30):
         level = best * (1 + 1e-4) + 1e-300
         crossings = _crossings(A, B, C, D, level)

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
-from ._parts import Ambient, FitRange, Input, Link, Linear, Lump, Module, Natural, Part, Sensor
+from ._parts import Ambient, FitRange, Input, Linear, Link, Lump, Module, Natural, Part, Sensor
 
 _PARTS: dict[str, type[Part]] = {"ambients": Ambient, "lumps": Lump, "links": Link, "inputs": Input,
                                  "modules": Module, "sensors": Sensor, "fit": FitRange}
@@ -27,7 +27,8 @@ _EXPECTED = {
 def refusal(error: ValidationError) -> InputError:
     """First fault of a pydantic error as an `InputError`."""
     faults = error.errors(include_url=False)
-    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])  # a misspelt key explains a missing one
+    # a misspelt key explains a missing one
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
     place, key = _place(fault["loc"])
     kind = fault["type"]
     if kind == "extra_forbidden":

@@ -16,8 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ._equations import Equations
 from ._system import System, equations
-from ._terms import Array, ModuleTerm
-
+from ._terms import Array, Indices, ModuleTerm
 
 _POINTS = 60  # of a load curve
 
@@ -91,7 +90,8 @@ def load_curve(system: System, setpoint: Mapping[str, float], current: Array, *,
     """
     eq = equations(system)
     held, columns, target = _faces(eq, setpoint)
-    u, x, rows = _surroundings(eq, ambient), eq.initial(), []
+    u, rows = _surroundings(eq, ambient), []
+    x: Array = eq.initial()
     x[held] = target
     path = np.asarray(current, float)
     for values in path[:, None] * np.ones(len(columns)) if path.ndim == 1 else path:
@@ -102,7 +102,8 @@ def load_curve(system: System, setpoint: Mapping[str, float], current: Array, *,
         x = solved
         slowest = slowest_regulated(eq, x, u, held, columns)
         rows.append((values.copy(), loads(eq, x, u, columns), x, slowest))
-    values, load, temperatures, rate = (np.array(c) for c in zip(*rows, strict=True)) if rows else (np.zeros((0, 0)),) * 4
+    found = zip(*rows, strict=True) if rows else (np.zeros((0, 0)),) * 4
+    values, load, temperatures, rate = (np.array(column) for column in found)
     return LoadCurve(system, dict(setpoint), values, load, temperatures, rate)
 
 
@@ -148,7 +149,7 @@ def fold(system: System, setpoint: Mapping[str, float], *, ambient: Mapping[str,
     return curve
 
 
-def _groups(eq: Equations, held: Array, columns: Array) -> list[list[int]]:
+def _groups(eq: Equations, held: Indices, columns: Indices) -> list[list[int]]:
     """Modules (positions among those named) that share a heat sink once the cold faces are held."""
     free = np.setdiff1d(np.arange(len(eq.capacity)), held)
     J = eq.jacobian(eq.initial(), eq.nominal())[free][:, free]
@@ -177,7 +178,7 @@ def _load_path(system: System, setpoint: Mapping[str, float], ambient: Mapping[s
         raise InputError("the machine is unstable without any current", where="argument system",
                          remedy="Check the signs of its parameters.")
     first = float(np.max(at_rest / size))
-    low, high = first, 1.0  # a module on a perfect sink takes its size: share 1
+    low, high = first, first + 1.01  # a module on a perfect sink takes its size more than at rest
     current = solve.currents(low, np.zeros(len(columns)))
     if current is None:
         raise InputError("the modules do not take heat with a small current", where="argument system",
@@ -189,7 +190,8 @@ def _load_path(system: System, setpoint: Mapping[str, float], ambient: Mapping[s
             high = middle
         else:
             low, current = middle, new
-    path, at = [], np.zeros(len(columns))
+    path: list[Array] = []
+    at: Array = np.zeros(len(columns))
     for share in first + (low - first) * (1 - np.linspace(1, 0, _POINTS) ** 2):  # dense towards the fold
         new = solve.currents(share, at)
         at = current if new is None else new
@@ -202,8 +204,8 @@ class _LoadSolver:
     """Finds the currents at which every module takes its share of the load, on the stable side."""
 
     eq: Equations
-    held: Array
-    columns: Array
+    held: Indices
+    columns: Indices
     target: Array
     u: Array
     size: Array
@@ -242,7 +244,7 @@ class _LoadSolver:
         return None
 
 
-def _load_slopes(eq: Equations, x: Array, u: Array, held: Array, columns: Array) -> Array:
+def _load_slopes(eq: Equations, x: Array, u: Array, held: Indices, columns: Indices) -> Array:
     """∂q/∂I with the rest of the network in steady state [W/A]."""
     Jx, Ju = eq.jacobian(x, u).toarray(), eq.input_jacobian(x, u).toarray()[:, columns]
     free = np.setdiff1d(np.arange(len(x)), held)
@@ -267,7 +269,7 @@ def _surroundings(eq: Equations, ambient: Mapping[str, float] | None) -> Array:
     return u
 
 
-def hot_side(eq: Equations, x: Array, u: Array, held: Array) -> Array | None:
+def hot_side(eq: Equations, x: Array, u: Array, held: Indices) -> Array | None:
     """Temperatures of all lumps but the held ones in steady state, by Newton from x; None if there are none nearby."""
     free = np.setdiff1d(np.arange(len(x)), held)
     x = x.copy()
@@ -281,7 +283,7 @@ def hot_side(eq: Equations, x: Array, u: Array, held: Array) -> Array | None:
     return None
 
 
-def regulated_feedback(eq: Equations, x: Array, u: Array, held: Array, columns: Array) -> Array:
+def regulated_feedback(eq: Equations, x: Array, u: Array, held: Indices, columns: Indices) -> Array:
     """System matrix [1/s] of the other lumps while the currents keep the held lumps' heat balance."""
     Jx, Ju = eq.jacobian(x, u).toarray(), eq.input_jacobian(x, u).toarray()[:, columns]
     free = np.setdiff1d(np.arange(len(x)), held)
@@ -289,7 +291,7 @@ def regulated_feedback(eq: Equations, x: Array, u: Array, held: Array, columns: 
     return (Jx[np.ix_(free, free)] + Ju[free] @ law) / eq.capacity[free, None]
 
 
-def slowest_regulated(eq: Equations, x: Array, u: Array, held: Array, columns: Array) -> float:
+def slowest_regulated(eq: Equations, x: Array, u: Array, held: Indices, columns: Indices) -> float:
     """Largest real part of the regulated machine's eigenvalues [1/s]; infinite where a current has lost its grip."""
     try:
         matrix = regulated_feedback(eq, x, u, held, columns)
@@ -298,7 +300,7 @@ def slowest_regulated(eq: Equations, x: Array, u: Array, held: Array, columns: A
     return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))
 
 
-def loads(eq: Equations, x: Array, u: Array, columns: Array) -> Array:
+def loads(eq: Equations, x: Array, u: Array, columns: Indices) -> Array:
     """Heat the modules take from their cold lumps, S x_c I - ½ R I² - K (x_h - x_c) [W]."""
     term = next(t for t in eq.terms if isinstance(t, ModuleTerm))
     hot, cold, current = eq.ends(term, x, u)
@@ -307,7 +309,7 @@ def loads(eq: Equations, x: Array, u: Array, columns: Array) -> Array:
     return -(into_cold + K * (hot - cold))[columns - len(eq.system.inputs)]
 
 
-def _faces(eq: Equations, setpoint: Mapping[str, float]) -> tuple[Array, Array, Array]:
+def _faces(eq: Equations, setpoint: Mapping[str, float]) -> tuple[Indices, Indices, Array]:
     if not setpoint:
         raise InputError("no module is named", where="argument setpoint", remedy='For example {"m1": 278.15}.')
     for name, value in setpoint.items():

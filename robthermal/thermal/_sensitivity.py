@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._augmented import Augmented, slope
 from ._collocation import DEGREE, Step, step_matrices
@@ -87,7 +88,7 @@ class Sensitivity:
                 out[k + 1] = now
         return out
 
-    def transitions(self, starts: Array, u: Array, level: Array) -> Transitions:
+    def transitions(self, starts: Array, u: Array, level: NDArray[np.integer]) -> Transitions:
         """Linear maps of steps that start at `starts` (n_steps, n_z) with inputs u (n_steps, n_u)."""
         n = self.n_free
         F, P = np.empty((len(u), n, n)), np.empty((len(u), n, len(self.names)))
@@ -136,7 +137,8 @@ class Sensitivity:
                 break
         return T, current
 
-    def _direct(self, step: Step, level: int, z: Array, u: Array, T: Array, current: Array, q: Array, G: Array) -> Array:
+    def _direct(self, step: Step, level: int, z: Array, u: Array, T: Array, current: Array, q: Array,
+                G: Array) -> Array:
         """Derivative of all rows with respect to the parameters at fixed port temperatures."""
         out = np.zeros((len(z), step.K.shape[0], len(self.names)))
         flat = q.reshape(len(z), (DEGREE + 1) * self.by.nq)
@@ -170,7 +172,8 @@ class Sensitivity:
         column = 0
         for term, (a, b) in zip(self.by.port_heat.terms, self.by.port_heat.columns, strict=True):
             if isinstance(term, kind):
-                flows = term.parameter_slopes(field, T[..., a], T[..., b], current if kind is ModuleTerm else T[..., :0])
+                through = current if kind is ModuleTerm else T[..., :0]
+                flows = term.parameter_slopes(field, T[..., a], T[..., b], through)
                 for side, flow in enumerate(flows):
                     out[..., column + side * len(a) + pair] = np.broadcast_to(flow, T[..., a].shape)[..., pair]
             column += 2 * len(a)

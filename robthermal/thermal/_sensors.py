@@ -87,7 +87,8 @@ def _of(rates: Rates, state: int) -> tuple[Array, Array] | None:
 
 
 def _delayed(x: Array, rate: tuple[Array, Array] | None, delay: float, h: float) -> Array:
-    """Value `delay` seconds earlier by cubic Hermite interpolation between samples; before the start: the first value."""
+    """Value `delay` seconds earlier by cubic Hermite interpolation between samples; before the start the first value.
+    """
     if not delay or rate is None:
         return x
     whole = int(np.ceil(delay / h - 1e-12))

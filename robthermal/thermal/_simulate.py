@@ -136,9 +136,9 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
         kept = run_implicit(eq, start_state(eq, record, initial, len(system.lumps)), u, record.sample_time, tolerance,
                             np.array(measured, np.intp)).lumps
         readings = read_sampled(eq, kept, record.sample_time) if system.sensors else kept
-    return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings, input_names=record.input_names,
-                  output_names=system.sensor_names or system.lump_names, start_time=record.start_time,
-                  name=f"simulation of {system.name}")
+    return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
+                  input_names=record.input_names, output_names=system.sensor_names or system.lump_names,
+                  start_time=record.start_time, name=f"simulation of {system.name}")
 
 
 def trajectory(system: System, record: Record, *, initial: Initial = None, tolerance: float = 1e-4,
@@ -161,6 +161,23 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     ------
     InputError, Diverged
         As in `simulate`; an unknown parameter name.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> system = rt.System(ambients={"room": {"temperature": 300.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                    links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                    sensors={"T": {"lump": "bar"}})
+    >>> record = rt.Record(sample_time=10.0, inputs=np.ones(3), outputs=np.zeros((3, 0)), input_names=["heater"],
+    ...                    output_names=[])
+    >>> run = rt.thermal.trajectory(system, record, sensitivities=["lumps.bar.capacity"])
+    >>> run.heater_heat[-1].tolist()  # 1 W for 20 s [J]
+    [20.0]
+    >>> bool(abs(run.energy_residual).max() < 1e-9)
+    True
+    >>> slope = -0.5 * run.time / 100**2 * 2 * np.exp(-run.time * 0.5 / 100)  # d/dC of 300 + 2 (1 - exp(-t G/C))
+    >>> bool(np.allclose(run.sensitivity[:, 0, 0], slope))
+    True
     """
     eq = equations(system)
     u = held_inputs(eq, record)
@@ -173,11 +190,13 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
                          expected=f"at most {_DENSE_STATES} states",
                          remedy="Reduce the model first (rt.thermal.reduce), or difference two simulations.")
     everything = np.arange(len(system.lumps))
-    run = run_implicit(eq, start_state(eq, record, initial, everything.size), u, record.sample_time, tolerance, everything)
+    start = start_state(eq, record, initial, everything.size)
+    run = run_implicit(eq, start, u, record.sample_time, tolerance, everything)
     measured = run.lumps[:, [system.lump_names.index(s.lump) for s in system.sensors.values()]]
     readings = read_sampled(eq, measured, record.sample_time)
-    return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat, _heater_heat(eq, record, u),
-                      run.electrical_energy, (), np.zeros((len(u), readings.shape[1], 0)), "implicit")
+    return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
+                      _heater_heat(eq, record, u), run.electrical_energy, (),
+                      np.zeros((len(u), readings.shape[1], 0)), "implicit")
 
 
 def is_small(eq: Equations) -> bool:
@@ -198,10 +217,11 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
         slopes = along.along(path, u, start_slope(eq, record, initial, names, integrator.nz))
     meters = path.z[:, n + lags:]
     states, h = path.z[:, :n + lags], record.sample_time
-    by_rate = any(s.delay for s in eq.system.sensors.values()) or any(n.endswith((".delay", ".time_constant")) for n in names)
+    delayed = any(s.delay for s in eq.system.sensors.values())
+    by_rate = delayed or any(n.endswith((".delay", ".time_constant")) for n in names)
     rates = _rates(eq, states, u) if by_rate else None
     readings = read_sensors(eq, states, rates, h)
-    sensitivity = np.zeros((len(u), readings.shape[1], 0))
+    sensitivity: Array = np.zeros((len(u), readings.shape[1], 0))
     if slopes is not None:
         held = held_slope(eq, record, names)
         rate_slopes = rates and _rate_slopes(eq, states, u, slopes, names, held)

@@ -14,7 +14,7 @@ from ._continuation import Curve, follow
 from ._equations import Equations
 from ._regulated import regulated_feedback
 from ._system import System, equations
-from ._terms import Array
+from ._terms import Array, Indices
 
 _COLDEST, _HOTTEST = 100.0, 1500.0  # K: beyond, the model means nothing
 
@@ -87,8 +87,8 @@ class SteadyState:
         return ax
 
 
-def steady_state(system: System, inputs: Mapping[str, float] | None = None, *, setpoint: Mapping[str, float] | None = None,
-                 heat: Mapping[str, float] | None = None) -> SteadyState:
+def steady_state(system: System, inputs: Mapping[str, float] | None = None, *,
+                 setpoint: Mapping[str, float] | None = None, heat: Mapping[str, float] | None = None) -> SteadyState:
     """Find the steady states of a system.
 
     Parameters
@@ -140,8 +140,8 @@ def _outcome(found: tuple[Equilibrium, ...], curve: Curve, problem: _Problem) ->
         return Outcome(True, "found", f"{len(found)} steady state{'s' * (len(found) > 1)}, {stable} of them stable.")
     if problem.held.size:
         return Outcome(False, "none", "None: the load is above q*, what the modules can take at these set-points. The "
-                       f"largest share of set-point change and load that has an equilibrium is {curve.reached:.3f}. Raise "
-                       "the set-point, lower the load, or cool the hot side better.")
+                       f"largest share of set-point change and load that has an equilibrium is {curve.reached:.3f}. "
+                       "Raise the set-point, lower the load, or cool the hot side better.")
     return Outcome(False, "none", "None: these currents drive a thermal runaway; the largest share of them that has an "
                    f"equilibrium is {curve.reached:.3f}. Lower the currents or cool the hot side better.")
 
@@ -152,15 +152,15 @@ class _Problem:
 
     eq: Equations
     u: Array
-    held: Array  # regulated lumps (indices)
-    modules: Array  # their modules
+    held: Indices  # regulated lumps
+    modules: Indices  # their modules
     target: Array  # their set-points [K]
     heat: Array
 
-    def free(self) -> Array:
+    def free(self) -> Indices:
         return np.setdiff1d(np.arange(len(self.eq.capacity)), self.held)
 
-    def columns(self) -> Array:
+    def columns(self) -> Indices:
         """Columns of u that hold the currents of the regulating modules."""
         return len(self.eq.system.inputs) + self.modules
 
@@ -206,7 +206,8 @@ class _Problem:
         slowest = float(np.linalg.eigvals(matrix).real.max()) if len(matrix) else -np.inf
         first = len(self.eq.system.inputs)
         return Equilibrium(dict(zip(self.eq.system.lump_names, x.tolist(), strict=True)),
-                           dict(zip(self.eq.system.module_names, u[first:].tolist(), strict=False)), slowest < 0, slowest)
+                           dict(zip(self.eq.system.module_names, u[first:].tolist(), strict=False)),
+                           slowest < 0, slowest)
 
 
 def _rest(eq: Equations, problem: _Problem) -> Array:
@@ -227,16 +228,19 @@ def exogenous_point(eq: Equations, inputs: Mapping[str, float]) -> Array:
             raise InputError(f"{name!r} is not a heater, module or ambient", where="argument inputs",
                              expected="one of " + ", ".join(names))
         if not np.isfinite(value) or (name in eq.system.ambients and value < 150):
-            raise InputError(f"{name} = {value}", where="argument inputs", expected="a finite number, kelvin for ambients")
+            raise InputError(f"{name} = {value}", where="argument inputs",
+                             expected="a finite number, kelvin for ambients")
         u[names.index(name)] = value
     return u
 
 
-def _regulated(eq: Equations, setpoint: Mapping[str, float], inputs: Mapping[str, float]) -> tuple[Array, Array, Array]:
+def _regulated(eq: Equations, setpoint: Mapping[str, float],
+               inputs: Mapping[str, float]) -> tuple[Indices, Indices, Array]:
     modules = eq.system.modules
     for name, value in setpoint.items():
         if name not in modules:
-            raise InputError(f"{name!r} is not a module", where="argument setpoint", expected="one of " + ", ".join(modules))
+            raise InputError(f"{name!r} is not a module", where="argument setpoint",
+                             expected="one of " + ", ".join(modules))
         if not np.isfinite(value) or value < 150:
             raise InputError(f"set-point of {name} is {value}", where="argument setpoint", expected="kelvin",
                              remedy="Add 273.15 to degrees Celsius.")
@@ -254,6 +258,7 @@ def _vector(values: Mapping[str, float], names: tuple[str, ...], argument: str, 
     out = np.zeros(len(names))
     for name, value in values.items():
         if name not in names or not np.isfinite(value):
-            raise InputError(f"{name} = {value}", where=f"argument {argument}", expected=f"a {kind} and a finite number")
+            raise InputError(f"{name} = {value}", where=f"argument {argument}",
+                             expected=f"a {kind} and a finite number")
         out[names.index(name)] = value
     return out

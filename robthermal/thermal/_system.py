@@ -196,8 +196,8 @@ class System(Part):
 def equations(system: System) -> Equations:
     """Equations of a system, refusing what is not one."""
     if not isinstance(system, System):
-        raise InputError(f"system is a {type(system).__name__}", where="argument system", expected="a robthermal.System",
-                         remedy="Read one with rt.read_system(path).")
+        raise InputError(f"system is a {type(system).__name__}", where="argument system",
+                         expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
     return Equations(system)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,13 @@ class Slopes:
 class Term(Protocol):
     """Heat between pairs of nodes."""
 
-    a: NDArray[np.intp]
-    b: NDArray[np.intp]
+    @property
+    def a(self) -> Indices:
+        """First node of every pair."""
+
+    @property
+    def b(self) -> Indices:
+        """Second node of every pair."""
 
     def heat(self, Ta: Array, Tb: Array, current: Array) -> tuple[Array, Array]:
         """Heat into a and into b [W]."""
@@ -52,8 +58,8 @@ class ModuleTerm:
     S, R, K at T_avg = (T_h + T_c)/2: Evers (5.4)-(5.5), (5.13), corrected.
     """
 
-    a: NDArray[np.intp]
-    b: NDArray[np.intp]
+    a: Indices
+    b: Indices
     S: Array
     S_slope: Array
     R: Array
@@ -127,8 +133,8 @@ class ModuleTerm:
 class NaturalTerm:
     """Natural convection: gain |dT|^exponent dT from the warmer to the colder node."""
 
-    a: NDArray[np.intp]
-    b: NDArray[np.intp]
+    a: Indices
+    b: Indices
     gain: Array
     exponent: Array
 
@@ -157,8 +163,8 @@ class NaturalTerm:
 class RadiationTerm:
     """Radiation: coefficient (T_a⁴ - T_b⁴), kelvin."""
 
-    a: NDArray[np.intp]
-    b: NDArray[np.intp]
+    a: Indices
+    b: Indices
     coefficient: Array
 
     def heat(self, Ta: Array, Tb: Array, current: Array) -> tuple[Array, Array]:

@@ -89,12 +89,14 @@ def network(side=316, steps=1000):
     links += [{"between": (f"x{i}", "room"), "conductance": 0.1} for i in rim]
     middle = f"x{number[side // 2, side // 2]}"
     start = time.perf_counter()
-    system = rt.System(ambients={"room": {"temperature": 293.15}}, lumps={f"x{i}": {"capacity": 1.0} for i in number.ravel()},
+    system = rt.System(ambients={"room": {"temperature": 293.15}},
+                       lumps={f"x{i}": {"capacity": 1.0} for i in number.ravel()},
                        links=links, inputs={"laser": {"lump": middle}}, sensors={"T": {"lump": middle}})
     row("build the System", time.perf_counter() - start, f"{len(links)} links")
     rng = np.random.default_rng(1)
     power = np.repeat(rng.uniform(0, 20, steps // 20), 20)
-    record = rt.Record(sample_time=1.0, inputs=power, outputs=np.zeros((steps, 0)), input_names=["laser"], output_names=[])
+    record = rt.Record(sample_time=1.0, inputs=power, outputs=np.zeros((steps, 0)), input_names=["laser"],
+                       output_names=[])
     start = time.perf_counter()
     run = rt.thermal.simulate(system, record, tolerance=1e-3)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

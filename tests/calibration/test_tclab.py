@@ -6,7 +6,6 @@ import importlib.util
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
 import robthermal as rt
@@ -45,12 +44,13 @@ def two_heaters(measured: Path) -> rt.calibration.Fit:
     return module.fit(module.read_run(measured, module.TRAINING), module.read_run(measured, module.HEATER_1))
 
 
-def test_two_heater_model_fits_its_run_and_free_runs_t1(two_heaters: rt.calibration.Fit) -> None:
+def test_two_heater_model_fits_its_run_and_free_runs_the_other(two_heaters: rt.calibration.Fit) -> None:
     assert two_heaters.rmse["T1"] <= 0.70 and two_heaters.rmse["T2"] <= 0.75
-    assert two_heaters.validation_rmse["T1"] <= 1.0
-    assert np.isfinite(two_heaters.validation_rmse["T2"])
+    assert two_heaters.validation_rmse["T1"] <= 1.0 and two_heaters.validation_rmse["T2"] <= 0.6
 
 
-@pytest.mark.xfail(reason="T2 on the heater-1 run: 0.66 K, the aim is 0.6 K; the room of that day was not recorded")
-def test_two_heater_model_free_runs_t2(two_heaters: rt.calibration.Fit) -> None:
-    assert two_heaters.validation_rmse["T2"] <= 0.6
+def test_room_does_not_hang_on_the_window(measured: Path) -> None:
+    module = example("two_heaters")
+    runs = [module.read_run(measured, file) for file in (module.TRAINING, module.HEATER_1)]
+    rooms = [module.rest_value(runs, seconds) for seconds in (10.0, 15.0, 30.0)]
+    assert max(rooms) - min(rooms) < 0.25  # half a step of the converter

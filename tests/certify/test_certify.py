@@ -11,7 +11,8 @@ import robthermal as rt
 BOX = (278.15, 358.15)
 # errata, "Largest |I| certified on the 18-lump setup": symmetric, cooling, heating
 TABLE = {
-    ("varying", "energy"): (2.72, 5.51, 2.72), ("varying", "sum"): (2.54, 5.54, 2.72), ("varying", "max"): (2.18, 5.22, 2.62),
+    ("varying", "energy"): (2.72, 5.51, 2.72), ("varying", "sum"): (2.54, 5.54, 2.72),
+    ("varying", "max"): (2.18, 5.22, 2.62),
     ("constant", "energy"): (4.93, 17.04, 4.93), ("constant", "sum"): (4.10, 13.5, 4.58),
     ("constant", "max"): (4.10, 13.5, 4.58)}
 FROZEN = {"varying": (2.73, 5.55, 2.73), "constant": (4.94, 17.05, 4.94)}
@@ -50,7 +51,8 @@ def test_beyond_the_limit_nothing_is_certified(systems, method):
 def random_system(rng):
     n = int(rng.integers(2, 7))
     links = [{"between": (f"x{i}", f"x{i + 1}"), "conductance": rng.uniform(0.1, 5)} for i in range(n - 1)]
-    links += [{"between": (f"x{i}", "room"), "conductance": rng.uniform(0.01, 1)} for i in range(n) if rng.random() < 0.6]
+    links += [{"between": (f"x{i}", "room"), "conductance": rng.uniform(0.01, 1)}
+              for i in range(n) if rng.random() < 0.6]
     links.append({"between": ("x0", "room"), "conductance": rng.uniform(0.05, 1), "name": "sure"})
     a, b = (int(i) for i in rng.choice(n, 2, replace=False))
     module = {"hot": f"x{a}", "cold": f"x{b}", "reference_temperature": 300.0,

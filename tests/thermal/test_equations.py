@@ -18,8 +18,9 @@ def test_heat_is_the_balance_written_by_hand(point):
     plate, hot, cold, sample = x
     dT = 0.5 * (hot + cold) - 303.15
     S, R, K = 0.05 + 7e-5 * dT, 3.0 + 0.015 * dT, 0.4 + 0.001 * dT
-    to_room = 0.05 * (room - sample) + 0.03 * abs(room - sample) ** 0.25 * (room - sample) + 2e-10 * (room**4 - sample**4)
-    shine = 0.02 * (plate - sample) + 0.01 * abs(plate - sample) ** 0.3 * (plate - sample) + 1e-10 * (plate**4 - sample**4)
+    up, over = room - sample, plate - sample
+    to_room = 0.05 * up + 0.03 * abs(up) ** 0.25 * up + 2e-10 * (room**4 - sample**4)
+    shine = 0.02 * over + 0.01 * abs(over) ** 0.3 * over + 1e-10 * (plate**4 - sample**4)
     expected = [
         1.2 * (sink - plate) + 9 * (hot - plate) - shine,
         9 * (plate - hot) + S * hot * current + 0.5 * R * current**2 + K * (cold - hot),

@@ -47,7 +47,8 @@ def test_modules_on_separate_sinks_have_their_own_limits():
     a, b = single(0.689), single(2.0)
     both = rt.System(ambients=a.ambients, lumps={"h1": {"capacity": 10.0}, "c1": {"capacity": 5.0},
                                                  "h2": {"capacity": 10.0}, "c2": {"capacity": 5.0}},
-                     links=[{"between": ("h1", "w"), "conductance": 0.689}, {"between": ("h2", "w"), "conductance": 2.0},
+                     links=[{"between": ("h1", "w"), "conductance": 0.689},
+                            {"between": ("h2", "w"), "conductance": 2.0},
                             {"between": ("c1", "c2"), "conductance": 0.3}],
                      modules={"m1": {"hot": "h1", "cold": "c1", "seebeck": S, "resistance": R, "conductance": K},
                               "m2": {"hot": "h2", "cold": "c2", "seebeck": S, "resistance": R, "conductance": K}})
