@@ -115,6 +115,63 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
 
 
 @app.command()
+def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machine.")],
+        system: Annotated[Path | None, typer.Option("--system", help="System file: columns and poles.")] = None,
+        inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeat for several.")] = None,
+        outputs: Annotated[list[str] | None, typer.Option("--output", help="Output column; repeat for several.")] = None,
+        method: Annotated[str, typer.Option(help="etfe, spectral, lpm, lrm or lrmp.")] = "lpm",
+        half_width: Annotated[int, typer.Option(help="Bins on each side of a local window.")] = 8,
+        degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
+        poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
+        band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
+        out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).")] = Path("frf.json"),
+        plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png).")] = None,
+        as_json: Json = False) -> None:
+    """Estimate a frequency response with its covariance, from records that need not be in steady state.
+
+    Example: robthermal frf run1.csv run2.csv --system setup.toml --method lrmp --out frf.json --plot frf.svg
+    """
+    model = rt.read_system(system) if system else None
+    with _progress() as say:
+        say("estimating the frequency response")
+        G = rt.project.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [], method=method,
+                                         half_width=half_width, degree=degree, poles=poles or [], band=band)
+    G.save(out)
+    if plot:
+        G.plot().flat[0].figure.savefig(plot)
+    summary = {"out": str(out), "method": G.method, "bins": len(G), "inputs": list(G.input_names),
+               "outputs": list(G.output_names), "suspect_bins": int(G.suspect.sum()), "notes": list(G.notes)}
+    _print(summary, as_json, lambda: _text(str(G), *G.notes, f"frequency response: {out}"))
+
+
+@app.command()
+def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.", metavar="NAME...")],
+               period: Annotated[int, typer.Option(help="Samples in a period.")],
+               sample_time: Annotated[float, typer.Option(help="[s].")],
+               band: Annotated[tuple[float, float], typer.Option(help="Excited frequencies [Hz].", metavar="LO HI")],
+               amplitude: Annotated[float, typer.Option(help="Largest deviation from the mean [unit of the inputs].")],
+               periods: Annotated[int, typer.Option(help="How many periods.")] = 1,
+               nonnegative: Annotated[bool, typer.Option("--nonnegative", help="No value below zero (heaters).")] = False,
+               arrangement: Annotated[str, typer.Option(help="orthogonal, zippered or independent.")] = "orthogonal",
+               seed: Annotated[int, typer.Option(help="Of the random phases.")] = 0,
+               system: Annotated[Path | None, typer.Option("--system", help="System file, for the design check.")] = None,
+               out: Annotated[Path, typer.Option("--out", help="Record to write.")] = Path("excitation.csv"),
+               as_json: Json = False) -> None:
+    """Design multisine inputs, and say before the experiment what they will leave unresolved.
+
+    Example: robthermal excitation m1 m2 --period 7200 --sample-time 1 --band 0.0005 0.1 --amplitude 0.5 --system setup.toml
+    """
+    model = rt.read_system(system) if system else None
+    u, design = rt.project.design_excitation(names, period=period, sample_time=sample_time, band=band, amplitude=amplitude,
+                                             periods=periods, nonnegative=nonnegative, arrangement=arrangement, seed=seed,
+                                             system=model)
+    files = rt.project.write_excitation(u, names, out)
+    summary = {"out": [str(file) for file in files], "outcome": design.outcome.text, "good": design.outcome.ok,
+               "crest_factors": u.crest_factors.max(axis=(0, 1)).tolist()}
+    _print(summary, as_json, lambda: _text(str(design), *(f"experiment: {file}" for file in files)))
+
+
+@app.command()
 def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
             temperature: Annotated[tuple[float, float] | None, typer.Option(
                 help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")] = None,

@@ -49,7 +49,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     train = make([0.0, 0.8, 0.3, 1.4, -0.4, 0.9, 0.2, 1.1], [0.0, 0.4, 1.1, 0.2, 1.3, -0.4, 0.7, 0.0],
                  900.0, 11, "train")
-    validation = make([0.5, 1.2, -0.3, 0.8], [1.0, 0.1, 0.7, 1.3], 900.0, 12, "validation")
+    validation = make([0.5, 0.9, 0.6, 1.0], [0.9, 0.5, 0.8, 0.4], 900.0, 12, "validation")
     for record in (train, validation):
         record.save(folder / f"{record.name}.csv", temperature_unit="degC",
                     temperatures=["room", *record.output_names])

@@ -4,45 +4,69 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..errors import Diverged, InputError, Outcome
+from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System
 from ._covariance import information
 from ._data import Data, as_data, refuse_same, refuse_short
 from ._directions import in_words
+from ._estimates import outcome_of
 from ._fit import Fit
+from ._innovations import has_disturbance, whitener
 from ._noise import LOSSES, Loss, declared_noise, estimated_noise, scipy_loss
-from ._problem import Problem, scaled
+from ._problem import Problem, Weigh, scaled
 from ._ranges import Choice, Ranges, chosen_ranges
+from ._response_fit import ResponseFit, calibrate_response
 from ._score import score_of, validate
 from ._start import STARTS, Start, initial_of
 from ._whiteness import whiteness_of
 
 Array = NDArray[np.float64]
+Method = Literal["output_error", "prediction_error"]
+METHODS = ("output_error", "prediction_error")
 _ROUNDS = 8  # of noise estimation
 _SETTLED = 0.01  # relative change of the noise levels
+_STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
 
 
+@overload
+def calibrate(system: System, data: FrequencyResponse, *, parameters: Choice = None, max_iterations: int = 50,
+              operating_point: Mapping[str, float] | None = None) -> ResponseFit: ...
+
+
+@overload
 def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Choice = None,
               validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
-              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50) -> Fit:
-    """Estimate parameters of a system from records: output error (free run), least squares, exact derivatives.
+              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
+              method: Method = "output_error") -> Fit: ...
+
+
+def calibrate(system: System, data: Record | Sequence[Record] | FrequencyResponse, *, parameters: Choice = None,
+              validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
+              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
+              method: Method = "output_error",
+              operating_point: Mapping[str, float] | None = None) -> Fit | ResponseFit:
+    """Estimate parameters of a system from records (exact derivatives) or a frequency response: least squares.
 
     Parameters
     ----------
     system : System
         With starting values.
-    data : Record or list of Record
-        Measured. Several records share the parameters; each has its own initial temperatures.
+    data : Record, list of Record, or FrequencyResponse
+        Measured. Several records share the parameters; each has its own initial temperatures. To a frequency response
+        the linearisation is fitted, weighted by its covariance, Evers (2.12); then only `parameters`, `max_iterations`
+        and `operating_point` apply.
     parameters : iterable of str or mapping, optional
         What may change: names from the system's fit table, or a mapping from name to (lower, upper) or `FitRange`, in
-        the unit of the parameter, temperatures in kelvin. A tuple of names as key ties them: they share one value, which
-        the result calls "a = b". Default: the whole fit table.
+        the unit of the parameter, temperatures in kelvin. A tuple of names as key ties them to one value,
+        called "a = b" in the result. Default: the whole fit table.
     validation : Record or list of Record, optional
         Data the fit does not see; free runs on them are scored, with initial temperatures from their first tenth.
     initial : {"free", "measured", "system"}
@@ -55,10 +79,16 @@ def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Ch
         reading; where the declaration is 0 it is estimated from the residuals.
     max_iterations : int
         Limit of the optimiser's steps.
+    method : {"output_error", "prediction_error"}
+        What is made small: the residuals of a free run, or the innovations of a Kalman filter, which knows the lumps'
+        `disturbance` and the sensors' noise (which must then be declared). Without any disturbance both are the same.
+    operating_point : mapping, optional
+        For a frequency response of a nonlinear system: heaters [unit], module currents [A] and ambients [K] at whose
+        steady state it was measured; default off and nominal.
 
     Returns
     -------
-    Fit
+    Fit or ResponseFit
 
     Raises
     ------
@@ -83,7 +113,13 @@ def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Ch
     >>> round(fit.parameters["lumps.bar.capacity"]), fit.outcome.code
     (100, 'converged')
     """
-    _check_options(system, initial, loss, max_iterations)
+    _check_options(system, initial, loss, max_iterations, method)
+    if isinstance(data, FrequencyResponse):
+        _refuse_time_options(validation, initial, loss, noise, method)
+        return calibrate_response(system, data, parameters, operating_point or {}, max_iterations)
+    if operating_point is not None:
+        raise InputError("operating_point is given with a record", where="argument operating_point",
+                         remedy="Leave it out: a record brings its own inputs.")
     ranges = chosen_ranges(system, parameters)
     training = as_data(system, data, "data")
     unseen = as_data(system, validation, "validation") if validation is not None else []
@@ -93,7 +129,10 @@ def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Ch
     refuse_short(training, len(ranges.names))
     problem = Problem(system, training, ranges, starts)
     levels = declared_noise(system, training, noise)
-    solution = _solve(problem, levels, loss, max_iterations)
+    filtered = method == "prediction_error" and has_disturbance(system)
+    if filtered:
+        _refuse_unknown_noise(levels)
+    solution = _solve(problem, levels, loss, max_iterations, filtered)
     return _result(problem, solution, unseen, initial, loss)
 
 
@@ -107,24 +146,34 @@ class Solution:
     iterations: int
 
 
-def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterations: int) -> Solution:
-    """Minimise; sensors without a declared noise are weighted by their residuals and the fit repeated."""
+def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool) -> Solution:
+    """Minimise; weights that depend on the fit (an undeclared noise, a filter) are renewed and the fit repeated."""
     unknown = [name for name, level in declared.items() if not level]
     v = problem.v0
     noise = dict(declared) | _levels(problem, v, unknown, loss)
     _refuse_idle(problem, v)
     left, enough = max_iterations, min(1e-6, 0.01 / problem.n_readings)  # of the cost: a small part of its own scatter
     for _ in range(_ROUNDS):
-        problem.weigh = [scaled(np.array([noise[name] for name in one.sensors])) for one in problem.data]
+        problem.weigh = _weights(problem, v, noise, filtered)
         run = least_squares(problem.vector, v, problem.jacobian, bounds=problem.bounds, x_scale="jac",
                             loss=scipy_loss(loss, problem.n_readings), max_nfev=left, ftol=enough, xtol=1e-9, gtol=1e-9)
+        moved = np.abs(run.x - v)[:len(problem.ranges.names)] / problem.ranges.unit
         v, left = run.x, left - run.nfev
         new = _levels(problem, v, unknown, loss)
         settled = all(abs(new[name] / noise[name] - 1.0) < _SETTLED for name in unknown)
+        settled = settled and not (filtered and moved.max() > _STILL)
         if settled or left < 1 or run.status == 0:
             break
         noise |= new
     return Solution(v, noise, run.status > 0 and settled, max_iterations - left)
+
+
+def _weights(problem: Problem, v: Array, noise: dict[str, float], filtered: bool) -> list[Weigh]:
+    levels = [np.array([noise[name] for name in one.sensors]) for one in problem.data]
+    if not filtered:
+        return [scaled(level) for level in levels]
+    systems = problem.systems(v)
+    return [whitener(system, one, level) for system, one, level in zip(systems, problem.data, levels, strict=True)]
 
 
 def _levels(problem: Problem, v: Array, unknown: list[str], loss: Loss) -> dict[str, float]:
@@ -160,13 +209,14 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
         validation_temperatures=tuple(_by_lump(system, T) for T, _ in checks),
         train=tuple(score_of(one, r) for one, r in zip(problem.data, residuals, strict=True)),
         validation=tuple(score_of(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
-        whiteness={name: whiteness_of([r[:, one.sensors.index(name)] for one, r
-                                       in zip(problem.data, residuals, strict=True) if name in one.sensors])
+        whiteness={name: whiteness_of([weigh(r)[:, one.sensors.index(name)] for one, r, weigh
+                                       in zip(problem.data, residuals, problem.weigh, strict=True)
+                                       if name in one.sensors])
                    for name in solution.noise},
         iterations=solution.iterations,
         outcome=Outcome(True, "converged", ""),
     )
-    return replace(fit, outcome=_outcome(fit, solution))
+    return replace(fit, outcome=outcome_of(fit, solution.converged))
 
 
 def _by_sensor(one: Data, values: Array) -> dict[str, Array]:
@@ -177,30 +227,33 @@ def _by_lump(system: System, temperatures: Array) -> dict[str, float]:
     return dict(zip(system.lump_names, temperatures.tolist(), strict=True))
 
 
-def _outcome(fit: Fit, solution: Solution) -> Outcome:
-    if not solution.converged:
-        return Outcome(False, "not_converged", f"Stopped after {solution.iterations} iterations without converging. "
-                       "Raise max_iterations, start closer, or calibrate fewer parameters.")
-    if fit.undetermined:
-        return Outcome(False, "undetermined", f"Converged, but the data leave open: {'; '.join(fit.undetermined)}. "
-                       "Fix one of these parameters, give it a prior (sigma), or excite the system differently.")
-    stuck = [name for name, at in zip(fit.parameters, fit.at_bound, strict=True) if at]
-    if stuck:
-        return Outcome(True, "at_bound", f"Converged with {', '.join(stuck)} at a bound; standard deviations there "
-                       "ignore the bound. Widen it if the physics allow, else doubt the structure of the model.")
-    return Outcome(True, "converged", f"Converged in {solution.iterations} iterations.")
-
-
-def _check_options(system: System, initial: str, loss: str, max_iterations: int) -> None:
+def _check_options(system: System, initial: str, loss: str, max_iterations: int, method: str) -> None:
     if not isinstance(system, System):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
-    for name, value, allowed in (("initial", initial, STARTS), ("loss", loss, LOSSES)):
+    for name, value, allowed in (("initial", initial, STARTS), ("loss", loss, LOSSES), ("method", method, METHODS)):
         if value not in allowed:
             raise InputError(f"{name} is {value!r}", where=f"argument {name}", expected="one of " + ", ".join(allowed))
     if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
         raise InputError(f"max_iterations is {max_iterations!r}", where="argument max_iterations",
                          expected="a positive whole number")
+
+
+def _refuse_time_options(validation: object, initial: str, loss: str, noise: object, method: str) -> None:
+    given = {"validation": validation is not None, "initial": initial != "free", "loss": loss != "linear",
+             "noise": noise is not None, "method": method != "output_error"}
+    for name in (name for name, said in given.items() if said):
+        raise InputError(f"{name} is given with a frequency response", where=f"argument {name}",
+                         expected="parameters, max_iterations and operating_point only",
+                         remedy="Leave it out, or calibrate on the record itself.")
+
+
+def _refuse_unknown_noise(levels: Mapping[str, float]) -> None:
+    unknown = [name for name, level in levels.items() if not level]
+    if unknown:
+        raise InputError(f"the noise of sensor {unknown[0]!r} is not declared", where="argument method",
+                         expected="declared noise of every sensor: a filter weighs it against the lumps' disturbance",
+                         remedy=f'Give `noise` in [sensors.{unknown[0]}], or pass noise={{"{unknown[0]}": 0.1}}.')
 
 
 def _refuse_double_start(ranges: Ranges, initial: Start) -> None:

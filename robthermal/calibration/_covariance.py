@@ -11,6 +11,7 @@ from scipy.linalg import eigh
 from ._autoregression import correlation_of
 from ._noise import Loss, score, score_slope
 from ._problem import Problem
+from ._ranges import Ranges
 
 Array = NDArray[np.float64]
 _ZERO = 1e-12  # relative eigenvalue that is rounding
@@ -63,7 +64,7 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
                         for X, own in (starts[i] for i in alike) if X.shape[2])
         power += sum(float(np.sum(e**2)) for e in psi)
     absorbed += float(np.trace(np.linalg.pinv(H, rcond=_ZERO, hermitian=True) @ meat))
-    return _with_priors(problem, v, H, G2 + meat * _inflation(power, absorbed))
+    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * _inflation(power, absorbed))
 
 
 def _same_sensors(problem: Problem) -> list[list[int]]:
@@ -82,15 +83,16 @@ def _inflation(power: float, absorbed: float) -> float:
     return power / max(power - absorbed, power / 4.0) if power else 1.0
 
 
-def _with_priors(problem: Problem, v: Array, H: Array, M: Array) -> Information:
-    unit = problem.ranges.unit
+def with_priors(ranges: Ranges, values: Array, H: Array, M: Array) -> Information:
+    """H⁻¹ M H⁻¹ with the priors added to both; H and M are of the data alone, (p, p), in coordinates."""
+    unit = ranges.unit
     scale = np.outer(unit, unit)
-    H, M, P = H * scale, M * scale, problem.prior_information(v) * scale
+    H, M, P = H * scale, M * scale, np.diag(ranges.prior_slopes(values) ** 2) * scale
     values, vectors = eigh(H)
     spread = np.array([_variance(value, vector, M, values[-1])
                        for value, vector in zip(values, vectors.T, strict=True)])
     open_ = tuple(vectors[:, i] for i in np.flatnonzero(spread > 1.0))
-    bounds = np.diag((unit / problem.ranges.spread) ** 2)
+    bounds = np.diag((unit / ranges.spread) ** 2)
     H, M = H + P, M + P
     for direction in open_:  # no prior either: as uncertain as its bounds
         if direction @ P @ direction < direction @ bounds @ direction:

@@ -99,9 +99,9 @@ class Problem:
             free = list(start_values(system, start.mean)) if start.n_free else []
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
-            J = run.sensitivity[:, one.columns]
+            J: Array = np.asarray(run.sensitivity[:, one.columns], np.float64)
             by_start: Array = np.multiply(J[..., len(flat):], start.sigma)
-            by_parameter = self.ranges.joined(J[..., :len(flat)]) * slopes
+            by_parameter: Array = np.multiply(self.ranges.joined(J[..., :len(flat)]), slopes)
             out.append(Run(run.readings[:, one.columns] - one.readings, by_parameter, by_start))
         return out
 
@@ -123,21 +123,12 @@ class Problem:
             J[rows, :p] = weigh(run.by_parameter).reshape(run.residual.size, p)
             J[rows, column:column + start.n_free] = weigh(run.by_start).reshape(run.residual.size, start.n_free)
             row, column = rows.stop, column + start.n_free
-        J[row + np.arange(known.sum()), np.flatnonzero(known)] = (self._prior_slope(v))[known]
+        J[row + np.arange(known.sum()), np.flatnonzero(known)] = self.ranges.prior_slopes(self.parameters(v))[known]
         J[row + int(known.sum()):, p:] = np.eye(v.size - p)
         return J
 
     def _prior(self, v: Array) -> Array:
-        known = np.isfinite(self.ranges.sigma)
-        away = (self.parameters(v) - self.ranges.start)[known] / self.ranges.sigma[known]
-        return np.concatenate([away, v[len(self.ranges.names):]])
-
-    def _prior_slope(self, v: Array) -> Array:
-        return self.ranges.slopes(self.parameters(v)) / self.ranges.sigma
-
-    def prior_information(self, v: Array) -> Array:
-        """Information of the parameters' priors in the coordinates, (p, p)."""
-        return np.diag(self._prior_slope(v) ** 2)
+        return np.concatenate([self.ranges.prior(self.parameters(v)), v[len(self.ranges.names):]])
 
 
 def scaled(noise: Array) -> Weigh:

@@ -14,7 +14,8 @@ from ..thermal import FitRange, System
 
 Array = NDArray[np.float64]
 Key = str | tuple[str, ...]
-Choice = Iterable[str] | Mapping[Key, tuple[float, float] | FitRange] | Mapping[str, tuple[float, float] | FitRange] | None
+Limits = tuple[float, float] | FitRange
+Choice = Iterable[str] | Mapping[Key, Limits] | Mapping[str, Limits] | None
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,18 @@ class Ranges:
         return {name: float(value) for group, value in zip(self.members, values, strict=True) for name in group}
 
     def joined(self, sensitivity: Array) -> Array:
-        """Derivative by each estimated value, (..., p), from that by each of the system's parameters, (..., len(flat))."""
+        """Derivative (..., p) by each estimated value, from that (..., len(flat)) by every member."""
         owner = np.repeat(np.arange(len(self.members)), [len(group) for group in self.members])
         return sensitivity @ (owner[:, None] == np.arange(len(self.members))).astype(float)
+
+    def prior(self, values: Array) -> Array:
+        """Distance from the priors' centres, of the parameters that have one, in standard deviations."""
+        known = np.isfinite(self.sigma)
+        return (values - self.start)[known] / self.sigma[known]
+
+    def prior_slopes(self, values: Array) -> Array:
+        """Derivative of `prior` by the coordinates, (p,); 0 without a prior."""
+        return self.slopes(values) / self.sigma
 
     @property
     def unit(self) -> Array:
@@ -113,7 +123,7 @@ def _table(system: System, parameters: Choice) -> dict[Key, FitRange]:
             raise InputError("nothing to calibrate: the system has no fit table", where="argument parameters",
                              remedy="Add [fit] to the system file, or pass a mapping, "
                                     'parameters={"links.a-b.conductance": (0.1, 10.0)}.')
-        return dict(system.fit)
+        return {name: limits for name, limits in system.fit.items()}
     if isinstance(parameters, str):
         raise InputError(f"parameters is the text {parameters!r}", where="argument parameters",
                          expected="a list of names or a mapping from name to (lower, upper)",
@@ -139,7 +149,7 @@ def _listed(system: System, name: str) -> FitRange:
     return system.fit[name]
 
 
-def _as_range(name: Key, limits: tuple[float, float] | FitRange) -> FitRange:
+def _as_range(name: Key, limits: Limits) -> FitRange:
     if isinstance(limits, FitRange):
         return limits
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -11,19 +12,23 @@ from ..thermal import System
 from ..verification import Certificate, establish, not_certified
 from ._energy import energy_rate
 from ._jacobian import box_jacobian
-from ._sections import Currents, Temperatures, made_by, region_section, system_section
+from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, short_matrices
+from ._polytope import MOST
+from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
 from ._weights import best_weights
 
-Method = Literal["energy", "sum", "max"]
-METHODS = ("energy", "sum", "max")
+Method = Literal["energy", "sum", "max", "lyapunov"]
+METHODS = ("energy", "sum", "max", "lyapunov")
 _SLACK = (1e-6, 1e-4, 1e-2, 0.1, 0.5)  # share of the rate given up when a proof fails, tried in turn
 _SMALLEST = 1e-12  # 1/s: a rate below this is not claimed
 _SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "HiGHS linear program",
-            "max": "HiGHS linear program"}
+            "max": "HiGHS linear program", "lyapunov": "Clarabel semidefinite program, cutting planes"}
+_Found = tuple[float, Iterator[dict[str, Any]]]  # rate, and ever more accurate evidence for it
 
 
-def contraction(system: System, *, current: Currents, temperature: Temperatures,
-                method: Method = "energy") -> Certificate:
+def contraction(system: System, *, current: Currents, temperature: Temperatures, method: Method = "energy",
+                parameters: Mapping[str, Interval] | None = None, structure: Structure = "full",
+                large: bool = False) -> Certificate:
     """Certify that a network contracts for every temperature and current in a box.
 
     Parameters
@@ -34,8 +39,16 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
         {module: (lower, upper)} [A], every module; modules vary independently.
     temperature : tuple or mapping
         (lower, upper) for every lump independently, or {lump: (lower, upper)} [K].
-    method : {"energy", "sum", "max"}
-        Norm: V = eᵀEe, weighted l₁ (cᵀJ < 0), weighted l∞ (J d < 0).
+    method : {"energy", "sum", "max", "lyapunov"}
+        Norm: V = eᵀEe, weighted l₁ (cᵀJ < 0), weighted l∞ (J d < 0), V = eᵀPe.
+    parameters : mapping, optional
+        Uncertain numbers of the system, {parameter name: (lower, upper)} in their own units: capacities of lumps,
+        conductances of links, values and slopes of modules. The claim then covers every combination.
+    structure : {"full", "block"}
+        Method "lyapunov": any P, or one without entries between hot side, cold side and the faces of the modules,
+        Evers (2021), (5.20).
+    large : bool
+        Method "lyapunov": search a dense P for more than 40 lumps too, which may take hours.
 
     Returns
     -------
@@ -45,7 +58,7 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     Raises
     ------
     InputError
-        Boxes that do not fit the system, Celsius, unknown method.
+        Boxes that do not fit the system, Celsius, unknown method or parameter, a large system with method "lyapunov".
 
     References
     ----------
@@ -61,33 +74,58 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     (True, True)
     """
     if method not in METHODS:
-        raise InputError(f"method = {method!r}", where="argument method", expected='"energy", "sum" or "max"')
+        raise InputError(f"method = {method!r}", where="argument method",
+                         expected='"energy", "sum", "max" or "lyapunov"')
     system_part = system_section(system)
-    region = region_section(system, current, temperature)
+    region = region_section(system, current, temperature, parameters)
     parts: dict[str, Any] = {"system": system_part, "region": region}
-    box = box_jacobian(system, region)
-    if method == "energy":
-        rate, weights = energy_rate(box), None
+    if method == "lyapunov":
+        check_choice(system, structure, large)
+        rate, evidence = _with_matrix(system, region, structure)
     else:
-        found = best_weights(box, method)
-        weights, rate = found if found is not None else (None, -np.inf)
+        rate, evidence = _with_weights(system, region, method)
     if not rate > _SMALLEST:
         return not_certified("contraction", **parts, evidence={"method": method},
                              made_by=made_by(_SOLVERS[method], "none"), reason=_why_not(method, rate))
-    for slack in _SLACK:
-        evidence: dict[str, Any] = {"method": method, "rate": _short(rate * (1 - slack))}
-        if weights is not None:
-            evidence["weights"] = [_short(w) for w in weights / weights.max()]
-        cert = establish("contraction", **parts, evidence=evidence, made_by=made_by(_SOLVERS[method], "found"))
+    for slack, found in zip(_SLACK, evidence, strict=False):
+        cert = establish("contraction", **parts, made_by=made_by(_SOLVERS[method], _status(slack)),
+                         evidence={"method": method, "rate": _short(rate * (1 - slack)), **found})
         if cert.holds:
             return cert
     return cert
+
+
+def _with_weights(system: System, region: Mapping[str, Any], method: str) -> _Found:
+    box = box_jacobian(system, region)
+    if method == "energy":
+        return energy_rate(box), ({} for _ in _SLACK)
+    found = best_weights(box, method)
+    if found is None:
+        return -np.inf, iter(())
+    weights, rate = found
+    return rate, ({"weights": [_short(w) for w in weights / weights.max()]} for _ in _SLACK)
+
+
+def _with_matrix(system: System, region: Mapping[str, Any], structure: str) -> _Found:
+    found = best_matrix(box_jacobian(system, region, hull=True), block_pattern(system, structure))
+    if found is None:
+        return np.nan, iter(())
+    return found.rate, ({"matrix": matrix} for matrix in short_matrices(found.matrix))
+
+
+def _status(slack: float) -> str:
+    return f"found; {100 * slack:g} % of the rate given up for short decimals and the proof"
 
 
 def _why_not(method: str, rate: float) -> str:
     if method == "energy":
         return (f"at some vertex of the box the symmetric part of the Jacobian grows at {-rate:.3g} 1/s: V = eᵀEe does "
                 "not decay there. Narrow the current or temperature range (rt.certify.largest_current tells how far).")
+    if method == "lyapunov":
+        if np.isnan(rate):
+            return f"more than {MOST} joint vertices: too many for one matrix inequality; use energy, sum or max."
+        return ("no matrix P was found for which V = eᵀPe decays at every vertex of the box. Narrow the current or "
+                "temperature range (rt.certify.largest_current tells how far).")
     norm = "column" if method == "sum" else "row"
     return (f"the linear program finds no positive weights for which every {norm} sum is negative over the box. Narrow "
             "the current or temperature range (rt.certify.largest_current tells how far), or try another method.")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy.sparse import csr_array
 
 from ..thermal import Equations, System
 
+Array = NDArray[np.float64]
 _CURRENTS = 9  # samples of a current range where the blocks are not convex in it
 
 
@@ -54,44 +56,77 @@ class BoxJacobian:
     blocks: tuple[Block, ...]
 
 
-def box_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian:
-    """Picture of a system over the box of a certificate's region."""
-    eq = Equations(system)
+def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = False) -> BoxJacobian:
+    """Picture of a system over the box of a certificate's region.
+
+    ``hull`` takes the corners of the triangle around the curve (I, I²) instead of points of it, as the checker does
+    for a full matrix P. Uncertain capacities enter at their upper end, uncertain links as a block, uncertain modules as
+    more vertices.
+    """
+    parameters = region.get("parameters", {})
+    worst = system.with_parameters(
+        {name: high for name, (_, high) in parameters.items() if name.startswith("lumps.")}
+        | {name: low for name, (low, _) in parameters.items() if name.startswith("links.")})
+    eq = Equations(worst)
     index = {name: i for i, name in enumerate(system.lumps)}
     box = region["temperature"]
     ranges = {name: box[name] if isinstance(box, Mapping) else box for name in system.lumps}
     ends = {name: [a.temperature] * 2 for name, a in system.ambients.items()} | ranges
     base = eq.A.tolil()
     blocks: list[Block] = []
-    for name, module in system.modules.items():
+    for name, module in worst.modules.items():
         h, c, K = index[module.hot], index[module.cold], module.conductance.value
         base[h, h] += K
         base[c, c] += K
         base[h, c] -= K
         base[c, h] -= K
-        vertices = _module_vertices(module, ranges[module.hot], ranges[module.cold], region["current"][name])
-        blocks.append(Block(h, c, vertices))
-    for link in system.links:
+        points = _hull(region["current"][name]) if hull else _points(module, region["current"][name])
+        vertices = [_module_vertices(variant, ranges[module.hot], ranges[module.cold], points)
+                    for variant in _variants(worst, name, parameters)]
+        blocks.append(Block(h, c, np.concatenate(vertices)))
+    for link in worst.links:
+        a, b = link.between if link.between[0] in index else link.between[::-1]
+        low, high = parameters.get(f"links.{link.name}.conductance", (0.0, 0.0))
+        if high > low:
+            spread = (high - low) * np.array([[-1.0, 1.0], [1.0, -1.0]])
+            blocks.append(Block(index[a], index.get(b, -1), np.stack([0.0 * spread, spread])))
         if link.natural is not None or link.radiation is not None:
-            a, b = link.between
-            if a not in index:
-                a, b = b, a
-            vertices = _link_vertices(link, ends[a], ends[b], ambient=b not in index)
-            blocks.append(Block(index[a], index.get(b, -1), vertices))
+            slopes = _link_vertices(link, ends[a], ends[b], ambient=b not in index)
+            blocks.append(Block(index[a], index.get(b, -1), slopes))
     return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
 
 
-def _module_vertices(module: Any, hot: list[float], cold: list[float], current: list[float]) -> NDArray[np.float64]:
+def _variants(system: System, name: str, parameters: Mapping[str, Any]) -> list[Any]:
+    """A module at every combination of the ends of its uncertain parameters; its heat is affine in each of them."""
+    own = {key: sorted(set(pair)) for key, pair in parameters.items() if key.startswith(f"modules.{name}.")}
+    return [system.with_parameters(dict(zip(own, values, strict=True))).modules[name]
+            for values in product(*own.values())]
+
+
+def _points(module: Any, current: list[float]) -> Array:
+    """Points (I, I²) of a range: many where the blocks are not convex in the current."""
     low, high = current
     concave = module.resistance.slope < 0
     currents = np.linspace(low, high, _CURRENTS) if concave else np.unique([low, high, np.clip(0.0, low, high)])
-    grid = np.meshgrid(np.unique(hot), np.unique(cold), currents, indexing="ij")
-    Th, Tc, I = (g.ravel() for g in grid)  # noqa: E741 - I is the current
+    return np.stack([currents, currents**2], -1)
+
+
+def _hull(current: list[float]) -> Array:
+    """Corners of the triangle around the curve (I, I²): its ends, and where their tangents meet."""
+    low, high = current
+    corners = [[low, low**2], [high, high**2], [0.5 * (low + high), low * high]]
+    return np.array(corners if low < high else corners[:1])
+
+
+def _module_vertices(module: Any, hot: list[float], cold: list[float], points: Array) -> Array:
+    Th, Tc, at = (g.ravel() for g in np.meshgrid(np.unique(hot), np.unique(cold), np.arange(len(points)),
+                                                 indexing="ij"))
+    I, square = points[at.astype(int)].T  # noqa: E741 - I is the current
     dT = 0.5 * (Th + Tc) - module.reference_temperature
     S, dS = module.seebeck.value + module.seebeck.slope * dT, module.seebeck.slope
     dR, dK = module.resistance.slope, module.conductance.slope
     K = module.conductance.value + dK * dT
-    joule, bend = 0.25 * dR * I**2, 0.5 * dK * (Th - Tc)
+    joule, bend = 0.25 * dR * square, 0.5 * dK * (Th - Tc)
     hh, hc = -K - bend + S * I + 0.5 * dS * Th * I + joule, K - bend + 0.5 * dS * Th * I + joule
     cc, ch = -K + bend - S * I - 0.5 * dS * Tc * I + joule, K + bend - 0.5 * dS * Tc * I + joule
     return np.stack([np.stack([hh, hc], -1), np.stack([ch, cc], -1)], -2)

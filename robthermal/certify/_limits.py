@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate
 from ._contraction import METHODS, Method, contraction
 from ._energy import energy_rate
-from ._jacobian import box_jacobian
-from ._sections import Temperatures, region_section
+from ._jacobian import BoxJacobian, box_jacobian
+from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, largest_growth
+from ._polytope import MOST, Cuts, polytope
+from ._sections import Interval, Temperatures, region_section
 from ._weights import has_weights
 
 Direction = Literal["symmetric", "cooling", "heating"]
 _SPAN = {"symmetric": (-1.0, 1.0), "cooling": (0.0, 1.0), "heating": (-1.0, 0.0)}
 _HIGHEST = 1e4  # A
 _PRECISION = 1e-5
+_PRECISION_MATRIX = 2e-3  # every step may cost seconds
 
 
 @dataclass(frozen=True)
@@ -49,7 +56,8 @@ class CurrentLimit:
 
 
 def largest_current(system: System, *, temperature: Temperatures, direction: Direction = "symmetric",
-                    method: Method = "energy") -> CurrentLimit:
+                    method: Method = "energy", parameters: Mapping[str, Interval] | None = None,
+                    structure: Structure = "full", large: bool = False) -> CurrentLimit:
     """Find the largest current range that can be certified, with its certificate.
 
     Parameters
@@ -60,7 +68,9 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
         Box as in `contraction` [K].
     direction : {"symmetric", "cooling", "heating"}
         Range [-c, c], [0, c] or [-c, 0], the same for every module.
-    method : {"energy", "sum", "max"}
+    method : {"energy", "sum", "max", "lyapunov"}
+        As in `contraction`.
+    parameters, structure, large
         As in `contraction`.
 
     Returns
@@ -83,28 +93,57 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
         raise InputError(f"direction = {direction!r}", where="argument direction",
                          expected='"symmetric", "cooling" or "heating"')
     if method not in METHODS:
-        raise InputError(f"method = {method!r}", where="argument method", expected='"energy", "sum" or "max"')
+        raise InputError(f"method = {method!r}", where="argument method",
+                         expected='"energy", "sum", "max" or "lyapunov"')
+    if method == "lyapunov":
+        check_choice(system, structure, large)
     if not system.modules:
         raise InputError("the system has no thermoelectric module", where="argument system",
                          remedy="Without modules use rt.certify.contraction with current={}.")
 
-    def holds(c: float) -> bool:
-        box = box_jacobian(system, region_section(system, _range(system, direction, c), temperature))
-        return energy_rate(box) > 0 if method == "energy" else has_weights(box, method)
+    def box(c: float, hull: bool = False) -> BoxJacobian:
+        region = region_section(system, _range(system, direction, c), temperature, parameters)
+        return box_jacobian(system, region, hull=hull)
 
+    if method == "lyapunov":
+        low = _matrix_limit(box, block_pattern(system, structure))
+    elif method == "energy":
+        low, _ = _bisect(lambda c: energy_rate(box(c)) > 0)
+    else:
+        low, _ = _bisect(lambda c: has_weights(box(c), method))
+    for back_off in (0.0, 1e-4, 1e-3, 1e-2, 0.05, 1.0):
+        c = low * (1 - back_off)
+        certificate = contraction(system, current=_range(system, direction, c), temperature=temperature, method=method,
+                                  parameters=parameters, structure=structure, large=large)
+        if certificate.holds:
+            return CurrentLimit(c, direction, method, certificate, _outcome(c, direction, method, back_off))
+    return CurrentLimit(0.0, direction, method, certificate, Outcome(
+        False, "not_certified", f"Not certified, not even without current: {certificate.reason}"))
+
+
+def _bisect(holds: Callable[[float], bool]) -> tuple[float, float]:
+    """Largest current that holds and smallest that does not, close together."""
     low, high = 0.0, 1.0
     while holds(high) and high < _HIGHEST:
         low, high = high, 2 * high
     while high - low > _PRECISION * high and high < _HIGHEST:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
-    for back_off in (0.0, 1e-4, 1e-3, 1e-2, 0.05, 1.0):
-        c = low * (1 - back_off)
-        certificate = contraction(system, current=_range(system, direction, c), temperature=temperature, method=method)
-        if certificate.holds:
-            return CurrentLimit(c, direction, method, certificate, _outcome(c, direction, method, back_off))
-    return CurrentLimit(0.0, direction, method, certificate, Outcome(
-        False, "not_certified", f"Not certified, not even without current: {certificate.reason}"))
+    return low, high
+
+
+def _matrix_limit(box: Callable[[float, bool], BoxJacobian], pattern: NDArray[np.bool_]) -> float:
+    """Between what V = eᵀEe reaches and what frozen eigenvalues allow: few matrix inequalities."""
+    if polytope(box(1.0, True)).count > MOST:
+        return 0.0
+    low, _ = _bisect(lambda c: energy_rate(box(c, False)) > 0)
+    _, high = _bisect(lambda c: largest_growth(polytope(box(c, False))) < 0)
+    cuts = Cuts()
+    while high - low > _PRECISION_MATRIX * high:
+        middle = 0.5 * (low + high)
+        found = best_matrix(box(middle, True), pattern, cuts=cuts, first=True)
+        low, high = (middle, high) if found is not None and found.rate > 0 else (low, middle)
+    return low
 
 
 def _range(system: System, direction: str, c: float) -> dict[str, tuple[float, float]]:

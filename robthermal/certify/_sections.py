@@ -15,6 +15,8 @@ from ..thermal import System
 Interval = tuple[float, float]
 Currents = Mapping[str, Interval]
 Temperatures = Interval | Mapping[str, Interval]
+_UNCERTAIN = (".capacity", ".conductance", *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance")
+                                             for part in ("value", "slope")))
 
 
 def system_section(system: System) -> dict[str, Any]:
@@ -44,9 +46,27 @@ def _module(module: Any) -> dict[str, Any]:
     return {"hot": module.hot, "cold": module.cold, **properties, "reference_temperature": module.reference_temperature}
 
 
-def region_section(system: System, current: Currents, temperature: Temperatures) -> dict[str, Any]:
-    """Temperature and current box, checked against the system."""
-    return {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
+def region_section(system: System, current: Currents, temperature: Temperatures,
+                   parameters: Mapping[str, Interval] | None = None) -> dict[str, Any]:
+    """Temperature and current box, and the ranges of uncertain parameters, checked against the system."""
+    region = {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
+    if parameters:
+        region["parameters"] = _parameter_box(system, parameters)
+    return region
+
+
+def _parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
+    """{parameter name: [lo, hi]} around the values of the system."""
+    names = tuple(name for name in system.parameter_names if name.endswith(_UNCERTAIN))
+    ranges = named_ranges(parameters, names, "parameters", "parameter that can be uncertain")
+    for name, (low, high) in ranges.items():
+        value = system.parameter(name)
+        if not low <= value <= high:
+            raise InputError(f"({low}, {high}) excludes the system's own value {value}",
+                             where=f"argument parameters[{name!r}]", expected="lower <= value <= upper")
+        if low <= 0 and not name.endswith(".slope"):
+            raise InputError(f"({low}, {high})", where=f"argument parameters[{name!r}]", expected="positive numbers")
+    return ranges
 
 
 def temperature_box(system: System, temperature: Temperatures) -> Any:

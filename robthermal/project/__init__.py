@@ -8,6 +8,9 @@ from ._claims import certify_system as certify_system
 from ._demo import demo_project as demo_project
 from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
+from ._frequency import design_excitation as design_excitation
+from ._frequency import estimate_response as estimate_response
+from ._frequency import write_excitation as write_excitation
 from ._job import Comparison as Comparison
 from ._job import JobResult as JobResult
 from ._job import run_job as run_job
@@ -18,5 +21,6 @@ from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "JobResult", "Project", "boxes_from_text",
-           "certificate_files", "certify_system", "check_free", "demo_project", "output_folder", "read_project",
-           "run_job", "write_certify", "write_job"]
+           "certificate_files", "certify_system", "check_free", "demo_project", "design_excitation",
+           "estimate_response", "output_folder", "read_project", "run_job", "write_certify", "write_excitation",
+           "write_job"]

@@ -7,10 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..thermal import System
-from ._schema import Boxes
-
-_ZERO = 273.15
-_METHODS = ("energy", "sum", "max")
+from ._schema import METHODS, Boxes, in_kelvin, range_in_kelvin
 
 
 def boxes_from_text(system: System, *, temperature: tuple[float, float] | None = None, current: Sequence[str] = (),
@@ -45,17 +42,18 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     >>> rt.project.boxes_from_text(rt.systems.two_module(), current=["m1=0:1.5", "m2=0:1.5"]).current
     {'m1': (0.0, 1.5), 'm2': (0.0, 1.5)}
     """
-    if method not in _METHODS:
+    if method not in METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected="energy, sum or max")
-    zero = _ZERO if system.temperature_unit == "degC" else 0.0
+    unit = system.temperature_unit
     default = {name: m.current_limits for name, m in system.modules.items() if m.current_limits is not None}
     currents = {**default, **dict(_range(text, "--current") for text in current)}
     surroundings = dict(_range(text, "--ambient") for text in ambient)
     points = dict(_value(text, "--setpoint") for text in setpoint)
-    return Boxes(temperature=_shift(temperature, zero) if temperature else Boxes().temperature, current=currents,
-                 ambient={name: _shift(pair, zero) for name, pair in surroundings.items()},
-                 setpoint={name: round(value + zero, 9) for name, value in points.items()},
-                 method=method)  # type: ignore[arg-type]  # checked above
+    return Boxes(temperature=range_in_kelvin(temperature, unit) if temperature else Boxes().temperature,
+                 current=currents,
+                 ambient={name: range_in_kelvin(pair, unit) for name, pair in surroundings.items()},
+                 setpoint={name: in_kelvin(value, unit) for name, value in points.items()},
+                 method=method)
 
 
 def certificate_files(paths: Sequence[Path]) -> list[Path]:
@@ -92,10 +90,6 @@ def certificate_files(paths: Sequence[Path]) -> list[Path]:
         else:
             found.append(path)
     return found
-
-
-def _shift(pair: tuple[float, float], zero: float) -> tuple[float, float]:
-    return round(pair[0] + zero, 9), round(pair[1] + zero, 9)
 
 
 def _range(text: str, option: str) -> tuple[str, tuple[float, float]]:

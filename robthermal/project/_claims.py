@@ -18,10 +18,7 @@ from ..certify import (
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, Verdict, verify
-from ._schema import Boxes, Direction, Method
-
-METHODS: tuple[Method, ...] = ("energy", "sum", "max")
-DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
+from ._schema import DIRECTIONS, METHODS, Boxes
 
 
 @dataclass(frozen=True)

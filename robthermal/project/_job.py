@@ -103,9 +103,16 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
 
     Examples
     --------
+    The demo's project without its records, for a bar in a room:
+
+    >>> from dataclasses import replace
     >>> import robthermal as rt
-    >>> project = rt.project.read_project(rt.project.demo_project())
-    >>> result = rt.project.run_job(project)  # doctest: +SKIP
+    >>> demo = rt.project.read_project(rt.project.demo_project())
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}])
+    >>> result = rt.project.run_job(replace(demo, system=bar, train=(), validation=(), boxes=rt.project.Boxes()))
+    >>> result.holds
+    True
     """
     progress("reading records")
     train, validation = ([read_record(path, project.system, median_filter=project.median_filter) for path in paths]

@@ -10,16 +10,18 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..errors import InputError
+from ..signals import celsius_to_kelvin
 from ..thermal import FitRange, System, fit_in_kelvin, read_system
 
 _MAX_BYTES = 10_000_000
-_ZERO = 273.15
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Pair = tuple[Number, Number]
 Method = Literal["energy", "sum", "max"]
 Direction = Literal["symmetric", "cooling", "heating"]
 Initial = Literal["free", "measured", "system"]
 Loss = Literal["linear", "soft_l1", "huber"]
+METHODS: tuple[Method, ...] = ("energy", "sum", "max")
+DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
 
 
 class _Table(BaseModel):
@@ -185,15 +187,22 @@ def _with_fit(system: System, ranges: dict[str, dict[str, float]], path: Path) -
 
 
 def _boxes(system: System, table: CertifyTable) -> Boxes:
-    zero = _ZERO if system.temperature_unit == "degC" else 0.0
-
-    def kelvin(pair: Pair) -> tuple[float, float]:
-        return round(pair[0] + zero, 9), round(pair[1] + zero, 9)
-
-    return Boxes(temperature=kelvin(table.temperature) if table.temperature else Boxes().temperature,
-                 ambient={name: kelvin(pair) for name, pair in table.ambient.items()}, current=table.current,
-                 heat=table.heat, setpoint={name: round(value + zero, 9) for name, value in table.setpoint.items()},
+    unit = system.temperature_unit
+    return Boxes(temperature=range_in_kelvin(table.temperature, unit) if table.temperature else Boxes().temperature,
+                 ambient={name: range_in_kelvin(pair, unit) for name, pair in table.ambient.items()},
+                 current=table.current, heat=table.heat,
+                 setpoint={name: in_kelvin(value, unit) for name, value in table.setpoint.items()},
                  method=table.method)
+
+
+def in_kelvin(value: float, unit: str) -> float:
+    """A temperature in the unit of a system file [K]."""
+    return float(celsius_to_kelvin(value)) if unit == "degC" else float(value)
+
+
+def range_in_kelvin(pair: Pair, unit: str) -> tuple[float, float]:
+    """Both ends of a range [K]."""
+    return in_kelvin(pair[0], unit), in_kelvin(pair[1], unit)
 
 
 def _refusal(error: ValidationError, path: Path) -> InputError:

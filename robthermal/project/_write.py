@@ -38,8 +38,16 @@ def write_job(result: JobResult, out: str | Path) -> Report:
 
     Examples
     --------
+    >>> from dataclasses import replace
+    >>> from pathlib import Path
     >>> import robthermal as rt
-    >>> rt.project.write_job(rt.project.run_job(project), "results")  # doctest: +SKIP
+    >>> demo = rt.project.read_project(rt.project.demo_project())
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}])
+    >>> result = rt.project.run_job(replace(demo, system=bar, train=(), validation=(), boxes=rt.project.Boxes()))
+    >>> report = rt.project.write_job(result, "results")
+    >>> sorted(path.name for path in Path("results").iterdir())
+    ['calibrated.toml', 'certificates', 'junit.xml', 'report.html', 'summary.json']
     """
     project = result.project
     sections = [comparison_section(result.comparisons, result.fit)] if result.comparisons else []

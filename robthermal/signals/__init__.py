@@ -13,14 +13,18 @@ from ._multisine import multisine as multisine
 from ._read import read_record as read_record
 from ._record import Record as Record
 from ._staircase import staircase as staircase
+from ._units import celsius_to_kelvin as celsius_to_kelvin
+from ._units import kelvin_to_celsius as kelvin_to_celsius
 
 __all__ = [
     "DesignCheck",
     "Excitation",
     "Record",
+    "celsius_to_kelvin",
     "crest_factor",
     "design_check",
     "find_glitches",
+    "kelvin_to_celsius",
     "median_filter",
     "multisine",
     "multisines",

@@ -80,7 +80,8 @@ def low_crest_phases(
     """Phases of a lower crest factor than that of the given ones, by clipping, then by descent of rising L_p norms.
 
     Clipping: van der Ouderaa, Schoukens and Renneboog (1988). L_p norms, here with the exact gradient: Guillaume,
-    Schoukens, Pintelon and Kollar (1991). A local minimum: other starting phases end elsewhere, at nearly the same height.
+    Schoukens, Pintelon and Kollar (1991). A local minimum: other starting phases end
+    elsewhere, at nearly the same height.
     `turns` [rad] are added to all phases, one experiment each: the highest peak of all experiments is brought down.
     """
     rotation = np.unique(np.round(np.mod(turns, np.pi), 12))[:, None]  # half a turn is a change of sign: the same peak

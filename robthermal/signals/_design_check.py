@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -9,11 +10,13 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ._checks import Array, channel_matrix, positive_number
-from ._design_model import machine_of, slow_poles
+from ._design_model import Modes, Truth, machine_of, slow_poles
 from ._design_result import DesignCheck
-from ._design_windows import estimator, expect, last_states, spectra_of
+from ._design_windows import Estimator, Spectra, estimator, noise_free_errors, noise_gain, spectra_of
 from ._excitation_set import Excitation
 from ._excitation_settings import one_of, per_input
+
+_CHUNK = 512  # lines solved at a time
 
 
 def design_check(
@@ -45,7 +48,7 @@ def design_check(
     noise : float or array_like, shape (n_y,), optional
         Standard deviation of the white noise of each output, in its unit; the expected variance of G needs it.
     gain : float or array_like, shape (n_u,), optional
-        Heat per unit of each input [W per unit], for the heat balance.
+        Heat per unit of each input [W per unit], for the heat balance and the transient that the inputs share.
     method : {"lpm", "etfe"}, optional
         How G will be estimated: `rt.identify.lpm` or `rt.identify.etfe`.
     degree : int, optional
@@ -84,33 +87,51 @@ def design_check(
     limit = positive_number(tolerance, "tolerance")
     if limit >= 1.0:
         raise InputError(f"tolerance is {limit:g}", where="argument tolerance", expected="a number between 0 and 1")
+    watts = np.array([positive_number(one, "gain", "W per unit") for one in per_input(gain, "gain", n_u)])
     found = slow_poles(model, poles, h)
     machine = None if model is None else machine_of(model, h, n_u)
     spectra = spectra_of(signals)
     estimate = estimator(word, degree, half_width, spectra)
-    expected = expect(estimate, spectra, spectra.excited, found * h, last_states(signals, found * h))
-    frequencies = spectra.excited / (spectra.n_samples * h)
-    watts = np.array([positive_number(g, f"gain[{i}]", "W per unit") for i, g in enumerate(per_input(gain, "gain", n_u))])
-    mean = signals.mean(axis=(0, 1))
-    deviations = _noise(noise, None if machine is None else len(machine.C))
-    rise = None if machine is None else (machine.response(np.zeros(1), h)[..., 0].real @ mean)
+    bins, truths = spectra.excited, [Modes(found * h, watts)] + ([machine] if machine else [])
+    gains, errors = _expected(estimate, spectra, signals, truths)
+    mean = signals.mean(axis=(0, 1)).round(12)  # a mean of zero up to rounding is zero
     return DesignCheck(
-        frequencies=frequencies,
+        frequencies=bins / (spectra.n_samples * h),
         poles=found,
-        pole_errors=expected.error,
+        pole_errors=errors[0],
+        model_errors=errors[1] if machine else None,
         tolerance=limit,
-        noise_gain=expected.gain,
-        noise=deviations,
-        response=None if machine is None else machine.response(frequencies, h),
-        mean_heat=watts * mean,
+        noise_gain=gains,
+        noise=_noise(noise, len(machine.C) if machine else None),
+        response=machine.response(spectra.points(bins)) if machine else None,
+        mean_heat=watts * mean + 0.0,
         heat_range=watts[:, None] * np.stack([signals.min(axis=(0, 1)), signals.max(axis=(0, 1))], axis=1),
-        energy=float(watts @ signals.sum(axis=(0, 1)) * h),
-        mean_rise=rise,
+        energy=float(watts @ mean) * h * spectra.n_samples * len(signals),
+        mean_rise=machine.response(np.ones(1, dtype=complex))[..., 0].real @ mean if machine else None,
         sample_time=h,
         n_samples=spectra.n_samples,
         n_experiments=len(signals),
         method=word if word == "etfe" else f"lpm, degree {degree}, half_width {half_width}",
     )
+
+
+def _expected(
+    method: Estimator, spectra: Spectra, signals: Array, truths: Sequence[Truth]
+) -> tuple[Array, list[Array]]:
+    """Noise gain (n_u, n_f), and for the modes and the machine the noise-free errors (n_y, n_f)."""
+    z, bins = spectra.points(np.arange(1, spectra.n_bins + 1)), spectra.excited
+    Y = [truth.outputs(z, spectra.U, signals) for truth in truths]
+    gains: list[Array] = []
+    errors: list[list[Array]] = [[] for _ in truths]
+    for part in np.array_split(bins, -(-bins.size // _CHUNK)):
+        weights, rows = method.weights(spectra, part), method.windows(part, spectra.n_bins)
+        gains.append(noise_gain(weights))
+        for place, truth in enumerate(truths):
+            G = truth.response(z[part - 1])
+            # Modes stand alone; of a machine, what counts is the output that responds most to an input.
+            scale = np.abs(G) if isinstance(truth, Modes) else np.abs(G).max(axis=0, keepdims=True)
+            errors[place].append(noise_free_errors(weights, rows, Y[place], G, scale))
+    return np.concatenate(gains, axis=1), [np.concatenate(one, axis=1) for one in errors]
 
 
 def _experiments(u: Any, h: float) -> Array:

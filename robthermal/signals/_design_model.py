@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,18 @@ from ._excitation_settings import exactly_one
 Complex = NDArray[np.complex128]
 
 _EXPECTED = "continuous-time poles [rad/s] with negative real part"
+_ENTRIES = 2**21  # of resolvent matrices held at a time
 _ALIKE = 0.01  # poles closer than this, relative to their size, are one
+
+
+class Truth(Protocol):
+    """Something whose response and noise-free output, from rest and with the inputs off before, are known."""
+
+    def response(self, z: Complex) -> Complex:
+        """G at the points z (L,) of the unit circle, (n_y, n_u, L)."""
+
+    def outputs(self, z: Complex, U: Complex, u: Array) -> Complex:
+        """Output lines (experiments, n_y, L) for the input lines U (experiments, n_u, L) of u (experiments, n, n_u)."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +39,53 @@ class Machine:
     C: Array
     D: Array
 
-    def response(self, frequencies: Array, sample_time: float) -> Complex:
-        """G at `frequencies` [Hz], (n_y, n_u, n_f)."""
-        z = np.exp(2j * np.pi * frequencies * sample_time)
-        found = np.empty((*self.D.shape, z.size), dtype=complex)
-        for k, one in enumerate(z):
-            found[..., k] = self.C @ np.linalg.solve(one * np.eye(len(self.A)) - self.A, self.B) + self.D
-        return found
+    def _states(self, z: Complex, right: Array) -> Complex:
+        """(z I - A)^-1 right, (L, n, columns)."""
+        parts = np.array_split(z, max(1, z.size * self.A.size // _ENTRIES))
+        resolvents = (one[:, None, None] * np.eye(len(self.A)) - self.A for one in parts)
+        return np.concatenate([np.linalg.solve(one, right[None]) for one in resolvents])
+
+    def response(self, z: Complex) -> Complex:
+        """As in `Truth`."""
+        found = self.C @ self._states(z, self.B) + self.D
+        return np.asarray(np.moveaxis(found, 0, -1))
+
+    def last_states(self, u: Array) -> Array:
+        """x(N) of every experiment, from zero, (experiments, n)."""
+        x = np.zeros((len(u), len(self.A)))
+        for held in u.transpose(1, 0, 2) @ self.B.T:
+            x = x @ self.A.T + held
+        return x
+
+    def outputs(self, z: Complex, U: Complex, u: Array) -> Complex:
+        """As in `Truth`."""
+        decay = self._states(z, self.last_states(u).T)  # (L, n, experiments)
+        transient = np.einsum("yn,lne->eyl", self.C, decay) * z / np.sqrt(u.shape[1])
+        return np.asarray(np.einsum("yil,eil->eyl", self.response(z), U) - transient)
+
+
+@dataclass(frozen=True)
+class Modes:
+    """One output for every pole: x(n+1) = gamma x(n) + sum_i gain_i u_i(n), gamma = exp(p T_s)."""
+
+    poles: Complex  # p T_s
+    gain: Array
+
+    def _quotients(self, z: Complex) -> Complex:
+        # z - gamma = gamma expm1(j theta - p T_s): no cancellation for slow poles at low bins
+        return np.asarray(np.exp(-self.poles)[:, None] / np.expm1(1j * np.angle(z) - self.poles[:, None]))
+
+    def response(self, z: Complex) -> Complex:
+        """As in `Truth`."""
+        return np.asarray(self._quotients(z)[:, None] * self.gain[:, None])
+
+    def outputs(self, z: Complex, U: Complex, u: Array) -> Complex:
+        """As in `Truth`."""
+        ages = np.arange(u.shape[1] - 1, -1, -1)
+        heat = u @ self.gain  # (experiments, n)
+        last = np.stack([heat @ np.exp(pole * ages) for pole in self.poles], axis=1)
+        driven = np.einsum("i,eil->el", self.gain, U)[:, None] - last[..., None] * z / np.sqrt(u.shape[1])
+        return np.asarray(driven * self._quotients(z))
 
 
 def machine_of(model: Any, h: float, n_u: int) -> Machine | None:
@@ -85,7 +136,9 @@ def slow_poles(model: Any, poles: Any, h: float) -> Complex:
     else:
         found = np.atleast_1d(np.asarray(model.poles(), dtype=complex))
         if step := _step(model, h):
-            found = np.log(found[np.abs(found) > 1e-12]) / step  # poles at z = 0 are delays: infinitely fast
+            found = np.asarray(
+                np.log(found[np.abs(found) > 1e-12]) / step
+            )  # poles at z = 0 are delays: infinitely fast
     for pole in found:
         if not np.isfinite(pole) or pole.real >= 0.0:
             raise InputError(
@@ -110,7 +163,7 @@ def _numbers(poles: Any) -> Complex:
 def _kept(found: Complex, h: float) -> Complex:
     if not found.size:
         raise InputError("the model has no poles", where="argument model", expected="a machine with time constants")
-    found = found[np.argsort(np.abs(found), kind="stable")]
+    found = np.asarray(found[np.argsort(np.abs(found), kind="stable")], dtype=complex)
     if abs(found[0]) * h >= np.pi:
         raise InputError(
             f"sample_time {h:g} s is too slow: the slowest time constant is {1.0 / abs(found[0]):.3g} s",

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..errors import Outcome
 from ._checks import Array
 
+_SHOWN = 8  # poles in the printed table
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DesignCheck:
@@ -24,7 +26,11 @@ class DesignCheck:
     poles : ndarray, shape (n_p,)
         Poles slower than the samples [rad/s], slowest first, one of each pair.
     pole_errors : ndarray, shape (n_p, n_f)
-        Error without noise for a machine with that pole alone, relative to its response [-].
+        Error without noise for a machine with that pole alone, every input heating it alike per watt, relative to its
+        response [-].
+    model_errors : ndarray, shape (n_y, n_f), or None
+        Error without noise for the nominal state space, the worst over the inputs, relative to the output that responds
+        most to that input [-].
     tolerance : float
         Error above which a frequency counts as unresolved [-].
     noise_gain : ndarray, shape (n_u, n_f)
@@ -54,6 +60,7 @@ class DesignCheck:
     frequencies: Array
     poles: NDArray[np.complex128]
     pole_errors: Array
+    model_errors: Array | None
     tolerance: float
     noise_gain: Array
     noise: Array | None
@@ -74,15 +81,14 @@ class DesignCheck:
 
     @property
     def unresolved(self) -> NDArray[np.bool_]:
-        """Lines at which some pole makes an error above the tolerance, (n_f,)."""
-        found: NDArray[np.bool_] = (self.pole_errors > self.tolerance).any(axis=0)
-        return found
+        """Lines with an error above the tolerance, (n_f,): of the nominal state space if given, else of a pole."""
+        errors = self.pole_errors if self.model_errors is None else self.model_errors
+        return np.asarray((errors > self.tolerance).any(axis=0))
 
     @property
     def undetermined(self) -> NDArray[np.bool_]:
         """Lines at which the excitation does not determine G of some input, (n_f,)."""
-        found: NDArray[np.bool_] = np.isinf(self.noise_gain).any(axis=0)
-        return found
+        return np.asarray(np.isinf(self.noise_gain).any(axis=0))
 
     @property
     def resolved_from(self) -> float:
@@ -104,7 +110,7 @@ class DesignCheck:
 
     @property
     def table(self) -> pd.DataFrame:
-        """One row per pole: time constant, its corner, whether the experiment shows it, from which line on it is resolved."""
+        """One row per pole: time constant, its corner, from which line on it is resolved, and whether its corner is."""
         corners = np.abs(self.poles) / (2.0 * np.pi)
         resolved = np.array([self._above(errors > self.tolerance) for errors in self.pole_errors])
         return pd.DataFrame(
@@ -131,7 +137,7 @@ class DesignCheck:
         if not self.unresolved.any():
             return Outcome(True, "resolved", f"All {f.size} excited lines are resolved to {self.tolerance:.0%}.")
         bad = f[self.unresolved]
-        worst = 1.0 / abs(self.poles[self.pole_errors.max(axis=1).argmax()])
+        worst = 1.0 / abs(self.poles[self.pole_errors[:, self.unresolved].max(axis=1).argmax()])
         text = (
             f"{bad.size} of {f.size} excited lines are unresolved, {bad[0]:.3g} to {bad[-1]:.3g} Hz: in "
             f"{self.duration:.4g} s the time constant of {worst:.3g} s leaves an error above {self.tolerance:.0%}."
@@ -170,7 +176,10 @@ class DesignCheck:
             rows.append("expected relative deviation of G, median and worst over the lines:")
             for o, i in np.ndindex(*relative.shape[:2]):
                 rows.append(f"  output {o}, input {i}: {np.median(relative[o, i]):.2g}, {relative[o, i].max():.2g}")
-        return "\n".join([*rows, self.table.to_string(index=False, float_format=lambda x: f"{x:.4g}"), str(self.outcome)])
+        rows.append(self.table.head(_SHOWN).to_string(index=False, float_format=lambda x: f"{x:.4g}"))
+        if len(self.poles) > _SHOWN:
+            rows.append(f"and {len(self.poles) - _SHOWN} faster ones")
+        return "\n".join([*rows, str(self.outcome)])
 
     def plot(self) -> Any:
         """Axes with the error of every pole above, the expected deviation of G below.
@@ -185,6 +194,8 @@ class DesignCheck:
         _, axes = plt.subplots(2, 1, sharex=True, layout="constrained")
         for pole, errors in zip(self.poles, self.pole_errors, strict=True):
             axes[0].loglog(self.frequencies, errors, lw=1.0, label=f"time constant {1.0 / abs(pole):.3g} s")
+        if self.model_errors is not None:
+            axes[0].loglog(self.frequencies, self.model_errors.max(axis=0), "k", lw=1.5, label="nominal model")
         axes[0].axhline(self.tolerance, color="black", lw=0.8, ls="--", label="tolerance")
         axes[0].set_ylabel("relative error without noise")
         axes[0].legend(fontsize="small")

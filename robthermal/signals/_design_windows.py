@@ -20,7 +20,6 @@ Complex = NDArray[np.complex128]
 
 _LINE_SILENT = 1e3  # a line is excited when it exceeds this many times the rounding error of its signal
 _RANK = 1e-8  # smallest singular value of a window that counts, relative to the largest
-_CHUNK = 512  # bins solved at a time
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,10 @@ class Spectra:
     def excited(self) -> NDArray[np.intp]:
         """Bins, from 1, at which some input is excited."""
         return np.flatnonzero((self.U != 0.0).any(axis=(0, 1))) + 1
+
+    def points(self, bins: NDArray[np.intp]) -> Complex:
+        """z of bins, on the unit circle."""
+        return np.asarray(np.exp(2j * np.pi / self.n_samples * bins))
 
     @property
     def n_bins(self) -> int:
@@ -74,7 +77,8 @@ class Estimator:
             for s in range(size):  # U x^0 stands first among the columns of the inputs
                 first = transients + s * n_u
                 K[:, e, :, first : first + n_u] = spectra.U[e][:, rows - 1].transpose(1, 2, 0) * powers[..., s, None]
-        return _rows_of_pseudoinverse(K.reshape(B, E * m, -1), slice(transients, transients + n_u)).reshape(B, n_u, E, m)
+        found = _rows_of_pseudoinverse(K.reshape(B, E * m, -1), slice(transients, transients + n_u))
+        return found.reshape(B, n_u, E, m)
 
 
 def estimator(method: str, degree: object, half_width: object, spectra: Spectra) -> Estimator:
@@ -120,41 +124,14 @@ def _rows_of_pseudoinverse(K: Complex, part: slice) -> Complex:
     return np.asarray(rows)
 
 
-@dataclass(frozen=True)
-class Expected:
-    """Variance of G per unit of white output noise (n_u, n_f), and error of every pole's mode (n_p, n_f), relative."""
-
-    gain: Array
-    error: Array
+def noise_gain(weights: Complex) -> Array:
+    """Variance of G per unit of white output noise, (n_u, B); infinite where the window does not determine it."""
+    gain = np.sum(np.abs(weights) ** 2, axis=(2, 3)).T
+    return np.where(np.isnan(gain), np.inf, gain)
 
 
-def expect(method: Estimator, spectra: Spectra, bins: NDArray[np.intp], poles: Complex, held: Complex) -> Expected:
-    """Noise gain and noise-free error at `bins`; `poles` are p T_s, `held` (n_p, experiments, n_u) the last states.
-
-    The mode x(n+1) = gamma x(n) + u_i(n) that starts at zero has X = (U_i - z x(N)/sqrt(N)) g, g = 1/(z - gamma).
-    """
-    n_u, angle = spectra.U.shape[1], 2.0 * np.pi / spectra.n_samples
-    gain, error = np.empty((n_u, bins.size)), np.zeros((len(poles), bins.size))
-    for first in range(0, bins.size, _CHUNK):
-        part = slice(first, first + _CHUNK)
-        weights, rows = method.weights(spectra, bins[part]), method.windows(bins[part], spectra.n_bins)
-        gain[:, part] = np.sum(np.abs(weights) ** 2, axis=(2, 3)).T
-        z = np.exp(1j * angle * rows)
-        for p, pole in enumerate(poles):
-            # z_k - gamma over z - gamma, without the cancellation at slow poles and low bins
-            centre = np.expm1(1j * angle * bins[part] - pole)
-            ratio = centre[:, None] / np.expm1(1j * angle * rows - pole)
-            for i in range(n_u):
-                transient = held[p, :, i, None, None] / np.sqrt(spectra.n_samples) * z  # (experiments, B, m)
-                seen = (spectra.U[:, i][:, rows - 1] - transient) * ratio
-                wrong = np.abs(np.einsum("bem,ebm->b", weights[:, i], seen) - 1.0)
-                error[p, part] = np.maximum(error[p, part], wrong)
-    for undetermined in (gain, error):
-        undetermined[np.isnan(undetermined)] = np.inf
-    return Expected(gain, error)
-
-
-def last_states(u: Array, poles: Complex) -> Complex:
-    """x(N) of x(n+1) = gamma x(n) + u_i(n) from zero, (n_p, experiments, n_u); `poles` are p T_s, gamma = exp(p T_s)."""
-    ages = np.arange(u.shape[1] - 1, -1, -1)
-    return np.stack([np.einsum("n,eni->ei", np.exp(pole * ages), u) for pole in poles])
+def noise_free_errors(weights: Complex, rows: NDArray[np.intp], Y: Complex, G: Complex, scale: Array) -> Array:
+    """Largest error of the G (n_y, n_u, B) of each output relative to `scale`, (n_y, B); outputs Y (E, n_y, bins)."""
+    found = np.stack([np.einsum("biem,ebm->ib", weights, Y[:, y][:, rows - 1]) for y in range(Y.shape[1])])
+    error = (np.abs(found - G) / scale).max(axis=1)
+    return np.where(np.isnan(error), np.inf, error)

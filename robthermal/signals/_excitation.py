@@ -12,6 +12,7 @@ from scipy.linalg import dft, hadamard
 from ..errors import InputError
 from ._checks import Array, positive_number
 from ._crest import crest_of, schroeder_phases, wave_of
+from ._excitation_set import Excitation
 from ._excitation_settings import (
     Lines,
     given_lines,
@@ -22,7 +23,6 @@ from ._excitation_settings import (
     shifted,
     whole_number,
 )
-from ._excitation_set import Excitation
 from ._multisine import chosen_phases
 
 

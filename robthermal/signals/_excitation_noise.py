@@ -141,7 +141,7 @@ def prbs(
         raise InputError(f"order is {length}", where="argument order", expected=f"at most {_ORDERS[1]}")
     levels = np.array([finite_number(low, "low"), finite_number(high, "high")])
     if not levels[0] < levels[1]:
-        raise InputError(f"low is {levels[0]:g} and high is {levels[1]:g}", where="argument high", expected="low < high")
+        raise InputError(f"low is {low!r} and high is {high!r}", where="argument high", expected="low < high")
     width = held_samples(hold, "hold", positive_number(sample_time, "sample_time", "s"))
     repeats = whole_number(periods, "periods", 1)
     if (2**length - 1) * width * repeats > _LONGEST:

@@ -76,12 +76,14 @@ class Excitation:
         rows = [
             f"{self.arrangement} multisines, {self.phases} phases: {realisations} realisation(s) of {experiments} "
             f"experiment(s), {samples} samples ({samples * self.sample_time:g} s), period {self.period} samples",
-            f"{'input':>5}{'lines':>8}{'lowest [Hz]':>14}{'highest [Hz]':>14}{'min':>11}{'mean':>11}{'max':>11}{'crest':>8}",
+            f"{'input':>5}{'lines':>8}{'lowest [Hz]':>14}{'highest [Hz]':>14}"
+            f"{'min':>11}{'mean':>11}{'max':>11}{'crest':>8}",
         ]
         for i in range(inputs):
-            u, f = self.signals[..., i], self.lines[i] / (self.period * self.sample_time)
-            levels = f"{u.min():>11.4g}{u.mean():>11.4g}{u.max():>11.4g}{self.crest_factors[..., i].max():>8.2f}"
-            rows.append(f"{i:>5}{f.size:>8}{f.min():>14.4g}{f.max():>14.4g}{levels}")
+            u, f = self.signals[..., i].round(12) + 0.0, self.lines[i] / (self.period * self.sample_time)
+            levels = f"{u.min():>11.4g}{u.mean().round(12) + 0.0:>11.4g}{u.max():>11.4g}"
+            crest = self.crest_factors[..., i].max()
+            rows.append(f"{i:>5}{f.size:>8}{f.min():>14.4g}{f.max():>14.4g}{levels}{crest:>8.2f}")
         return "\n".join([*rows, str(self.outcome)])
 
     def plot(self) -> Any:

@@ -104,7 +104,7 @@ def line_amplitudes(spectrum: object, lines: Lines) -> Array:
         if one_of(spectrum, "spectrum", ("linear", "logarithmic")) == "linear":
             return np.ones(lines.size)
         return 1.0 / np.sqrt(lines)
-    if not isinstance(spectrum, (Sequence, np.ndarray)) or np.ndim(spectrum) != 1:  # type: ignore[arg-type]
+    if not isinstance(spectrum, (Sequence, np.ndarray)) or np.ndim(spectrum) != 1:
         raise InputError(f"spectrum is {spectrum!r}", where="argument spectrum", expected=expected)
     if len(spectrum) != lines.size:
         raise InputError(
@@ -127,7 +127,7 @@ def per_input(value: Any, where: str, n_inputs: int) -> list[Any]:
 
 
 def scaled(waves: Array, rms: object, amplitude: object) -> Array:
-    """`waves` of mean zero, several experiments of one input, with the rms of each or the largest peak of all as asked."""
+    """`waves` of mean zero (several experiments of one input) with the rms, or the largest peak of all, asked for."""
     exactly_one("rms", rms, "amplitude", amplitude)
     if rms is not None:
         return np.asarray(waves * (positive_number(rms, "rms") / np.sqrt(np.mean(waves**2))))

@@ -14,7 +14,7 @@ from ._record import Record
 _NEIGHBOURS = 5  # a jump of up to two samples cannot move the median of five
 _NOISE = 8.0  # times the noise: one false alarm in 10^15 samples of Gaussian noise
 _QUANTA = 4.0  # quantisation steps that a sound reading may jump
-_SWING = 4.0  # times the spread of the middle three of seven neighbours
+_SWING = 6.0  # times the spread of the middle three of seven neighbours
 _MAD = 1.4826  # median absolute deviation of a Gaussian, to its standard deviation
 
 
@@ -22,7 +22,7 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
     """Single-sample outliers in the outputs: away from the median of five neighbours, and back after two samples.
 
     A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
-    deviations (from the median absolute deviation), by more than 4 quantisation steps, and by more than 4 times the
+    deviations (from the median absolute deviation), by more than 4 quantisation steps, and by more than 6 times the
     spread of its neighbours: a real swing moves them too.
 
     Parameters

@@ -101,7 +101,7 @@ def multisine(
 def chosen_phases(
     kind: object, lines: Lines, amplitudes: Array, random: Array, n: int, turns: ArrayLike = (0.0,)
 ) -> Array:
-    """The phases of one of the three kinds; `random` are uniform, `turns` are added to all, experiment by experiment."""
+    """The phases of one of the three kinds; `random` are uniform, `turns` are added to all, one per experiment."""
     word = one_of(kind, "phases", PHASES)
     if word == "schroeder":
         return schroeder_phases(lines, amplitudes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -50,6 +51,15 @@ def kelvin(value: Any, where: str) -> float:
         raise InputError(f"{number:g} K is above {celsius_to_kelvin(HIGHEST_CELSIUS):g} K", where=where,
                          expected="kelvin", remedy="Was 273.15 added twice?")
     return number
+
+
+def by_lump(values: Mapping[str, float], names: Sequence[str], argument: str) -> list[float]:
+    """Temperatures of all lumps, in order."""
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise InputError(f"{argument} has no temperature for lump {missing[0]!r}", where=f"argument {argument}",
+                         remedy="Give every lump a temperature [K].")
+    return [values[name] for name in names]
 
 
 def whole(value: Any, where: str, lowest: int = 1) -> int:

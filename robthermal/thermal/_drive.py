@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..signals import Record
 from ._augmented import lagged
+from ._checks import by_lump
 from ._equations import Equations
 from ._terms import Array
+from ._units import LOWEST_KELVIN
 
 Initial = ArrayLike | Mapping[str, float] | None
 
@@ -41,7 +43,7 @@ def held_inputs(eq: Equations, record: Record) -> Array:
 def _no_celsius(eq: Equations, u: Array) -> None:
     for offset, name in enumerate(reversed(eq.system.ambient_names), start=1):
         low = u[:, -offset].min()
-        if low < 150.0:
+        if low < LOWEST_KELVIN:
             raise InputError(f"ambient {name!r} falls to {low:.6g} K", where="argument record",
                              expected="kelvin inside a Record", remedy="Add 273.15, or read the file with its unit.")
 
@@ -89,13 +91,9 @@ def _given(eq: Equations, initial: Initial) -> NDArray[np.float64] | None:
         return None
     names = eq.system.lump_names
     if isinstance(initial, Mapping):
-        missing = [name for name in names if name not in initial]
-        if missing:
-            raise InputError(f"initial has no temperature for lump {missing[0]!r}", where="argument initial",
-                             remedy="Give every lump a temperature [K].")
-        initial = [initial[name] for name in names]
+        initial = by_lump(initial, names, "initial")
     values = np.asarray(initial, float)
-    if values.shape not in ((), (len(names),)) or not np.isfinite(values).all() or values.min() < 150.0:
+    if values.shape not in ((), (len(names),)) or not np.isfinite(values).all() or values.min() < LOWEST_KELVIN:
         raise InputError(f"initial has shape {values.shape}, smallest value {values.min(initial=np.inf):.6g}",
                          where="argument initial", expected=f"one or {len(names)} finite temperatures [K]",
                          remedy="Temperatures are kelvin inside.")

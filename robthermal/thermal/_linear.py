@@ -12,11 +12,13 @@ from scipy.linalg import expm
 
 from ..errors import InputError
 from ._augmented import lagged
+from ._checks import by_lump
 from ._equations import Equations
 from ._sensors import source_states
 from ._steady import exogenous_point
 from ._system import System, equations
 from ._terms import Array
+from ._units import LOWEST_KELVIN
 
 
 def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
@@ -107,13 +109,9 @@ def _point(eq: Equations, temperatures: ArrayLike | Mapping[str, float] | None) 
         return eq.initial()
     names = eq.system.lump_names
     if isinstance(temperatures, Mapping):
-        missing = [name for name in names if name not in temperatures]
-        if missing:
-            raise InputError(f"no temperature for lump {missing[0]!r}", where="argument temperatures",
-                             remedy="Give every lump a temperature [K].")
-        temperatures = [temperatures[name] for name in names]
+        temperatures = by_lump(temperatures, names, "temperatures")
     x = np.asarray(temperatures, float)
-    if x.shape != (len(names),) or not np.isfinite(x).all() or x.min() < 150:
+    if x.shape != (len(names),) or not np.isfinite(x).all() or x.min() < LOWEST_KELVIN:
         raise InputError(f"shape {x.shape}, smallest value {x.min(initial=np.inf):.6g}", where="argument temperatures",
                          expected=f"{len(names)} finite temperatures in kelvin")
     return x

@@ -17,6 +17,7 @@ from ..errors import InputError
 from ._equations import Equations
 from ._system import System, equations
 from ._terms import Array, Indices, ModuleTerm
+from ._units import LOWEST_KELVIN
 
 _POINTS = 60  # of a load curve
 
@@ -262,7 +263,7 @@ def _load_slopes(eq: Equations, x: Array, u: Array, held: Indices, columns: Indi
 def _surroundings(eq: Equations, ambient: Mapping[str, float] | None) -> Array:
     u = eq.nominal()
     for name, value in (ambient or {}).items():
-        if name not in eq.system.ambients or not np.isfinite(value) or value < 150:
+        if name not in eq.system.ambients or not np.isfinite(value) or value < LOWEST_KELVIN:
             raise InputError(f"ambient {name} = {value}", where="argument ambient",
                              expected=f"kelvin for one of {', '.join(eq.system.ambients)}")
         u[eq.system.exogenous_names.index(name)] = value
@@ -292,11 +293,11 @@ def regulated_feedback(eq: Equations, x: Array, u: Array, held: Indices, columns
 
 
 def slowest_regulated(eq: Equations, x: Array, u: Array, held: Indices, columns: Indices) -> float:
-    """Largest real part of the regulated machine's eigenvalues [1/s]; infinite where a current has lost its grip."""
-    try:
-        matrix = regulated_feedback(eq, x, u, held, columns)
-    except np.linalg.LinAlgError:
+    """Largest real part of the regulated machine's eigenvalues [1/s]; infinite where more current no longer cools."""
+    grip = eq.input_jacobian(x, u).toarray()[held, columns]
+    if not (grip < 0).all():  # beyond S x_c = R I the controller's sign is wrong
         return np.inf
+    matrix = regulated_feedback(eq, x, u, held, columns)
     return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))
 
 
@@ -312,13 +313,18 @@ def loads(eq: Equations, x: Array, u: Array, columns: Indices) -> Array:
 def _faces(eq: Equations, setpoint: Mapping[str, float]) -> tuple[Indices, Indices, Array]:
     if not setpoint:
         raise InputError("no module is named", where="argument setpoint", remedy='For example {"m1": 278.15}.')
-    for name, value in setpoint.items():
-        if name not in eq.system.modules:
-            raise InputError(f"{name!r} is not a module", where="argument setpoint",
-                             expected="one of " + ", ".join(eq.system.modules))
-        if not np.isfinite(value) or value < 150.0:
-            raise InputError(f"set-point of {name} is {value} K", where="argument setpoint", expected="kelvin",
-                             remedy="Add 273.15 to degrees Celsius.")
+    check_setpoint(eq.system, setpoint)
     held = np.array([eq.system.lump_names.index(eq.system.modules[name].cold) for name in setpoint], np.intp)
     columns = len(eq.system.inputs) + np.array([eq.system.module_names.index(name) for name in setpoint], np.intp)
     return held, columns, np.array(list(setpoint.values()), float)
+
+
+def check_setpoint(system: System, setpoint: Mapping[str, float]) -> None:
+    """Refuse set-points of what is no module, and Celsius."""
+    for name, value in setpoint.items():
+        if name not in system.modules:
+            raise InputError(f"{name!r} is not a module", where="argument setpoint",
+                             expected="one of " + ", ".join(system.modules))
+        if not np.isfinite(value) or value < LOWEST_KELVIN:
+            raise InputError(f"set-point of {name} is {value} K", where="argument setpoint", expected="kelvin",
+                             remedy="Add 273.15 to degrees Celsius.")

@@ -12,9 +12,10 @@ import pandas as pd
 from ..errors import InputError, Outcome
 from ._continuation import Curve, follow
 from ._equations import Equations
-from ._regulated import regulated_feedback
+from ._regulated import check_setpoint, slowest_regulated
 from ._system import System, equations
 from ._terms import Array, Indices
+from ._units import LOWEST_KELVIN
 
 _COLDEST, _HOTTEST = 100.0, 1500.0  # K: beyond, the model means nothing
 
@@ -200,10 +201,9 @@ class _Problem:
     def equilibrium(self, y: Array) -> Equilibrium:
         x, u = self.state(y, 1.0, np.zeros(len(self.eq.capacity)))
         if self.held.size:
-            matrix = regulated_feedback(self.eq, x, u, self.held, self.columns())
+            slowest = slowest_regulated(self.eq, x, u, self.held, self.columns())
         else:
-            matrix = self.eq.jacobian(x, u).toarray() / self.eq.capacity[:, None]
-        slowest = float(np.linalg.eigvals(matrix).real.max()) if len(matrix) else -np.inf
+            slowest = float(np.linalg.eigvals(self.eq.jacobian(x, u).toarray() / self.eq.capacity[:, None]).real.max())
         first = len(self.eq.system.inputs)
         return Equilibrium(dict(zip(self.eq.system.lump_names, x.tolist(), strict=True)),
                            dict(zip(self.eq.system.module_names, u[first:].tolist(), strict=False)),
@@ -227,7 +227,7 @@ def exogenous_point(eq: Equations, inputs: Mapping[str, float]) -> Array:
         if name not in names:
             raise InputError(f"{name!r} is not a heater, module or ambient", where="argument inputs",
                              expected="one of " + ", ".join(names))
-        if not np.isfinite(value) or (name in eq.system.ambients and value < 150):
+        if not np.isfinite(value) or (name in eq.system.ambients and value < LOWEST_KELVIN):
             raise InputError(f"{name} = {value}", where="argument inputs",
                              expected="a finite number, kelvin for ambients")
         u[names.index(name)] = value
@@ -237,13 +237,8 @@ def exogenous_point(eq: Equations, inputs: Mapping[str, float]) -> Array:
 def _regulated(eq: Equations, setpoint: Mapping[str, float],
                inputs: Mapping[str, float]) -> tuple[Indices, Indices, Array]:
     modules = eq.system.modules
-    for name, value in setpoint.items():
-        if name not in modules:
-            raise InputError(f"{name!r} is not a module", where="argument setpoint",
-                             expected="one of " + ", ".join(modules))
-        if not np.isfinite(value) or value < 150:
-            raise InputError(f"set-point of {name} is {value}", where="argument setpoint", expected="kelvin",
-                             remedy="Add 273.15 to degrees Celsius.")
+    check_setpoint(eq.system, setpoint)
+    for name in setpoint:
         if name in inputs:
             raise InputError(f"module {name!r} has a current and a set-point", where="argument inputs",
                              remedy="Give one of them: its current follows from the set-point.")

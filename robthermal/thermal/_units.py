@@ -1,10 +1,9 @@
-"""Kelvin inside, Celsius at the border: exact decimal conversion, so that files survive a round trip."""
+"""Kelvin inside, Celsius at the border: single temperatures of system files, converted exactly as those of records."""
 
 from __future__ import annotations
 
-from decimal import Decimal
+from .. import signals
 
-_ZERO_CELSIUS = Decimal("273.15")
 LOWEST_KELVIN = 150.0
 HIGHEST_CELSIUS = 250.0
 
@@ -15,7 +14,7 @@ def celsius_to_kelvin(value: float) -> float:
     >>> celsius_to_kelvin(25.1)
     298.25
     """
-    return float(Decimal(repr(float(value))) + _ZERO_CELSIUS)
+    return float(signals.celsius_to_kelvin(value))
 
 
 def kelvin_to_celsius(value: float) -> float:
@@ -24,4 +23,4 @@ def kelvin_to_celsius(value: float) -> float:
     >>> kelvin_to_celsius(298.25)
     25.1
     """
-    return float(Decimal(repr(float(value))) - _ZERO_CELSIUS)
+    return float(signals.kelvin_to_celsius(value))

@@ -14,6 +14,7 @@ from ._fields import get, mapping, margin_of, not_negative, numbers, sequence, t
 from ._kind import Kind, Proof, working_precision
 from ._numbers import name_of, round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
+from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 
 _NORMS = {
     "sum": "the weighted sum of absolute differences",
@@ -34,12 +35,15 @@ class Contraction:
     margin: fmpq
     weights: tuple[fmpq, ...]
     matrix: tuple[tuple[fmpq, ...], ...]
+    parameters: Parameters = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
     """Return the exact problem, or raise InputError."""
-    network = read_system(system)
-    box = read_region(region, network)
+    nominal = read_system(system)
+    box = read_region(region, nominal)
+    parameters = read_parameters(region)
+    network = worst_system(nominal, system, parameters)
     table = mapping(evidence, "evidence")
     method = text(get(table, "method", "evidence"), "evidence.method")
     if method not in _NORMS:
@@ -56,14 +60,15 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
             raise InputError(f"{len(rows)} rows", where="evidence.matrix", expected=f"{n}, one per lump")
         matrix = [numbers(row, n, f"evidence.matrix[{k}]") for k, row in enumerate(rows)]
     return Contraction(network, box, method, rate, margin_of(margin, "rate"), tuple(weights),
-                       tuple(tuple(row) for row in matrix))
+                       tuple(tuple(row) for row in matrix), parameters)
 
 
 def claim(problem: Contraction) -> str:
     """Return the one sentence the data give."""
     speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
              else "decays strictly")
-    return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}: "
+    return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}"
+            f"{say_parameters(problem.parameters)}: "
             f"between any two trajectories in this box under the same inputs, {_NORMS[problem.method]} "
             f"(method {problem.method}) {speed}.")
 

@@ -16,7 +16,7 @@ from flint import arb, fmpq
 from ._definite import eliminate, is_positive, is_semidefinite
 from ._kind import Proof
 from ._numbers import as_float, name_of, show
-from ._slopes import least_ambient_slope, natural_slope, radiation_slope
+from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
 from ._vertices import Cluster, Point, Vertex, clusters, count, describe, endpoints, hull, vertices
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
                             f"modules, at lump {name_of(system.lumps[failed])}")
     points = [_points(problem, k) for k in range(len(system.modules))]
     for group in groups:
-        if count(group, problem.region, points) > _MOST_PER_CLUSTER:
-            return Proof(False, f"method energy: too many vertices ({count(group, problem.region, points)}) of modules "
-                                "that share lumps to check them one by one")
+        if count(system, group, problem.region, points) > _MOST_PER_CLUSTER:
+            return Proof(False, f"method energy: too many vertices ({count(system, group, problem.region, points)}) of "
+                                "uncertain modules, or of modules that share lumps, to check them one by one")
     choices = [_undominated(group, vertices(system, problem.region, group, points)) for group in groups]
     rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
     return _check(problem, rate, rest, ports, groups, choices)
@@ -57,7 +57,7 @@ def _network(problem: Contraction, rate: fmpq) -> list[dict[int, fmpq]]:
         a, b = link.nodes
         if isinstance(a, int) and isinstance(b, int):
             here, there = region.temperature[a], region.temperature[b]
-            g = link.conductance + natural_slope(link, here, there)[0]
+            g = link.conductance + exchange_slope(link, here, there)[0]
             u, v = radiation_slope(link, here), radiation_slope(link, there)
             # The slope at a enters as -u z_a² + u z_a z_b; beyond its least value that is at most (u - u_min) z_b²/4.
             rows[a][a] += g + u[0] - (v[1] - v[0]) / 4
@@ -73,7 +73,8 @@ def _network(problem: Contraction, rate: fmpq) -> list[dict[int, fmpq]]:
 def _points(problem: Contraction, k: int) -> list[Point]:
     """Return the current points of a module: sym J is convex in the current when R' >= 0, so its ends suffice."""
     interval = problem.region.current[k]
-    return endpoints(interval) if problem.system.modules[k].resistance[1] >= 0 else hull(interval, _PIECES)
+    convex = all(module.resistance[1] >= 0 for module in problem.system.forms(k))
+    return endpoints(interval) if convex else hull(interval, _PIECES)
 
 
 def _block(group: Cluster, vertex: Vertex) -> Block:

@@ -11,6 +11,8 @@ from typing import Any
 
 from flint import fmpq
 
+from robthermal.errors import InputError
+
 from ._fields import Interval, get, interval, intervals, kelvin_interval, mapping, margin_of
 from ._kind import Kind, Proof, working_precision
 from ._numbers import name_of, round_down, show
@@ -47,6 +49,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     """Return the exact problem, or raise InputError."""
     network = read_system(system)
     table = mapping(region, "region")
+    if "parameters" in table:
+        raise InputError("uncertain parameters are not part of this kind of claim", where="region.parameters")
     mapping(evidence, "evidence")
     given = get(table, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")

@@ -18,7 +18,7 @@ from ._definite import approximate, is_positive_preconditioned
 from ._fields import Interval
 from ._kind import Proof
 from ._numbers import name_of, show
-from ._slopes import natural_slope, radiation_slope
+from ._slopes import exchange_slope, radiation_slope
 from ._vertices import Entries, clusters, count, describe, hull, vertices
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class _Form:
 
 def prove(problem: Contraction, rate: fmpq) -> Proof:
     """Prove P > 0 and the inequality at every vertex of the relaxed box, refining the relaxation where it fails."""
-    broken = _asymmetry(problem)
+    broken = _asymmetry(problem) or _uncertain_capacity(problem)
     if broken:
         return Proof(False, broken)
     form = _Form(problem)
@@ -88,9 +88,14 @@ def _asymmetry(problem: Contraction) -> str:
     return ""
 
 
+def _uncertain_capacity(problem: Contraction) -> str:
+    name = next((name for name, _ in problem.parameters if name.startswith("lumps.")), "")
+    return f"method lyapunov: {name_of(name)} is uncertain, which needs method energy, sum or max" if name else ""
+
+
 def _count(problem: Contraction, pieces: int) -> int:
     points = [hull(interval, pieces) for interval in problem.region.current]
-    return math.prod(count(group, problem.region, points) for group in clusters(problem.system))
+    return math.prod(count(problem.system, group, problem.region, points) for group in clusters(problem.system))
 
 
 def _modules(problem: Contraction, pieces: int) -> list[list[Described]]:
@@ -125,13 +130,15 @@ def _links(problem: Contraction) -> tuple[Entries, list[list[Described]], str]:
         if len(ends) == 2:
             i, j = ends
             exchange: Entries = {(i, i): fmpq(-1), (i, j): fmpq(1), (j, j): fmpq(-1), (j, i): fmpq(1)}
-            if link.gain != 0:
-                bent.append(_ends(natural_slope(link, temperature[i], temperature[j]), exchange, "convection"))
+            if link.gain != 0 or link.spread != 0:
+                bent.append(_ends(exchange_slope(link, temperature[i], temperature[j]), exchange, "conductance"))
         elif ends and link.gain != 0:
             return base, bent, ("method lyapunov: natural convection from lump "
                                 f"{name_of(names[ends[0]])} to an ambient has no bounded slope; use energy, sum or max")
         else:
             exchange = {(i, i): fmpq(-1) for i in ends}
+            if ends and link.spread != 0:
+                bent.append(_ends((fmpq(0), link.spread), exchange, "uncertain conductance"))
         for place, value in exchange.items():
             base[place] = base.get(place, fmpq(0)) + link.conductance * value
         if link.radiation != 0:

@@ -19,15 +19,19 @@ def power(base: fmpq, exponent: fmpq) -> Interval:
     return (lower if lower > 0 else fmpq(0)), ball.upper().fmpq()
 
 
-def natural_slope(link: Link, first: Interval, second: Interval) -> Interval:
-    """Return bounds of the slope gain (1 + e) |dT|^e of gain |dT|^e dT, dT between two intervals [W/K]."""
+def exchange_slope(link: Link, first: Interval, second: Interval) -> Interval:
+    """Return bounds of what a link conducts beyond its conductance [W/K].
+
+    That is the spread of an uncertain conductance and the slope gain (1 + e) |dT|^e of gain |dT|^e dT, dT between two
+    intervals.
+    """
     if link.gain == 0:
-        return fmpq(0), fmpq(0)
+        return fmpq(0), link.spread
     low, high = first[0] - second[1], first[1] - second[0]
     far = max(abs(low), abs(high))
     near = fmpq(0) if low <= 0 <= high else min(abs(low), abs(high))
     factor = link.gain * (1 + link.exponent)
-    return factor * power(near, link.exponent)[0], factor * power(far, link.exponent)[1]
+    return factor * power(near, link.exponent)[0], factor * power(far, link.exponent)[1] + link.spread
 
 
 def radiation_slope(link: Link, temperature: Interval) -> Interval:

@@ -19,13 +19,17 @@ _EXPONENT_LIMIT = 10
 
 @dataclass(frozen=True)
 class Link:
-    """Heat path between two nodes; a node is a lump's index or an ambient's name."""
+    """Heat path between two nodes; a node is a lump's index or an ambient's name.
+
+    The conductance is anything between ``conductance`` and ``conductance + spread``, constant in time or not.
+    """
 
     nodes: tuple[int | str, int | str]
     conductance: fmpq
     gain: fmpq
     exponent: fmpq
     radiation: fmpq
+    spread: fmpq = fmpq(0)
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class Module:
 
 @dataclass(frozen=True)
 class ThermalSystem:
-    """Lumps, links and modules of a certificate, exactly."""
+    """Lumps, links and modules of a certificate, exactly; ``variants`` are a module's vertices where it is uncertain."""
 
     name: str
     lumps: tuple[str, ...]
@@ -65,6 +69,11 @@ class ThermalSystem:
     ambients: tuple[str, ...]
     links: tuple[Link, ...]
     modules: tuple[Module, ...]
+    variants: tuple[tuple[Module, ...], ...] = ()
+
+    def forms(self, k: int) -> tuple[Module, ...]:
+        """Return the vertices of module k: itself where nothing is uncertain."""
+        return self.variants[k] if self.variants else (self.modules[k],)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from flint import fmpq
 
 from ._fields import Interval
 from ._numbers import name_of, show
-from ._system import Region, ThermalSystem
+from ._system import Module, Region, ThermalSystem
 
 Entries = dict[tuple[int, int], fmpq]
 
@@ -83,13 +83,13 @@ def hull(interval: Interval, pieces: int) -> list[Point]:
     return [Point(step, step**2) for step in steps] + corners
 
 
-def count(cluster: Cluster, region: Region, points: Sequence[Sequence[Point]]) -> int:
+def count(system: ThermalSystem, cluster: Cluster, region: Region, points: Sequence[Sequence[Point]]) -> int:
     """Return the number of vertices of a cluster before listing them."""
     total = 1
     for lump in cluster.lumps:
         total *= len(ends(region.temperature[lump]))
     for module in cluster.modules:
-        total *= len(points[module])
+        total *= len(points[module]) * len(system.forms(module))
     return total
 
 
@@ -99,11 +99,11 @@ def vertices(system: ThermalSystem, region: Region, cluster: Cluster,
     found = []
     for temperatures in product(*(ends(region.temperature[lump]) for lump in cluster.lumps)):
         at = dict(zip(cluster.lumps, temperatures, strict=True))
-        for chosen in product(*(points[module] for module in cluster.modules)):
+        for chosen in product(*(product(points[k], system.forms(k)) for k in cluster.modules)):
             entries: Entries = {}
-            for k, point in zip(cluster.modules, chosen, strict=True):
-                _add_module(entries, system, k, at, point)
-            found.append(Vertex(entries, temperatures, chosen))
+            for point, module in chosen:
+                _add_module(entries, module, at, point)
+            found.append(Vertex(entries, temperatures, tuple(point for point, _ in chosen)))
     return found
 
 
@@ -116,8 +116,7 @@ def describe(system: ThermalSystem, cluster: Cluster, vertex: Vertex) -> str:
     return ", ".join(words)
 
 
-def _add_module(entries: Entries, system: ThermalSystem, k: int, at: dict[int, fmpq], point: Point) -> None:
-    module = system.modules[k]
+def _add_module(entries: Entries, module: Module, at: dict[int, fmpq], point: Point) -> None:
     h, c = module.hot, module.cold
     places = ((h, h), (h, c), (c, c), (c, h))
     for place, (a, b, d) in zip(places, module.entries(at[h], at[c]), strict=True):

@@ -15,7 +15,7 @@ from flint import fmpq
 
 from ._kind import Proof
 from ._numbers import name_of, round_down, show
-from ._slopes import least_ambient_slope, natural_slope, radiation_slope
+from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
 from ._system import Link, Module, Quadratic, peak
 from ._vertices import ends
 
@@ -80,7 +80,7 @@ def _collect(problem: Contraction) -> tuple[list[fmpq], list[dict[int, _Pair]]]:
         if isinstance(a, int) and isinstance(b, int):
             shared = _between(pairs, a, b)
             shared.conductance += link.conductance
-            if link.gain != 0 or link.radiation != 0:
+            if link.gain != 0 or link.radiation != 0 or link.spread != 0:
                 shared.bent.append(link)
         else:
             for lump in (node for node in (a, b) if isinstance(node, int)):
@@ -125,10 +125,10 @@ def _partner(problem: Contraction, j: int, p: int, pair: _Pair, own: fmpq) -> tu
             value = _links(problem, j, p, pair, sign)
             words = [f"{name_of(problem.system.lumps[p])} = {show(other)} K"]
             for k in pair.modules:
-                module = problem.system.modules[k]
-                top, current = peak(_share(problem, module, j, p, own, other, sign), problem.region.current[k])
+                top, current = max((peak(_share(problem, module, j, p, own, other, sign), problem.region.current[k])
+                                    for module in problem.system.forms(k)), key=lambda pair: pair[0])
                 value += top
-                words.append(f"current {name_of(module.name)} = {show(current)} A")
+                words.append(f"current {name_of(problem.system.modules[k].name)} = {show(current)} A")
             if best is None or value > best[0]:
                 best = (value, words)
     if best is None:
@@ -153,7 +153,7 @@ def _links(problem: Contraction, j: int, p: int, pair: _Pair, sign: int) -> fmpq
     total = (v - w) * pair.conductance
     own, other = problem.region.temperature[j], problem.region.temperature[p]
     for link in pair.bent:
-        total += max((v - w) * slope for slope in natural_slope(link, own, other))
+        total += max((v - w) * slope for slope in exchange_slope(link, own, other))
         here, there = radiation_slope(link, own), radiation_slope(link, other)
         if problem.method == "sum":  # row p, column j also holds the slope at j
             total += max((v - w) * slope for slope in here)

@@ -169,6 +169,30 @@ def test_result_goes_to_json_text_and_picture() -> None:
     np.testing.assert_allclose(np.diag(fit.correlation), 1.0)
 
 
+def twins(conductances: tuple[float, float] = (0.5, 0.5)) -> rt.System:
+    return rt.System(
+        ambients={"room": {"temperature": 295.0}}, lumps={name: {"capacity": 50.0} for name in "ab"},
+        links=[{"between": (name, "room"), "conductance": g} for name, g in zip("ab", conductances, strict=True)],
+        inputs={"q": {"lump": "a"}, "p": {"lump": "b"}},
+        sensors={"Ta": {"lump": "a", "noise": 0.1}, "Tb": {"lump": "b", "noise": 0.1}})
+
+
+def test_tied_parameters_share_one_value() -> None:
+    # Two equal bodies without a path between them: tied is the mean of what each says alone, √2 better known.
+    heat = np.repeat(np.random.default_rng(4).uniform(0, 20, 10), 15)
+    empty = rt.Record(sample_time=8.0, inputs=np.column_stack([heat, heat]), outputs=np.zeros((150, 0)),
+                      input_names=["q", "p"], output_names=[])
+    run = noisy(rt.thermal.simulate(twins(), empty), 1)
+    names = ("links.a-room.conductance", "links.b-room.conductance")
+    free = rt.calibrate(twins((0.3, 0.3)), run, parameters=dict.fromkeys(names, (0.05, 5.0)))
+    tied = rt.calibrate(twins((0.3, 0.3)), run, parameters={names: (0.05, 5.0)})
+    label = " = ".join(names)
+    assert list(tied.parameters) == [label]
+    assert tied.system.parameter(names[0]) == tied.system.parameter(names[1]) == tied.parameters[label]
+    assert tied.parameters[label] == pytest.approx(np.mean(list(free.parameters.values())), rel=1e-3)
+    assert tied.std[label] == pytest.approx(np.mean(list(free.std.values())) / np.sqrt(2), rel=0.3)
+
+
 def refused(match: str, system: rt.System | None = None, data: object = None, **options: object) -> None:
     run = noisy(driven(plant()), 1)
     with pytest.raises(InputError, match=match):
@@ -193,6 +217,11 @@ def test_bad_input_is_refused_by_name() -> None:
     refused("positive standard deviation", noise={"Ta": 0.0})
     refused("but initial is 'free'", parameters={"lumps.a.initial": (290.0, 300.0)},
             system=plant().with_parameters({"lumps.a.initial": 295.0}))
+    pair = ("links.a-room.conductance", "links.a-b.conductance")
+    refused("start at different values", parameters={pair: (0.05, 5.0)})
+    refused("not the same kind", parameters={("lumps.a.capacity", pair[0]): (0.05, 500.0)})
+    refused("named twice", parameters={("lumps.a.capacity",): (5.0, 500.0), "lumps.a.capacity": (5.0, 500.0)})
+    refused("Tie parameters in a mapping", parameters=[pair])
     refused("has no derivative", parameters={"sensors.Ta.time_constant": (0.0, 50.0)})
 
 

@@ -43,6 +43,12 @@ def test_load_beyond_the_fold_has_no_equilibrium_and_below_it_has_two():
     assert not above.equilibria and not above.outcome and "above q*" in above.outcome.text
 
 
+def test_an_equilibrium_where_more_current_heats_is_not_stable():
+    found = rt.thermal.steady_state(rt.systems.two_module(), setpoint={"m1": 278.15}).equilibria
+    assert [e.stable for e in found] == [True, False]
+    assert found[0].currents["m1"] < 1 and found[1].currents["m1"] > 3
+
+
 def test_modules_on_separate_sinks_have_their_own_limits():
     a, b = single(0.689), single(2.0)
     both = rt.System(ambients=a.ambients, lumps={"h1": {"capacity": 10.0}, "c1": {"capacity": 5.0},

@@ -1,0 +1,133 @@
+"""Calibration on a frequency response, weighted by its covariance. Evers (2.12)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from ..errors import InputError, Outcome
+from ..identify import FrequencyResponse
+from ..thermal import System
+from ._covariance import with_priors
+from ._directions import in_words
+from ._estimates import Estimates, outcome_of
+from ._operating_point import OperatingPoint
+from ._ranges import Choice, chosen_ranges
+from ._response_bins import bins_of, spread_of_score
+from ._response_model import ResponseProblem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResponseFit(Estimates):
+    """Result of `calibrate` on a frequency response; the first fields are those of `Estimates`.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        What was fitted.
+    bins : ndarray of int, shape (n_b,)
+        Positions of the frequencies that were used: determined, not suspect.
+    outputs, inputs : tuple of str
+        Channels that were used.
+    model : ndarray, shape (n_y, n_u, n_b)
+        Response of the calibrated model at those frequencies and channels.
+    misfit : float
+        Mean squared distance in standard deviations [-]: near 1 if the model explains the response within its noise.
+    """
+
+    response: FrequencyResponse
+    bins: NDArray[np.intp]
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    model: NDArray[np.complex128]
+    misfit: float
+
+    def plot(self) -> NDArray[Any]:
+        """Estimated response with its 95 % band, and the model on top.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes
+            As `FrequencyResponse.plot`.
+        """
+        axes: NDArray[Any] = self.response.plot()
+        grid = np.reshape(axes, (2 * len(self.response.output_names), len(self.response.input_names)))
+        frequencies = self.response.frequencies[self.bins]
+        for o, name in enumerate(self.outputs):
+            row = 2 * self.response.output_names.index(name)
+            for i, source in enumerate(self.inputs):
+                place = grid[row, self.response.input_names.index(source)]
+                place.plot(frequencies, np.abs(self.model[o, i]), "k--", linewidth=1.0, label="model")
+        return axes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Parameters and misfit, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
+        return self._plain_table() | {"misfit": self.misfit, "n_frequencies": int(self.bins.size)}
+
+    def __str__(self) -> str:
+        return "\n".join([*self._lines(), f"{self.bins.size} frequencies, misfit {self.misfit:.3g} (1 is noise alone)",
+                          str(self.outcome)])
+
+
+def calibrate_response(system: System, response: FrequencyResponse, parameters: Choice,
+                       operating_point: Mapping[str, float], max_iterations: int) -> ResponseFit:
+    """Fit the linearisation of a system to a frequency response."""
+    ranges = chosen_ranges(system, parameters)
+    problem = ResponseProblem(system, response, bins_of(system, response), ranges,
+                              OperatingPoint(operating_point))
+    _refuse(problem)
+    start = ranges.coordinates(ranges.start)
+    bounds = ranges.coordinates(ranges.lower), ranges.coordinates(ranges.upper)
+    run = least_squares(problem.vector, start, problem.jacobian, bounds=bounds, x_scale="jac",
+                        max_nfev=max_iterations, ftol=1e-9, xtol=1e-9, gtol=1e-9)
+    return _result(problem, run.x, run.status > 0, int(run.nfev))
+
+
+def _result(problem: ResponseProblem, q: Array, converged: bool, iterations: int) -> ResponseFit:
+    ranges, G, bins = problem.ranges, problem.response, problem.bins
+    values, J, z = ranges.values(q), problem.slopes(q), problem.whitened(q)
+    H = 2.0 * np.einsum("kap,kaq->pq", J.conj(), J).real
+    known = with_priors(ranges, values, H, spread_of_score(G, bins, J))
+    slopes, freedom = ranges.slopes(values), G.degrees_of_freedom[bins.index].astype(float)
+    # E zᴴz = m q/(q - n_y) with a covariance that is estimated with q degrees of freedom
+    misfit = np.mean(np.abs(z) ** 2 * ((freedom - len(G.output_names)) / freedom)[:, None])
+    fit = ResponseFit(
+        system=problem.system_at(q),
+        parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
+        start=dict(zip(ranges.names, ranges.start.tolist(), strict=True)),
+        lower=ranges.lower, upper=ranges.upper, sigma=ranges.sigma, at_bound=ranges.at_bound(values),
+        covariance=known.covariance * np.outer(slopes, slopes),
+        undetermined=in_words(ranges, known.undetermined),
+        iterations=iterations, outcome=Outcome(True, "converged", ""),
+        response=G, bins=bins.index, outputs=bins.outputs, inputs=bins.inputs,
+        model=problem.model(q).reshape(-1, len(bins.inputs), len(bins.outputs)).transpose(2, 1, 0),
+        misfit=float(misfit),
+    )
+    return replace(fit, outcome=outcome_of(fit, converged))
+
+
+def _refuse(problem: ResponseProblem) -> None:
+    """Fewer numbers than unknowns; a parameter that the response does not feel."""
+    names = problem.ranges.names
+    if 2 * problem.bins.measured.size <= len(names):
+        raise InputError(f"{problem.bins.measured.size} complex numbers for {len(names)} unknowns",
+                         where="argument data", remedy="Use more frequencies, or calibrate fewer parameters.")
+    slopes = problem.slopes(problem.ranges.coordinates(problem.ranges.start))
+    reach = np.abs(slopes).max(axis=(0, 1)) * problem.ranges.spread
+    idle = np.flatnonzero(reach < 1e-9)
+    if idle.size:
+        raise InputError(f"{names[idle[0]]!r} has no influence on the frequency response", where="argument data",
+                         expected="parameters that change the linearisation (offsets and temperatures may not)",
+                         remedy="Take it out of the parameters.")

@@ -1,0 +1,163 @@
+"""Frequency responses and excitation signals for the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..identify import FrequencyResponse, etfe, lpm, lrm, lrmp, spectral
+from ..signals import DesignCheck, Excitation, Record, design_check, multisines, read_record
+from ..thermal import System
+
+_METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
+
+
+def estimate_response(paths: Sequence[Path], *, system: System | None = None, inputs: Sequence[str] = (),
+                      outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
+                      poles: Sequence[float] = (), band: tuple[float, float] | None = None) -> FrequencyResponse:
+    """Estimate a frequency response from record files.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Records of one machine, each with its own transient.
+    system : System, optional
+        Gives the columns, and the prescribed poles of "lrmp" when `poles` is empty.
+    inputs, outputs : sequence of str
+        Columns, instead of or to select from those of the system.
+    method : str
+        "etfe", "spectral", "lpm", "lrm" or "lrmp".
+    half_width : int
+        Window is 2 half_width + 1 bins (local methods).
+    degree : int
+        Of the local polynomials ("lpm", "lrm").
+    poles : sequence of float
+        Prescribed poles [rad/s] for "lrmp"; empty: those of the system, else chosen from the data.
+    band : tuple of float, optional
+        Frequencies to keep [Hz].
+
+    Returns
+    -------
+    FrequencyResponse
+
+    Raises
+    ------
+    InputError
+        Unknown method, missing columns, and everything the estimators refuse.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> from pathlib import Path
+    >>> u = rt.signals.multisine(400, sample_time=1.0, seed=0, band=(0.0, 0.4), rms=1.0, periods=2)
+    >>> rt.Record(sample_time=1.0, inputs=u, outputs=300 + np.cumsum(u) * 0.01, input_names=["q"],
+    ...           output_names=["T"]).save("run.csv")
+    >>> rt.project.estimate_response([Path("run.csv")], inputs=["q"], outputs=["T"]).response.shape[:2]
+    (1, 1)
+    """
+    if method not in _METHODS:
+        raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
+    records = [_channels(path, system, inputs, outputs) for path in paths]
+    given: Any = list(poles) if poles else system if system is not None else "auto"
+    G = {"etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
+         "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
+         "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
+         "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
+    return G.between(*band) if band else G
+
+
+def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str]) -> Record:
+    if system is None:
+        if not inputs or not outputs:
+            raise InputError("the columns are not known", where=str(path),
+                             remedy="Give --system, or --input and --output for each column.")
+        return read_record(path, inputs=list(inputs), outputs=list(outputs))
+    record = read_record(path, system)
+    if not record.output_names:
+        raise InputError("has no sensor column", where=str(path), expected="one of " + ", ".join(system.sensor_names))
+    return record.select(inputs=list(inputs or record.input_names), outputs=list(outputs or record.output_names))
+
+
+def design_excitation(names: Sequence[str], *, period: int, sample_time: float, band: tuple[float, float],
+                      amplitude: float, periods: int = 1, nonnegative: bool = False, arrangement: str = "orthogonal",
+                      seed: int = 0, system: System | None = None) -> tuple[Excitation, DesignCheck]:
+    """Design multisines for some inputs and check what they will resolve.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Input columns.
+    period, periods : int
+        Samples in a period, and how many periods.
+    sample_time : float
+        [s].
+    band : tuple of float
+        Excited frequencies [Hz].
+    amplitude : float
+        Largest deviation from the mean [unit of the inputs].
+    nonnegative : bool
+        Shift the mean so that no value is negative (heaters).
+    arrangement : str
+        "orthogonal", "zippered" or "independent".
+    seed : int
+        Of the random phases.
+    system : System, optional
+        Its poles tell which frequencies the time leaves unresolved.
+
+    Returns
+    -------
+    excitation : Excitation
+        Signals of all experiments.
+    check : DesignCheck
+        What they cost and resolve.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> u, check = rt.project.design_excitation(["m1", "m2"], period=2000, sample_time=1.0, band=(0.001, 0.1),
+    ...                                         amplitude=0.5, system=rt.systems.two_module())
+    >>> len(u.experiments)
+    2
+    """
+    u = multisines(period, inputs=len(names), sample_time=sample_time, seed=seed, band=band, amplitude=amplitude,
+                   offset="nonnegative" if nonnegative else 0.0, periods=periods, phases="low_crest",
+                   arrangement=arrangement)  # type: ignore[arg-type]  # checked by multisines
+    return u, design_check(u, sample_time=sample_time, poles=None if system is None else system.poles())
+
+
+def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Path]:
+    """Write every experiment as a record file; several get a number in their name.
+
+    Parameters
+    ----------
+    u : Excitation
+        From `design_excitation`.
+    names : sequence of str
+        Input columns.
+    path : Path
+        File to write (.csv, .parquet, .mat).
+
+    Returns
+    -------
+    list of Path
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> u, _ = rt.project.design_excitation(["q"], period=500, sample_time=1.0, band=(0.01, 0.1), amplitude=1.0)
+    >>> [p.name for p in rt.project.write_excitation(u, ["q"], Path("u.csv"))]
+    ['u.csv']
+    """
+    several = len(u.experiments) > 1
+    written = []
+    for number, signals in enumerate(u.experiments, start=1):
+        file = path.with_stem(f"{path.stem}_{number}") if several else path
+        Record(sample_time=u.sample_time, inputs=signals, outputs=np.zeros((len(signals), 0)), input_names=list(names),
+               output_names=[]).save(file)
+        written.append(file)
+    return written
