@@ -22,6 +22,7 @@ from .errors import Outcome as Outcome
 if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import calibration as calibration
     from . import certify as certify
+    from . import design as design
     from . import errors as errors
     from . import identify as identify
     from . import project as project
@@ -39,7 +40,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "errors", "identify", "project", "report", "signals", "systems", "thermal",
+_ROOMS = ("calibration", "certify", "design", "errors", "identify", "project", "report", "signals", "systems", "thermal",
           "verification")
 
 _HOME = {  # public name: the room it lives in

@@ -117,8 +117,8 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
 @app.command()
 def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machine.")],
         system: Annotated[Path | None, typer.Option("--system", help="System file: columns and poles.")] = None,
-        inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column; repeat for several.")] = None,
-        outputs: Annotated[list[str] | None, typer.Option("--output", help="Output column; repeat for several.")] = None,
+        inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column, may repeat.")] = None,
+        outputs: Annotated[list[str] | None, typer.Option("--output", help="Output column, may repeat.")] = None,
         method: Annotated[str, typer.Option(help="etfe, spectral, lpm, lrm or lrmp.")] = "lpm",
         half_width: Annotated[int, typer.Option(help="Bins on each side of a local window.")] = 8,
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
@@ -134,8 +134,9 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
     model = rt.read_system(system) if system else None
     with _progress() as say:
         say("estimating the frequency response")
-        G = rt.project.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [], method=method,
-                                         half_width=half_width, degree=degree, poles=poles or [], band=band)
+        G = rt.project.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [],
+                                         method=method, half_width=half_width, degree=degree, poles=poles or [],
+                                         band=band)
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)
@@ -151,20 +152,20 @@ def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.",
                band: Annotated[tuple[float, float], typer.Option(help="Excited frequencies [Hz].", metavar="LO HI")],
                amplitude: Annotated[float, typer.Option(help="Largest deviation from the mean [unit of the inputs].")],
                periods: Annotated[int, typer.Option(help="How many periods.")] = 1,
-               nonnegative: Annotated[bool, typer.Option("--nonnegative", help="No value below zero (heaters).")] = False,
-               arrangement: Annotated[str, typer.Option(help="orthogonal, zippered or independent.")] = "orthogonal",
+               nonnegative: Annotated[bool, typer.Option("--nonnegative", help="No value below 0.")] = False,
+               arrangement: Annotated[str, typer.Option(help="orthogonal, zippered, independent.")] = "orthogonal",
                seed: Annotated[int, typer.Option(help="Of the random phases.")] = 0,
-               system: Annotated[Path | None, typer.Option("--system", help="System file, for the design check.")] = None,
+               system: Annotated[Path | None, typer.Option("--system", help="For the design check.")] = None,
                out: Annotated[Path, typer.Option("--out", help="Record to write.")] = Path("excitation.csv"),
                as_json: Json = False) -> None:
     """Design multisine inputs, and say before the experiment what they will leave unresolved.
 
-    Example: robthermal excitation m1 m2 --period 7200 --sample-time 1 --band 0.0005 0.1 --amplitude 0.5 --system setup.toml
+    Example: robthermal excitation m1 m2 --period 7200 --sample-time 1 --band 0.0005 0.1 --amplitude 0.5
     """
     model = rt.read_system(system) if system else None
-    u, design = rt.project.design_excitation(names, period=period, sample_time=sample_time, band=band, amplitude=amplitude,
-                                             periods=periods, nonnegative=nonnegative, arrangement=arrangement, seed=seed,
-                                             system=model)
+    u, design = rt.project.design_excitation(
+        names, period=period, sample_time=sample_time, band=band, amplitude=amplitude, periods=periods,
+        nonnegative=nonnegative, arrangement=arrangement, seed=seed, system=model)
     files = rt.project.write_excitation(u, names, out)
     summary = {"out": [str(file) for file in files], "outcome": design.outcome.text, "good": design.outcome.ok,
                "crest_factors": u.crest_factors.max(axis=(0, 1)).tolist()}

@@ -1,10 +1,15 @@
-"""Parameters of a thermal system from measured records, with what the data do and do not determine."""
+"""Parameters of a thermal system from measured records or frequency responses, and what the data do not determine."""
 
 from ._calibrate import calibrate as calibrate
+from ._convection import ConvectionLaw as ConvectionLaw
+from ._convection import convection_law as convection_law
 from ._estimates import Estimates as Estimates
 from ._fit import Fit as Fit
+from ._module_properties import ModuleProperties as ModuleProperties
+from ._module_properties import module_properties as module_properties
 from ._response_fit import ResponseFit as ResponseFit
 from ._score import Score as Score
 from ._whiteness import Whiteness as Whiteness
 
-__all__ = ["Estimates", "Fit", "ResponseFit", "Score", "Whiteness", "calibrate"]
+__all__ = ["ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseFit", "Score", "Whiteness", "calibrate",
+           "convection_law", "module_properties"]

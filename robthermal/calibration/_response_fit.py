@@ -26,10 +26,27 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResponseFit(Estimates):
-    """Result of `calibrate` on a frequency response; the first fields are those of `Estimates`.
+    """Result of `calibrate` on a frequency response.
 
     Parameters
     ----------
+    system : System
+        With the estimated parameters.
+    parameters, start : dict
+        Estimates and starting values by name, in the unit of each parameter.
+    lower, upper, sigma : ndarray, shape (p,)
+        Bounds, and prior standard deviations (infinite: no prior).
+    at_bound : ndarray of bool, shape (p,)
+        Estimates that ran into a bound; their standard deviation ignores it.
+    covariance : ndarray, shape (p, p)
+        Covariance of the estimates, in the order of `parameters`, initial temperatures marginalised, residuals taken as
+        correlated in time. A direction the data leave open has the spread of its prior or of its bounds.
+    undetermined : tuple of str
+        Directions the data do not determine, in words.
+    iterations : int
+        Model evaluations the optimiser tried.
+    outcome : Outcome
+        Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
     response : FrequencyResponse
         What was fitted.
     bins : ndarray of int, shape (n_b,)

@@ -24,7 +24,7 @@ Direction = Literal["symmetric", "cooling", "heating"]
 _SPAN = {"symmetric": (-1.0, 1.0), "cooling": (0.0, 1.0), "heating": (-1.0, 0.0)}
 _HIGHEST = 1e4  # A
 _PRECISION = 1e-5
-_PRECISION_MATRIX = 2e-3  # every step may cost seconds
+_PRECISION_MATRIX = 4e-3  # every step may cost seconds
 
 
 @dataclass(frozen=True)

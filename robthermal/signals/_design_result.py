@@ -102,7 +102,7 @@ class DesignCheck:
 
     @property
     def relative_deviation(self) -> Array | None:
-        """Square root of the variance over |G|, (n_y, n_u, n_f) [-]; None without `noise` and nominal response."""
+        """Root of the variance over the size of G, (n_y, n_u, n_f) [-]; None without `noise` and nominal response."""
         if self.response is None or self.variance is None:
             return None
         with np.errstate(divide="ignore"):

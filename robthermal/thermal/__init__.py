@@ -43,11 +43,12 @@ from ._simulate import trajectory as trajectory
 from ._steady import Equilibrium as Equilibrium
 from ._steady import SteadyState as SteadyState
 from ._steady import steady_state as steady_state
+from ._stepping import Stepper as Stepper
 from ._system import System as System
 
 __all__ = ["Ambient", "Assembly", "Contact", "DatasheetFit", "Equations", "Equilibrium", "FitRange", "Input", "Layer",
            "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
-           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "System", "Trajectory",
+           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Stepper", "System", "Trajectory",
            "fit_in_kelvin", "fold", "format_system", "hinf_error", "linearize", "load_curve", "materials",
            "module_from_datasheet", "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce",
            "simulate", "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_system"]

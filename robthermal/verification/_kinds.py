@@ -6,6 +6,7 @@ from ._contraction import CONTRACTION
 from ._invariance import INVARIANCE
 from ._kind import Kind
 from ._network import NETWORK
+from ._observer import OBSERVER
 from ._runaway import RUNAWAY
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK)}
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER)}

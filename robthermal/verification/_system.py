@@ -61,7 +61,7 @@ class Module:
 
 @dataclass(frozen=True)
 class ThermalSystem:
-    """Lumps, links and modules of a certificate, exactly; ``variants`` are a module's vertices where it is uncertain."""
+    """Lumps, links and modules of a certificate, exactly; ``variants`` are the vertices of uncertain modules."""
 
     name: str
     lumps: tuple[str, ...]

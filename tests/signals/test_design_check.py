@@ -143,6 +143,15 @@ CASES: list[tuple[Any, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize("case", range(len(CASES)))
+def test_noise_gain_is_that_of_lpm_at_every_line(case: int) -> None:
+    u, settings = CASES[case]
+    check = design_check(u, sample_time=1.0, poles=[-0.05], **settings)
+    experiments = u.experiments if isinstance(u, rt.signals.Excitation) else [np.asarray(u)[:, None]]
+    G = rt.identify.lpm(records(experiments, 1.0, [one[:, :1] for one in experiments]), **settings)
+    np.testing.assert_allclose(check.noise_gain, np.einsum("iif->if", G.gram).real[:, bins_of(check)], rtol=1e-8)
+
+
+@pytest.mark.parametrize("case", range(len(CASES)))
 def test_expected_variance_is_the_scatter_of_lpm(case: int) -> None:
     u, settings = CASES[case]
     check = design_check(u, sample_time=1.0, poles=[-0.05], noise=[0.02, 0.5], **settings)

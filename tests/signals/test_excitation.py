@@ -76,7 +76,7 @@ def test_multisine_has_the_amplitude_spectrum_asked_for() -> None:
     np.testing.assert_array_equal(sizes("linear"), sizes(np.ones(4)))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from(["random", "schroeder", "low_crest"]), st.floats(1e-3, 1e3))
 def test_a_nonnegative_multisine_touches_zero_and_is_nowhere_below(seed: int, phases: Any, rms: float) -> None:
     common: dict[str, Any] = dict(sample_time=1.0, lines=range(1, 12), rms=rms, phases=phases, seed=seed)
@@ -113,7 +113,7 @@ def test_schroeder_phases_of_equal_amplitudes_are_the_published_ones() -> None:
 def test_low_crest_phases_beat_schroeder_and_keep_the_spectrum(lines: Any, spectrum: Any, at_most: float) -> None:
     common: dict[str, Any] = dict(sample_time=1.0, lines=lines, rms=1.0, spectrum=spectrum)
     schroeder = multisine(1000, phases="schroeder", seed=0, **common)
-    for seed in range(3):
+    for seed in range(2):
         low, random = (multisine(1000, phases=word, seed=seed, **common) for word in ("low_crest", "random"))
         assert crest_factor(low) < min(at_most, crest_factor(schroeder), crest_factor(random))
         np.testing.assert_allclose(np.abs(np.fft.rfft(low)), np.abs(np.fft.rfft(schroeder)), atol=1e-9)

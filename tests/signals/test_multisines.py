@@ -13,8 +13,10 @@ from robthermal.signals import crest_factor, multisine, multisines
 COMMON: dict[str, Any] = {"sample_time": 0.5, "lines": range(2, 40), "rms": 1.0, "seed": 3}
 
 
-@pytest.mark.parametrize("n_u", [1, 2, 3, 4, 5])
-@pytest.mark.parametrize("phases", ["random", "low_crest"])
+@pytest.mark.parametrize(
+    ("n_u", "phases"),
+    [(1, "random"), (2, "random"), (3, "random"), (4, "random"), (5, "random"), (2, "low_crest"), (3, "low_crest")],
+)
 def test_experiments_are_orthogonal_at_every_line(n_u: int, phases: Any) -> None:
     heat = multisines(200, inputs=n_u, phases=phases, offset="nonnegative", **COMMON)
     U = np.fft.rfft(heat.signals[0], axis=1, norm="ortho")[:, 2:40]  # (experiments, lines, inputs)
@@ -56,7 +58,7 @@ def test_all_experiments_share_level_and_operating_point() -> None:
     np.testing.assert_allclose(means, np.broadcast_to(means[0, 0], means.shape))
 
 
-@pytest.mark.parametrize("n_u", [2, 3, 4])
+@pytest.mark.parametrize("n_u", [2, 3])
 def test_low_crest_holds_in_every_experiment(n_u: int) -> None:
     heat = multisines(400, inputs=n_u, phases="low_crest", **COMMON)
     direct = [[crest_factor(experiment[:, i]) for i in range(n_u)] for experiment in heat.experiments]

@@ -1,0 +1,191 @@
+"""Feed-forward of what is measured, and a disturbance observer for what is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from ..errors import InputError
+from ._controller import Controller, Seen
+from ._modules import Array
+from ._numbers import positive
+from ._plant import ColdSide
+from ._sampling import check_sampling
+
+
+@dataclass(frozen=True)
+class FeedForward:
+    """A controller plus the steady heat that holds the reference in the measured surroundings.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        Its static gains.
+    controller : Controller
+        Works on what is left.
+    """
+
+    plant: ColdSide
+    controller: Controller
+
+    @property
+    def sample_time(self) -> float:
+        """[s]."""
+        return self.controller.sample_time
+
+    def _share(self, seen: Seen) -> Array:
+        return self.plant.holding_heat(seen.reference, seen.around)
+
+    def start(self, seen: Seen, heat: Array) -> Array:
+        """State of the controller."""
+        return self.controller.start(seen, heat - self.plant.holding_heat(seen.cold, seen.around))
+
+    def heat(self, state: Array, seen: Seen) -> Array:
+        """Wanted heats v [W]."""
+        return self.controller.heat(state, seen) + self._share(seen)
+
+    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+        """Advance the controller with its own share."""
+        share = self._share(seen)
+        return self.controller.advance(state, seen, wanted - share, achieved - share)
+
+
+def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
+    """Add feed-forward of the measured ambient, heaters and reference to a controller.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        The cold side.
+    controller : Controller
+        For example from `pid`.
+
+    Returns
+    -------
+    FeedForward
+        Its heat holds the set-point exactly in steady state when the model is right and nothing unmeasured acts.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
+    >>> loop = rt.design.feed_forward(plant, rt.design.pid(plant, bandwidth=0.02, sample_time=1.0))
+    >>> loop.sample_time
+    1.0
+    """
+    _same_law(plant, controller)
+    return FeedForward(plant, controller)
+
+
+@dataclass(frozen=True)
+class DisturbanceObserver:
+    """A controller that also cancels the estimated unmeasured heat on the cold faces.
+
+    x̂⁺ = A_d x̂ + B_d (achieved + d̂) + B_w w + L_x e, d̂⁺ = d̂ + L_d e, e = y - C x̂. It is driven by the heat that the
+    law *achieved*, so it does not wind up.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        Its model.
+    controller : Controller
+        Works on what is left; needs no integral action.
+    A, B, L : ndarray
+        Augmented model [x̂; d̂] and gain.
+    """
+
+    plant: ColdSide
+    controller: Controller
+    A: Array
+    B: Array
+    L: Array
+
+    @property
+    def sample_time(self) -> float:
+        """[s]."""
+        return self.controller.sample_time
+
+    def _split(self, state: Array) -> tuple[Array, Array]:
+        size = len(self.A)
+        return state[:size], state[size:]
+
+    def disturbance(self, state: Array) -> Array:
+        """Estimated unmeasured heat on the cold faces [W]."""
+        return self._split(state)[0][len(self.plant.lumps):]
+
+    def start(self, seen: Seen, heat: Array) -> Array:
+        """Estimates at what is seen, no disturbance."""
+        own = np.concatenate([seen.temperatures[self.plant.indices], np.zeros(len(seen.cold))])
+        return np.concatenate([own, self.controller.start(seen, heat)])
+
+    def heat(self, state: Array, seen: Seen) -> Array:
+        """Wanted heats v [W]."""
+        own, inner = self._split(state)
+        return self.controller.heat(inner, seen) - own[len(self.plant.lumps):]
+
+    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+        """Advance both: the observer with the achieved heat, the controller with its own share."""
+        own, inner = self._split(state)
+        error = seen.cold - self.plant.C @ own[:len(self.plant.lumps)]
+        estimate = self.A @ own + self.B @ np.concatenate([achieved, seen.around]) + self.L @ error
+        share = self.disturbance(state)
+        return np.concatenate([estimate, self.controller.advance(inner, seen, wanted + share, achieved + share)])
+
+
+def disturbance_observer(plant: ColdSide, controller: Controller, *, time_constant: float) -> DisturbanceObserver:
+    """Add a disturbance observer to a controller.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        The cold side.
+    controller : Controller
+        For example a P or PI controller from `pid`.
+    time_constant : float
+        How fast the disturbance is followed [s].
+
+    Returns
+    -------
+    DisturbanceObserver
+
+    Raises
+    ------
+    InputError
+        A time constant below two samples; a loop that is not stable with it.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
+    >>> p = rt.design.pid(plant, proportional=0.2, sample_time=1.0)
+    >>> loop = rt.design.disturbance_observer(plant, p, time_constant=20.0)
+    >>> bool(abs(rt.design.loop_poles(plant, loop)).max() < 1)
+    True
+    """
+    _same_law(plant, controller)
+    h, tau = controller.sample_time, positive(time_constant, "time_constant", "s")
+    if tau < 2 * h:
+        raise InputError(f"time_constant = {tau:g} s with a sample time of {h:g} s", where="argument time_constant",
+                         expected=f"at least {2 * h:g} s", remedy="Sample faster.")
+    A_d, B_d = plant.sampled(h)
+    n, m = len(A_d), len(plant.law.names)
+    A = np.block([[A_d, B_d[:, :m]], [np.zeros((m, n)), np.eye(m)]])
+    B = np.vstack([B_d, np.zeros((m, B_d.shape[1]))])
+    C = np.hstack([plant.C, np.zeros((m, m))])
+    # random-walk heat against sensor noise, shifted so that the estimate settles with the time constant or faster
+    shift = np.exp(h / tau)
+    noise = np.diag(np.concatenate([np.full(n, 1e-6), np.ones(m)]))
+    P = solve_discrete_are(shift * A.T, shift * C.T, noise, np.eye(m))
+    L = shift**2 * A @ P @ C.T @ np.linalg.inv(shift**2 * C @ P @ C.T + np.eye(m))
+    observer = DisturbanceObserver(plant, controller, A, B, L)
+    check_sampling(plant, observer)
+    return observer
+
+
+def _same_law(plant: ColdSide, controller: Controller) -> None:
+    if not (isinstance(plant, ColdSide) and hasattr(controller, "advance") and hasattr(controller, "sample_time")):
+        raise InputError(f"plant is a {type(plant).__name__}, controller a {type(controller).__name__}",
+                         where="arguments plant, controller",
+                         expected="a ColdSide (rt.design.cold_side) and a controller (rt.design.pid, …)")

@@ -1,0 +1,30 @@
+"""Checks of plain numbers, one message each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ._modules import Array
+
+
+def positive(value: Any, argument: str, unit: str) -> float:
+    """A finite number above zero."""
+    try:
+        number = np.nan if isinstance(value, str | bytes | bool) else float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (np.isfinite(number) and number > 0):
+        raise InputError(f"{argument} = {value!r}", where=f"argument {argument}",
+                         expected=f"a finite number above 0 [{unit}]")
+    return number
+
+
+def non_negative(values: Array, argument: str) -> None:
+    """Finite numbers, zero or above."""
+    if not (np.isfinite(values).all() and values.min(initial=0.0) >= 0):
+        raise InputError(f"{argument} has the value {values.min():g}", where=f"argument {argument}",
+                         expected="finite numbers, 0 or more",
+                         remedy="Gains are positive: more heat v makes the cold lump warmer.")

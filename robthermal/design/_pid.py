@@ -1,0 +1,122 @@
+"""PI and PID with back-calculation from the heat that the law achieved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ._controller import Seen
+from ._modules import Array
+from ._numbers import non_negative, positive
+from ._plant import ColdSide
+from ._sampling import check_sampling
+
+
+@dataclass(frozen=True)
+class PID:
+    """One PI or PID per module, anti-windup by back-calculation from the heat the law achieved.
+
+    v = Kp (r - y) + z - Kd ẏ_f, with z held exactly over a sample and the filtered derivative sampled exactly.
+
+    Parameters
+    ----------
+    proportional : ndarray, shape (n_modules,)
+        Kp [W/K].
+    integral : ndarray, shape (n_modules,)
+        Ki [W/(K s)].
+    derivative : ndarray, shape (n_modules,)
+        Kd [W s/K]; acts on the measurement.
+    filter_time : float
+        Time constant of the derivative's filter [s].
+    tracking_time : ndarray, shape (n_modules,)
+        Time in which the integrator gives way to an active limit [s].
+    sample_time : float
+        [s].
+    """
+
+    proportional: Array
+    integral: Array
+    derivative: Array
+    filter_time: float
+    tracking_time: Array
+    sample_time: float
+
+    def start(self, seen: Seen, heat: Array) -> Array:
+        """Integrators at the heat, derivative filters at rest."""
+        return np.concatenate([heat, seen.cold])
+
+    def heat(self, state: Array, seen: Seen) -> Array:
+        """Wanted heats v [W]."""
+        z, filtered = np.split(state, 2)
+        slope = (seen.cold - filtered) / self.filter_time
+        return self.proportional * (seen.reference - seen.cold) + z - self.derivative * slope
+
+    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+        """Integrate, giving way to limits; advance the filter with the measurement held."""
+        z, filtered = np.split(state, 2)
+        z = z + self.sample_time * self.integral * (seen.reference - seen.cold)
+        z = z + -np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
+        keep = np.exp(-self.sample_time / self.filter_time)
+        return np.concatenate([z, keep * filtered + (1 - keep) * seen.cold])
+
+
+def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None, proportional: float | Array | None = None,
+        integral: float | Array = 0.0, derivative: float | Array = 0.0, filter_time: float | None = None,
+        tracking_time: float | None = None) -> PID:
+    """One PI or PID per module in discrete time.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        What it controls.
+    sample_time : float
+        [s].
+    bandwidth : float, optional
+        Tune a PI for this crossover frequency [rad/s]: |Kp G| = 1 there, integral action a factor four below.
+    proportional, integral, derivative : float or ndarray, optional
+        Own gains [W/K], [W/(K s)], [W s/K] instead of a bandwidth.
+    filter_time : float, optional
+        Time constant of the derivative's filter [s]; default two samples.
+    tracking_time : float, optional
+        Anti-windup [s]; default Kp/Ki.
+
+    Returns
+    -------
+    PID
+
+    Raises
+    ------
+    InputError
+        Neither or both of bandwidth and proportional; a sample time too slow for the sampled loop to be stable, with
+        the slowest that would do.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
+    >>> controller = rt.design.pid(plant, bandwidth=0.05, sample_time=1.0)
+    >>> bool(abs(rt.design.loop_poles(plant, controller)).max() < 1)
+    True
+    """
+    h = positive(sample_time, "sample_time", "s")
+    if (bandwidth is None) == (proportional is None):
+        raise InputError("give either bandwidth or proportional", where="argument bandwidth",
+                         expected="one of the two")
+    m = len(plant.law.names)
+    if bandwidth is not None:
+        w = positive(bandwidth, "bandwidth", "rad/s")
+        G = plant.C @ np.linalg.solve(1j * w * np.eye(len(plant.A)) - plant.A, plant.B[:, :m])
+        kp = 1 / np.abs(np.diag(G))
+        ki, kd = kp * w / 4, np.zeros(m)
+    else:
+        kp, ki, kd = (np.broadcast_to(np.asarray(gain, float), (m,)).copy()
+                      for gain in (proportional, integral, derivative))  # type: ignore[arg-type]  # not None here
+        non_negative(np.stack([kp, ki, kd]), "proportional, integral, derivative")
+    own = kp / np.where(ki > 0, ki, 1.0) if tracking_time is None else positive(tracking_time, "tracking_time", "s")
+    tracking = np.where(ki > 0, np.maximum(own, h), np.inf)  # what never integrates must not drift either
+    tau = 2 * h if filter_time is None else positive(filter_time, "filter_time", "s")
+    controller = PID(kp, ki, kd, tau, tracking, h)
+    check_sampling(plant, controller, lambda time: PID(kp, ki, kd, max(tau, 2 * time), tracking, time))
+    return controller

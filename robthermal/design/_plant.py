@@ -1,0 +1,155 @@
+"""The linear cold side that the law leaves to the outer loop, G_lin of Evers (5.19), sampled exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import InputError
+from ..thermal import Equations
+from ._linearization import FeedbackLinearization
+from ._modules import Array
+
+
+@dataclass(frozen=True)
+class ColdSide:
+    """E ẋ = A x + v + B w: lumps of the cold side, driven by the modules' heats and by everything around them.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        Whose modules drive it.
+    lumps : tuple of str
+        States.
+    around : tuple of str
+        What else acts: heaters, ambients, and hot faces that touch the cold side through a link. In this order they
+        are the inputs after the modules' heats.
+    A, B : ndarray
+        (n, n) [1/s] and (n, n_modules + n_around).
+    """
+
+    law: FeedbackLinearization
+    lumps: tuple[str, ...]
+    around: tuple[str, ...]
+    A: Array
+    B: Array
+
+    @property
+    def indices(self) -> NDArray[np.intp]:
+        """Positions of its lumps among all lumps of the system."""
+        return np.array([self.law.system.lump_names.index(name) for name in self.lumps], np.intp)
+
+    @property
+    def C(self) -> Array:
+        """Selects the cold faces, (n_modules, n)."""
+        faces = [part.cold for part in self.law.modules.parts]
+        return np.array([[float(lump == face) for lump in self.lumps] for face in faces])
+
+    def sampled(self, sample_time: float) -> tuple[Array, Array]:
+        """Exact zero-order-hold A_d and B_d at a sample time [s]."""
+        n, m = self.B.shape
+        both = np.zeros((n + m, n + m))
+        both[:n] = np.hstack([self.A, self.B]) * sample_time
+        exact = expm(both)[:n]
+        return exact[:, :n], exact[:, n:]
+
+    def to_control(self, sample_time: float = 0.0) -> control.StateSpace:
+        """python-control state space from [v, around] to the cold faces; continuous for sample_time 0."""
+        A, B = self.sampled(sample_time) if sample_time else (self.A, self.B)
+        return control.ss(A, B, self.C, np.zeros((len(self.C), B.shape[1])), dt=sample_time, states=list(self.lumps),
+                          inputs=[*(f"heat of {name}" for name in self.law.names), *self.around],
+                          outputs=[part.cold for part in self.law.modules.parts])
+
+    def surroundings(self, temperatures: Array, exogenous: Mapping[str, float]) -> Array:
+        """Values of `around` from all lump temperatures and the heaters and ambients by name."""
+        names = self.law.system.lump_names
+        nominal = {name: part.temperature for name, part in self.law.system.ambients.items()}
+        return np.array([temperatures[names.index(name)] if name in names else exogenous.get(name, nominal.get(name, 0))
+                         for name in self.around])
+
+    def holding_heat(self, reference: ArrayLike, around: ArrayLike) -> Array:
+        """Steady heats v that hold the cold faces at a reference, given the surroundings: static feed-forward [W]."""
+        m = len(self.law.names)
+        X = np.linalg.solve(-self.A, self.B)
+        to_face = self.C @ X
+        return np.linalg.solve(to_face[:, :m], np.asarray(reference) - to_face[:, m:] @ np.asarray(around))
+
+
+def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None) -> ColdSide:
+    """Linear plant of a feedback-linearised system, from the heats v to the cold faces.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        The law.
+    temperatures : array_like, shape (n_lumps,), optional
+        Where natural convection and radiation are linearised [K]; default the initial temperatures. The links of
+        modules and conduction are linear: for them it does not matter.
+
+    Returns
+    -------
+    ColdSide
+        Lumps that a cold face reaches through links, hot faces apart: those act like ambients, so the plant stays
+        linear when a screw joins both sides.
+
+    Raises
+    ------
+    InputError
+        When one lump is the hot face of one driven module and the cold face of another (a cascade): v of the one is
+        then not free of the current of the other.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
+    >>> len(plant.lumps), plant.around
+    (8, ('room',))
+    """
+    system, eq = law.system, Equations(law.system)
+    hot = {part.hot for part in system.modules.values()}
+    for name, part in zip(law.names, law.modules.parts, strict=True):
+        if part.cold in hot:
+            raise InputError(f"the cold face {part.cold!r} of module {name!r} is another module's hot face",
+                             where="argument law", expected="one stage", remedy="Linearise the cold stage only, with "
+                             "modules=[…], and let the other stage hold its own temperature.")
+    x = eq.initial() if temperatures is None else np.asarray(temperatures, float)
+    full = _passive(eq, x)
+    n = len(system.lumps)
+    free = np.array([i for i, name in enumerate(system.lump_names) if name not in hot], np.intp)
+    _, label = connected_components(csr_array(full[np.ix_(free, free)]), directed=False)
+    wanted = {label[np.searchsorted(free, i)] for i in law.modules.cold}
+    states = free[np.isin(label, list(wanted))]
+    others = [i for i in range(full.shape[1]) if i >= n or system.lump_names[i] in hot]
+    heaters = eq.B[:, :len(system.inputs)].toarray()[states]
+    used_heaters = [j for j in range(heaters.shape[1]) if heaters[:, j].any()]
+    used = [i for i in others if full[states, i].any()]
+    nodes = (*system.lump_names, *system.ambient_names)
+    around = (*(system.input_names[j] for j in used_heaters), *(nodes[i] for i in used))
+    drive = np.array([[float(i == c) for c in law.modules.cold] for i in states])
+    B = np.hstack([drive, heaters[:, used_heaters], full[np.ix_(states, used)]])
+    capacity = eq.capacity[states][:, None]
+    return ColdSide(law, tuple(nodes[i] for i in states), around, full[np.ix_(states, states)] / capacity, B / capacity)
+
+
+def _passive(eq: Equations, x: Array) -> Array:
+    """Heat into the lumps per kelvin of every lump and ambient, without the modules, (n, n + n_ambients) [W/K]."""
+    u = eq.nominal()
+    first = u.size - len(eq.system.ambients)
+    full = np.hstack([eq.jacobian(x, u).toarray(), eq.input_jacobian(x, u).toarray()[:, first:]])
+    names = eq.system.lump_names
+    for part in eq.system.modules.values():
+        h, c = names.index(part.hot), names.index(part.cold)
+        K = part.conductance.value + part.conductance.slope * (0.5 * (x[h] + x[c]) - part.reference_temperature)
+        bend = 0.5 * part.conductance.slope * (x[h] - x[c])
+        full[h, h] += K + bend
+        full[h, c] -= K - bend
+        full[c, c] += K - bend
+        full[c, h] -= K + bend
+    return full

@@ -1,0 +1,133 @@
+"""State feedback with integral action, sampled exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import solve_discrete_are
+
+from ..errors import InputError
+from ._controller import Seen
+from ._modules import Array
+from ._numbers import positive
+from ._plant import ColdSide
+from ._sampling import check_sampling
+
+
+@dataclass(frozen=True)
+class StateFeedback:
+    """v = z - K x_c + Kr r, z⁺ = z + h Ki (r - y) + (achieved - wanted) h / tracking_time.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        Whose states are fed back.
+    K, reference_gain : ndarray
+        (n_modules, n) [W/K] and (n_modules, n_modules) [W/K].
+    integral : ndarray, shape (n_modules, n_modules)
+        [W/(K s)].
+    tracking_time : float
+        Time in which the integrators give way to an active limit [s].
+    sample_time : float
+        [s].
+    """
+
+    plant: ColdSide
+    K: Array
+    reference_gain: Array
+    integral: Array
+    tracking_time: float
+    sample_time: float
+
+    def _proportional(self, seen: Seen) -> Array:
+        return self.reference_gain @ seen.reference - self.K @ seen.temperatures[self.plant.indices]
+
+    def start(self, seen: Seen, heat: Array) -> Array:
+        """Integrators that give the heat while the reference is the temperature."""
+        at_rest = self.reference_gain @ seen.cold - self.K @ seen.temperatures[self.plant.indices]
+        return heat - at_rest
+
+    def heat(self, state: Array, seen: Seen) -> Array:
+        """Wanted heats v [W]."""
+        return state + self._proportional(seen)
+
+    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+        """Integrate the error, giving way to limits."""
+        change = self.sample_time * self.integral @ (seen.reference - seen.cold)
+        return state + change - np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
+
+
+def state_feedback(plant: ColdSide, *, sample_time: float, settling: float | None = None,
+                   gain: ArrayLike | None = None, integral: ArrayLike | None = None,
+                   tracking_time: float | None = None) -> StateFeedback:
+    """State feedback with integral action, by LQR or from gains designed elsewhere.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        What it controls; all its lumps are fed back, measured or estimated (`observer`).
+    sample_time : float
+        [s].
+    settling : float, optional
+        LQR with a guaranteed decay: every pole of the sampled loop is faster than a time constant of a quarter of
+        this [s]. (The system is shifted by that rate before the Riccati equation is solved.)
+    gain, integral : array_like, optional
+        Own K (n_modules, n) [W/K] and Ki (n_modules, n_modules) [W/(K s)], for example of an LMI, for v = -K x + z,
+        ż = Ki (r - y).
+    tracking_time : float, optional
+        Anti-windup [s]; default a tenth of the settling time, else ten samples.
+
+    Returns
+    -------
+    StateFeedback
+
+    Raises
+    ------
+    InputError
+        Wrong shapes, a loop that is not stable, a settling time below the sample time.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
+    >>> loop = rt.design.state_feedback(plant, settling=200.0, sample_time=1.0)
+    >>> slowest = abs(rt.design.loop_poles(plant, loop)).max()
+    >>> bool(-1.0 / np.log(slowest) < 200.0 / 4)
+    True
+    """
+    h, m, n = positive(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
+    if (settling is None) == (gain is None):
+        raise InputError("give either settling or gain", where="argument settling", expected="one of the two")
+    if settling is not None:
+        K, Ki = _lqr(plant, h, positive(settling, "settling", "s"))
+        Kr = K @ np.linalg.pinv(plant.C)
+    else:
+        K = np.asarray(gain, float)
+        Ki = np.zeros((m, m)) if integral is None else np.asarray(integral, float)
+        Kr = np.zeros((m, m))
+        if K.shape != (m, n) or Ki.shape != (m, m):
+            raise InputError(f"gain has shape {K.shape}, integral {Ki.shape}", where="arguments gain, integral",
+                             expected=f"({m}, {n}) for the lumps {', '.join(plant.lumps)}, and ({m}, {m})")
+    tracking = tracking_time if tracking_time is not None else settling / 10 if settling is not None else 10 * h
+    controller = StateFeedback(plant, K, Kr, Ki, positive(tracking, "tracking_time", "s"), h)
+    check_sampling(plant, controller)
+    return controller
+
+
+def _lqr(plant: ColdSide, h: float, settling: float) -> tuple[Array, Array]:
+    """LQR of the cold side with its integrators, shifted so that everything decays within the settling time."""
+    rate = np.exp(4 * h / settling)
+    if h > settling / 4:
+        raise InputError(f"a sample time of {h:g} s is too slow for a settling time of {settling:g} s",
+                         where="argument sample_time", expected=f"at most {settling / 4:g} s")
+    A, B = plant.sampled(h)
+    m, n = len(plant.law.names), len(A)
+    whole = np.block([[A, np.zeros((n, m))], [-h * plant.C, np.eye(m)]]) * rate
+    drive = np.vstack([B[:, :m], np.zeros((m, m))]) * rate
+    weight = np.diag(np.concatenate([plant.C.sum(axis=0), np.full(m, (4 / settling) ** 2)])) + 1e-9 * np.eye(n + m)
+    size = np.linalg.norm(plant.C @ np.linalg.solve(plant.A, plant.B[:, :m]), 2)
+    P = solve_discrete_are(whole, drive, weight, size**2 * np.eye(m) / 100)
+    both = np.linalg.solve(drive.T @ P @ drive + size**2 * np.eye(m) / 100, drive.T @ P @ whole)
+    return both[:, :n], -both[:, n:]

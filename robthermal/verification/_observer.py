@@ -1,0 +1,224 @@
+"""Kind "observer": the error of a sampled observer shrinks in one quadratic norm over a box.
+
+x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^), A_d = exp(E^-1 A T_s) of the passive network with the modules' conductance at
+their reference temperature, Γ = (E^-1 A)^-1 (A_d - 1) E^-1, f all other heat, held over the sample. The error obeys
+e+ = M e with M = A_d - L C + Γ F, F a mean of ∂f/∂x over the box (proof note, 10).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flint import arb, arb_mat, fmpq
+
+from robthermal.errors import InputError
+
+from ._corners import Part, first_failure, is_positive, make_part
+from ._fields import get, mapping, margin_of, numbers, positive, sequence, text
+from ._kind import Kind, Proof, working_precision
+from ._lyapunov import (
+    MOST_WORK,
+    PIECES,
+    asymmetry,
+    dense,
+    link_slopes,
+    module_slopes,
+    vertex_count,
+)
+from ._numbers import exact, name_of, round_down, show
+from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
+from ._vertices import Entries
+
+_LONGEST = 100_000  # |E^-1 A| T_s beyond which the exponential is not enclosed
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Reads gain times the temperature of one lump, without lag."""
+
+    name: str
+    lump: int
+    gain: fmpq
+
+
+@dataclass(frozen=True)
+class Observer:
+    """The exact problem of one observer certificate."""
+
+    system: ThermalSystem
+    region: Region
+    sensors: tuple[Sensor, ...]
+    gain: tuple[tuple[fmpq, ...], ...]
+    sample_time: fmpq
+    contraction: fmpq
+    margin: fmpq
+    matrix: tuple[tuple[fmpq, ...], ...]
+
+
+def read(system: Any, region: Any, evidence: Any, margin: Any) -> Observer:
+    """Return the exact problem, or raise InputError."""
+    network = read_system(system)
+    box, table, found = read_region(region, network), mapping(region, "region"), mapping(evidence, "evidence")
+    if "parameters" in table:
+        raise InputError("uncertain parameters are not part of this kind of claim", where="region.parameters")
+    sensors = tuple(_sensor(item, network, f"system.sensors[{k}]")
+                    for k, item in enumerate(sequence(get(system, "sensors", "system"), "system.sensors")))
+    contraction = positive(found.get("contraction", 1), "evidence.contraction")
+    if contraction > 1:
+        raise InputError(f"contraction {show(contraction)}", where="evidence.contraction", expected="at most 1")
+    n = len(network.lumps)
+    return Observer(network, box, sensors, _matrix(get(system, "gain", "system"), n, len(sensors), "system.gain"),
+                    positive(get(table, "sample_time", "region"), "region.sample_time"), contraction,
+                    margin_of(margin, "contraction"),
+                    _matrix(get(found, "matrix", "evidence"), n, n, "evidence.matrix"))
+
+
+def claim(problem: Observer) -> str:
+    """Return the one sentence the data give."""
+    lumps = problem.system.lumps
+    reads = ", ".join(f"{name_of(s.name)} ({show(s.gain)} times {name_of(lumps[s.lump])})" for s in problem.sensors)
+    speed = (f"shrinks at least by {show(problem.contraction)}² per sample" if problem.contraction < 1
+             else "shrinks strictly with every sample")
+    return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the {say_system(problem.system)} with sensors "
+            f"{reads or 'none'}, sampled every {show(problem.sample_time)} s, f held in between, converges for all "
+            f"{say_region(problem.system, problem.region)}, temperatures and estimates both in this box: e'Pe of the "
+            f"error {speed}.")
+
+
+def prove(problem: Observer) -> Proof:
+    """Prove the inequality over the box, with the stored margin taken off the contraction."""
+    with working_precision():
+        extra = max(problem.margin, fmpq(0))
+        proof = _prove(problem, problem.contraction - extra)
+        if proof.valid:
+            return replace(proof, margins={"contraction": round_down(extra)})
+        if extra > 0 and _prove(problem, problem.contraction).valid:
+            return Proof(False, f"stored margin {show(extra)} is larger than what can be proven: {proof.reason}")
+        return proof
+
+
+def find_margin(problem: Observer) -> dict[str, float]:
+    """Return how much smaller a contraction the same matrix proves, to one per cent of what is left to 1."""
+    def proven(extra: float) -> bool:
+        return _prove(problem, problem.contraction - fmpq(*extra.as_integer_ratio())).valid
+
+    with working_precision():
+        low, high = 0.0, round_down(problem.contraction)
+        for _ in range(24):
+            middle = (low + high) / 2 if low > 0 else high / 8
+            if high - low <= 0.01 * high or high < 1e-9:
+                break
+            low, high = (middle, high) if proven(middle) else (low, middle)
+    return {"contraction": float(f"{low * 0.999:.4g}") if low > 0 else 0.0}
+
+
+def _prove(problem: Observer, contraction: fmpq) -> Proof:
+    """[c P, M'P; P M, c P] > 0 for all M of the box: affine in M, so that vertices suffice."""
+    n = len(problem.matrix)
+    if contraction <= 0:
+        return Proof(False, f"contraction {show(contraction)} is not positive")
+    broken = asymmetry(problem.matrix)
+    base, bent, missing = link_slopes(problem.system, problem.region)
+    if broken or missing:
+        return Proof(False, broken or missing)
+    P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])
+    if not is_positive(make_part(P, "", True)):
+        return Proof(False, "P > 0 fails or cannot be proven")
+    sampled = _sampled(problem, base)
+    if isinstance(sampled, str):
+        return Proof(False, sampled)
+    A_d, hold = sampled
+    left = P * hold
+    passive = P * (A_d - _injection(problem)) + left * dense(_reference(problem.system), n)
+    start = make_part(_schur(passive, P * arb(contraction)), "", True)
+    links = [[_part(left, item, n) for item in items] for items in bent]
+    words = f"M'PM < {show(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
+    proof = Proof(False, "too many vertices to check any")
+    for pieces in PIECES:
+        total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
+        if total * n**3 > MOST_WORK:
+            return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
+        groups = module_slopes(problem.system, problem.region, pieces)
+        failed = first_failure(start, [*links, *([_part(left, item, n) for item in items] for items in groups)])
+        if failed is None:
+            return Proof(True, f"{words} at all {total} vertices of the relaxed box")
+        proof = Proof(False, f"{words} fails or cannot be proven at {failed.where or 'the links'}")
+        if failed.real:
+            break  # a point of the box: no refinement helps
+    return proof
+
+
+def _sampled(problem: Observer, links: Entries) -> tuple[arb_mat, arb_mat] | str:
+    """Return balls around A_d and Γ, or why there are none."""
+    n = len(problem.matrix)
+    entries = dict(links)
+    for place, value in _reference(problem.system).items():
+        entries[place] = entries.get(place, fmpq(0)) - value
+    scaled = {(i, j): value / problem.system.capacity[i] for (i, j), value in entries.items()}
+    size = sum((abs(value) for value in scaled.values()), fmpq(0)) * problem.sample_time
+    if size > _LONGEST:
+        return f"sample time {show(problem.sample_time)} s: too long to enclose the sampled network"
+    F = dense(scaled, n)
+    A_d = (F * arb(problem.sample_time)).exp()
+    one, inverse = arb_mat(n, n, 1), dense({(i, i): 1 / c for i, c in enumerate(problem.system.capacity)}, n)
+    try:
+        return A_d, F.solve(A_d - one) * inverse
+    except ZeroDivisionError:
+        return "the passive network has no inverse, or none can be proven: some lump has no path to an ambient"
+
+
+def _reference(system: ThermalSystem) -> Entries:
+    """Return what leaves f because A holds it: minus the conductance of the modules at their reference."""
+    entries: Entries = {}
+    for module in system.modules:
+        h, c, K = module.hot, module.cold, module.conductance[0]
+        for place, value in (((h, h), K), ((c, c), K), ((h, c), -K), ((c, h), -K)):
+            entries[place] = entries.get(place, fmpq(0)) + value
+    return entries
+
+
+def _injection(problem: Observer) -> arb_mat:
+    entries: Entries = {}
+    for i, row in enumerate(problem.gain):
+        for value, sensor in zip(row, problem.sensors, strict=True):
+            place = (i, sensor.lump)
+            entries[place] = entries.get(place, fmpq(0)) + value * sensor.gain
+    return dense(entries, len(problem.matrix))
+
+
+def _part(left: arb_mat, described: tuple[Entries, str, bool], n: int) -> Part:
+    entries, where, real = described
+    return make_part(_schur(left * dense(entries, n)), where, real)
+
+
+def _schur(PM: arb_mat, own: arb_mat | None = None) -> arb_mat:
+    """Return [own, M'P; P M, own] of P M, zero where own is left out."""
+    n = PM.nrows()
+    below = PM.tolist()
+    inside = [[arb(0)] * n for _ in range(n)] if own is None else own.tolist()
+    above = PM.transpose().tolist()
+    rows = [[*inside[i], *above[i]] for i in range(n)] + [[*below[i], *inside[i]] for i in range(n)]
+    return arb_mat(rows)
+
+
+def _sensor(value: Any, system: ThermalSystem, where: str) -> Sensor:
+    if isinstance(value, str):
+        value = {"name": value, "lump": value}
+    table = mapping(value, where)
+    lump = text(get(table, "lump", where), f"{where}.lump")
+    if lump not in system.lumps:
+        raise InputError(f"{name_of(lump)} is not a lump", where=f"{where}.lump")
+    name = text(table.get("name", lump), f"{where}.name")
+    return Sensor(name, system.lumps.index(lump), exact(table.get("gain", 1), f"{where}.gain"))
+
+
+def _matrix(value: Any, rows: int, columns: int, where: str) -> tuple[tuple[fmpq, ...], ...]:
+    found = sequence(value, where)
+    if len(found) != rows:
+        raise InputError(f"{len(found)} rows", where=where, expected=f"{rows}, one per lump")
+    return tuple(tuple(numbers(row, columns, f"{where}[{k}]")) for k, row in enumerate(found))
+
+
+OBSERVER = Kind("observer", read, claim, prove, find_margin)

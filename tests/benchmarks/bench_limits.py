@@ -1,0 +1,49 @@
+"""Largest certified currents and runaway limits of the two-module setup beside the published reference table."""
+
+from _timing import best_of, header, row
+
+import robthermal as rt
+
+BOX = (278.15, 358.15)
+DIRECTIONS = ("symmetric", "cooling", "heating")
+PUBLISHED = {  # corrected thesis, "Largest |I| certified on the 18-lump setup" [A]
+    ("S(T), R(T)", "energy"): (2.72, 5.51, 2.72), ("S(T), R(T)", "sum"): (2.54, 5.54, 2.72),
+    ("S(T), R(T)", "max"): (2.18, 5.22, 2.62), ("constant", "energy"): (4.93, 17.04, 4.93),
+    ("constant", "sum"): (4.10, 13.5, 4.58), ("constant", "max"): (4.10, 13.5, 4.58)}
+RUNAWAY = {5: (1.51, 3.75), 15: (1.54, 6.45), 25: (1.56, 9.18)}
+
+
+def systems():
+    """The setup with varying and with constant S and R."""
+    two = rt.systems.two_module()
+    flat = {f"modules.{m}.{p}.slope": 0.0 for m in two.modules for p in ("seebeck", "resistance")}
+    return {"S(T), R(T)": two, "constant": two.with_parameters(flat)}
+
+
+def limits():
+    """Every entry of the table, with the time to find and to verify it."""
+    header("largest certified current, box 5 to 85 °C: found (published) [A]")
+    for (kind, method), published in PUBLISHED.items():
+        system = systems()[kind]
+        for direction, expected in zip(DIRECTIONS, published, strict=True):
+            seconds, limit = best_of(lambda s=system, d=direction, m=method: rt.certify.largest_current(
+                s, temperature=BOX, direction=d, method=m), repeats=1)
+            check, verdict = best_of(lambda c=limit.certificate: rt.verify(c))
+            row(f"{kind:<10} {method:<6} {direction:<9} {limit.current:7.3f} ({expected:5.2f})", seconds,
+                f"verified in {1e3 * check:.1f} ms: {verdict.valid}")
+
+
+def folds():
+    """Runaway limits."""
+    header("runaway limit per module: found (published)")
+    system = systems()["S(T), R(T)"]
+    for celsius, (current, load) in RUNAWAY.items():
+        point = {m: celsius + 273.15 for m in system.modules}
+        seconds, found = best_of(lambda p=point: rt.certify.runaway(system, setpoint=p), repeats=1)
+        amps, watts = (", ".join(f"{v:.3f}" for v in d.values()) for d in (found.current, found.load))
+        row(f"{celsius} °C: I* {amps} A ({current}), q* {watts} W ({load})", seconds)
+
+
+if __name__ == "__main__":
+    limits()
+    folds()
