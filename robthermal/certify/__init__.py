@@ -8,8 +8,9 @@ from ._invariance import invariance as invariance
 from ._limits import CurrentLimit as CurrentLimit
 from ._limits import largest_current as largest_current
 from ._network import network as network
+from ._observer import observer as observer
 from ._runaway import Runaway as Runaway
 from ._runaway import runaway as runaway
 
 __all__ = ["CurrentLimit", "Runaway", "RunawayFree", "contraction", "heater_heat", "invariance", "largest_current",
-           "network", "runaway", "runaway_free"]
+           "network", "observer", "runaway", "runaway_free"]

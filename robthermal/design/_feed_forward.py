@@ -174,9 +174,8 @@ def disturbance_observer(plant: ColdSide, controller: Controller, *, time_consta
     A = np.block([[A_d, B_d[:, :m]], [np.zeros((m, n)), np.eye(m)]])
     B = np.vstack([B_d, np.zeros((m, B_d.shape[1]))])
     C = np.hstack([plant.C, np.zeros((m, m))])
-    # random-walk heat against sensor noise, shifted so that the estimate settles with the time constant or faster
-    shift = np.exp(h / tau)
-    noise = np.diag(np.concatenate([np.full(n, 1e-6), np.ones(m)]))
+    # all but noise-free, and shifted: modes slower than the time constant are moved to it, faster ones stay
+    shift, noise = np.exp(h / tau), 1e-9 * np.eye(n + m)
     P = solve_discrete_are(shift * A.T, shift * C.T, noise, np.eye(m))
     L = shift**2 * A @ P @ C.T @ np.linalg.inv(shift**2 * C @ P @ C.T + np.eye(m))
     observer = DisturbanceObserver(plant, controller, A, B, L)

@@ -389,8 +389,7 @@ class FrequencyResponse:
 
         Returns
         -------
-        numpy.ndarray of matplotlib axes
-            For "bode" of shape (2 n_y, n_u), magnitude above phase; otherwise (n_y,).
+        ndarray of matplotlib axes, (2 n_y, n_u) for "bode" (magnitude above phase), else (n_y,)
         """
         return _response_plots.draw(self, kind, p)
 

@@ -58,12 +58,20 @@ def largest_margin(problem: Contraction) -> fmpq:
     return _worst(problem)[1]
 
 
-def _worst(problem: Contraction) -> tuple[int, fmpq, str]:
+def lines(problem: Contraction) -> list[tuple[fmpq, str]]:
+    """Return the largest weighted line of every lump [W/K times the weights], and where it is reached."""
     losses, pairs = _collect(problem)
-    worst: tuple[int, fmpq, str] | None = None
+    found = []
     for j, weight in enumerate(problem.weights):
         value, where = _line(problem, j, pairs[j])
-        margin = (losses[j] * weight - value) / (weight * problem.system.capacity[j]) - problem.rate
+        found.append((value - losses[j] * weight, where))
+    return found
+
+
+def _worst(problem: Contraction) -> tuple[int, fmpq, str]:
+    worst: tuple[int, fmpq, str] | None = None
+    for j, (value, where) in enumerate(lines(problem)):
+        margin = -value / (problem.weights[j] * problem.system.capacity[j]) - problem.rate
         if worst is None or margin < worst[1]:
             worst = (j, margin, where)
     if worst is None:

@@ -1,0 +1,71 @@
+"""What a plain controller does instead of the law: a constant gain from wanted heat to current."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._linearization import Command, FeedbackLinearization, Temperatures
+from ._modules import Array
+
+
+@dataclass(frozen=True)
+class ConstantGain:
+    """I = I0 - |dI/dv| (v - v0), the tangent of the law at one operating point, with the law's limits.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        Whose limits and modules.
+    current, heat, gain : ndarray, shape (n_modules,)
+        I0 [A], v0 [W] and |dI/dv| [A/W].
+    """
+
+    law: FeedbackLinearization
+    current: Array
+    heat: Array
+    gain: Array
+
+    def command(self, v: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures, *,
+                previous: ArrayLike | None = None, sample_time: float | None = None) -> Command:
+        """Current for a wanted heat, by the constant gain; `heat` is what it believes to achieve."""
+        wanted = self.law.modules.vector(v, "v", "W")
+        asked = self.current - self.gain * (wanted - self.heat)
+        true = self.law.command(self.law.heat(asked, temperatures), temperatures, previous=previous,
+                                sample_time=sample_time)
+        beyond = asked > self.law.bounds(temperatures).current
+        limit = np.where(beyond & (true.limit == ""), "optimum", true.limit)
+        current = np.where(limit == "", asked, true.current)
+        return Command(current, true.voltage, self.heat - (current - self.current) / self.gain, limit)
+
+
+def constant_gain(law: FeedbackLinearization, temperatures: Temperatures,
+                  current: ArrayLike | Mapping[str, ArrayLike] = 0.0) -> ConstantGain:
+    """Plain alternative to a law, for comparison: its tangent at one operating point.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        The law.
+    temperatures : array_like, shape (n_lumps,), or mapping of lump to temperature
+        Operating point [K].
+    current : array_like, mapping or float, optional
+        Currents there [A].
+
+    Returns
+    -------
+    ConstantGain
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> law = rt.design.feedback_linearization(rt.systems.two_module())
+    >>> plain = rt.design.constant_gain(law, [298.15] * 18)
+    >>> plain.gain.round(4).tolist()  # 1/(S x_c) [A/W]
+    [0.0633, 0.0633]
+    """
+    at = law.modules.vector(current, "current", "A")
+    return ConstantGain(law, at, law.heat(at, temperatures), law.gain(at, temperatures))

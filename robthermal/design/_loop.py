@@ -1,0 +1,264 @@
+"""Closed loops of the nonlinear plant with a sampled controller, simulated exactly between the samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import Diverged, InputError, Outcome
+from ..thermal import Stepper, System
+from ._constant_gain import ConstantGain
+from ._controller import Controller, Seen
+from ._linearization import Command, FeedbackLinearization
+from ._modules import Array, ModuleSet, check_system
+from ._numbers import positive
+from ._observer import Observer
+from ._plant import ColdSide, cold_side
+
+Law = FeedbackLinearization | ConstantGain
+Signals = Mapping[str, ArrayLike]
+_SUBSTEPS = 10  # of a sample under voltage drive: the current follows the temperatures
+_SETTLED = 0.05  # K
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """What happened in a simulated closed loop; row k of the inputs acts after row k of the temperatures.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization or ConstantGain
+        What turned heats into currents.
+    time : ndarray, shape (n,)
+        [s].
+    reference, cold : ndarray, shape (n, n_modules)
+        Set-points and cold faces [K].
+    lumps : ndarray, shape (n, n_lumps)
+        True temperatures [K].
+    estimate : ndarray, shape (n, n_lumps)
+        What the controller believed: the truth without an observer [K].
+    current, voltage, wanted, achieved : ndarray, shape (n, n_modules)
+        [A], [V], heats v that were asked for and, in the law's view, achieved [W].
+    limit : ndarray of str, shape (n, n_modules)
+        Active limits.
+    outcome : Outcome
+        "settled", "moving", "limited" or "ran_away".
+    """
+
+    law: Law
+    time: Array
+    reference: Array
+    cold: Array
+    lumps: Array
+    estimate: Array
+    current: Array
+    voltage: Array
+    wanted: Array
+    achieved: Array
+    limit: np.ndarray
+    outcome: Outcome
+
+    def __str__(self) -> str:
+        return self.outcome.text
+
+    def plot(self) -> Any:
+        """Plot cold faces with their set-points [°C] and currents [A]; returns the two matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(2, sharex=True, layout="constrained")
+        for i, name in enumerate(_base(self.law).names):
+            line, = axes[0].plot(self.time, self.cold[:, i] - 273.15, label=name)
+            axes[0].plot(self.time, self.reference[:, i] - 273.15, "--", color=line.get_color())
+            axes[1].plot(self.time, self.current[:, i], color=line.get_color(), drawstyle="steps-post")
+        axes[0].set(ylabel="cold face [°C]", title=self.outcome.code)
+        axes[0].legend()
+        axes[1].set(xlabel="time [s]", ylabel="current [A]")
+        return axes
+
+
+def simulate_loop(system: System, controller: Controller, reference: ArrayLike | Signals, *, law: Law, duration: float,
+                  inputs: Signals | None = None, load: Signals | None = None,
+                  initial: ArrayLike | Mapping[str, float] | None = None, current: ArrayLike = 0.0,
+                  drive: Literal["current", "voltage"] = "current", observer: Observer | None = None,
+                  noise_seed: int | None = None) -> ClosedLoop:
+    """Simulate a sampled controller on the nonlinear system.
+
+    Parameters
+    ----------
+    system : System
+        The plant; it may differ from the one the law was built for in everything but names.
+    controller : Controller
+        From `pid`, `state_feedback`, `linear_controller`, `feed_forward` or `disturbance_observer`.
+    reference : array_like or mapping
+        Set-points of the cold faces [K]: one number, one per module, (n, n_modules), or module to number or (n,).
+    law : FeedbackLinearization or ConstantGain
+        Turns the heats into currents.
+    duration : float
+        [s].
+    inputs : mapping, optional
+        Heaters [unit], ambients [K] and currents of modules the law does not drive [A], by name: a number or (n,).
+    load : mapping of lump, optional
+        Unmeasured heat into lumps [W]: a number or (n,).
+    initial : array_like or mapping, optional
+        Lump temperatures at the start [K].
+    current : array_like, optional
+        Currents that flowed before the start [A]: the controller starts from them.
+    drive : {"current", "voltage"}, optional
+        What the driver holds over a sample.
+    observer : Observer, optional
+        Estimates all lumps from the sensors; without it every lump is measured.
+    noise_seed : int, optional
+        Adds the sensors' noise; None for none.
+
+    Returns
+    -------
+    ClosedLoop
+        Up to the runaway, if there is one.
+
+    Raises
+    ------
+    InputError
+        Unknown names, wrong lengths, Celsius, an observer of another sample time.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> system = rt.systems.two_module()
+    >>> law = rt.design.feedback_linearization(system)
+    >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.05, sample_time=1.0)
+    >>> loop = rt.design.simulate_loop(system, pi, 288.15, law=law, duration=400.0)
+    >>> loop.outcome.code
+    'settled'
+    """
+    run = _Run(system, controller, law, duration, inputs or {}, load or {}, initial, drive, observer, noise_seed)
+    return run.go(reference, _base(law).modules.vector(current, "current", "A"))
+
+
+def _base(law: Law) -> FeedbackLinearization:
+    if isinstance(law, ConstantGain):
+        return law.law
+    if not isinstance(law, FeedbackLinearization):
+        raise InputError(f"law is a {type(law).__name__}", where="argument law",
+                         expected="what rt.design.feedback_linearization or rt.design.constant_gain returned")
+    return law
+
+
+class _Run:
+    """One closed loop in progress."""
+
+    def __init__(self, system: System, controller: Controller, law: Law, duration: float, inputs: Signals,
+                 load: Signals, initial: ArrayLike | Mapping[str, float] | None, drive: str,
+                 observer: Observer | None, noise_seed: int | None):
+        check_system(system)
+        base = _base(law)
+        if not set(base.names) <= set(system.modules) or system.lump_names != base.system.lump_names:
+            raise InputError("lumps or modules differ from those of the law's system", where="argument system",
+                             expected="the same names")
+        if drive not in ("current", "voltage"):
+            raise InputError(f"drive = {drive!r}", where="argument drive", expected='"current" or "voltage"')
+        self.law, self.base, self.controller, self.observer = law, base, controller, observer
+        self.h = positive(controller.sample_time, "controller.sample_time", "s")
+        if observer is not None and abs(observer.sample_time - self.h) > 1e-9 * self.h:
+            raise InputError(f"the observer's sample time is {observer.sample_time:g} s", where="argument observer",
+                             expected=f"the controller's, {self.h:g} s")
+        self.n = max(int(round(positive(duration, "duration", "s") / self.h)), 1)
+        self.substeps = _SUBSTEPS if drive == "voltage" else 1
+        self.plant = Stepper(system, self.h / self.substeps, initial=initial, loads=tuple(load))
+        self.inputs = self._signals(inputs, "inputs")
+        self.load = self._signals(load, "load")
+        self.linear: ColdSide = cold_side(base)
+        self.true = ModuleSet.of(system, base.names)
+        self.noise = None if noise_seed is None else np.random.default_rng(noise_seed)
+
+    def _signals(self, given: Signals, argument: str) -> dict[str, Array]:
+        out = {}
+        for name, values in given.items():
+            if name in self.base.names:
+                raise InputError(f"{name!r} is driven by the law", where=f"argument {argument}",
+                                 remedy="Leave its current out.")
+            array = np.asarray(values, float)
+            if array.shape not in ((), (self.n,)) or not np.isfinite(array).all():
+                raise InputError(f"{name!r} has shape {array.shape}", where=f"argument {argument}",
+                                 expected=f"a finite number or {self.n} of them, one per sample")
+            out[name] = np.broadcast_to(array, (self.n,))
+        return out
+
+    def go(self, reference: ArrayLike | Signals, current: Array) -> ClosedLoop:
+        """Run to the end, or to the runaway."""
+        wanted_cold = np.broadcast_to(self.base.modules.vector(reference, "reference", "K"),
+                                      (self.n, len(self.base.names)))
+        if wanted_cold.min() < 150.0:
+            raise InputError(f"a set-point is {wanted_cold.min():g} K", where="argument reference", expected="kelvin",
+                             remedy="Add 273.15 to degrees Celsius.")
+        rows: list[tuple[Any, ...]] = []
+        memory = self.observer.start(self.plant.lumps) if self.observer else None
+        state: Array | None = None
+        try:
+            for k in range(self.n):
+                true, named = self.plant.lumps, {name: float(values[k]) for name, values in self.inputs.items()}
+                believed = true if self.observer is None else self.observer.estimate(memory)
+                seen = Seen(wanted_cold[k], believed[self.base.modules.cold], believed,
+                            self.linear.surroundings(believed, named))
+                if state is None:
+                    state = self.controller.start(seen, self._heat_of(current, believed))
+                heat = self.controller.heat(state, seen)
+                command = self.law.command(heat, believed, previous=current, sample_time=self.h)
+                state = self.controller.advance(state, seen, heat, command.heat)
+                rows.append((true, believed, command, heat))
+                if self.observer is not None:
+                    u = {**named, **dict(zip(self.base.names, command.current.tolist(), strict=True))}
+                    memory = self.observer.step(memory, self._reading(), u)
+                self._advance(command, named, k)
+                current = command.current
+        except Diverged as error:
+            return self._result(rows, wanted_cold, Outcome(False, "ran_away", str(error)))
+        return self._result(rows, wanted_cold, None)
+
+    def _heat_of(self, current: Array, temperatures: Array) -> Array:
+        if isinstance(self.law, ConstantGain):
+            return self.law.heat - (current - self.law.current) / self.law.gain
+        return self.law.heat(current, temperatures)
+
+    def _reading(self) -> Array:
+        readings = self.plant.readings
+        if self.noise is not None:
+            sigma = np.array([sensor.noise for sensor in self.plant.system.sensors.values()])
+            readings = readings + sigma * self.noise.standard_normal(len(sigma))
+        names = self.plant.system.sensor_names
+        assert_sensors = self.observer.sensors if self.observer else ()
+        return readings[[names.index(name) for name in assert_sensors]]
+
+    def _advance(self, command: Command, named: dict[str, float], k: int) -> None:
+        load = {lump: float(values[k]) for lump, values in self.load.items()}
+        for _ in range(self.substeps):
+            current = command.current
+            if self.substeps > 1:
+                p = self.true.properties(self.plant.lumps)
+                current = (command.voltage - p.S * (p.hot - p.cold)) / p.R
+            self.plant.step({**named, **dict(zip(self.base.names, current.tolist(), strict=True))}, load)
+
+    def _result(self, rows: list[tuple[Any, ...]], reference: Array, outcome: Outcome | None) -> ClosedLoop:
+        true, believed, commands, wanted = zip(*rows, strict=True)
+        lumps = np.array(true)
+        fields = {key: np.array([getattr(c, key) for c in commands]) for key in ("current", "voltage", "heat", "limit")}
+        cold = lumps[:, self.base.modules.cold]
+        reference = reference[:len(cold)]
+        return ClosedLoop(self.law, self.h * np.arange(len(cold)), reference, cold, lumps, np.array(believed),
+                          fields["current"], fields["voltage"], np.array(wanted), fields["heat"], fields["limit"],
+                          outcome or _judge(self.base, cold, reference, fields["limit"]))
+
+
+def _judge(law: FeedbackLinearization, cold: Array, reference: Array, limit: np.ndarray) -> Outcome:
+    tail = slice(-max(len(cold) // 20, 2), None)
+    error = np.abs(cold - reference)[tail].max(axis=0)
+    if error.max() < _SETTLED:
+        return Outcome(True, "settled", f"Settled: every cold face stays within {_SETTLED} K of its set-point.")
+    i = int(np.argmax(error))
+    if (limit[tail, i] != "").all():
+        return Outcome(False, "limited", f"{law.names[i]} is at its {limit[-1, i]} limit and {error[i]:.3g} K from its "
+                       "set-point: rt.design.reachable tells what it can hold with this load.")
+    return Outcome(False, "moving", f"{law.names[i]} is still {error[i]:.3g} K from its set-point: simulate longer.")
