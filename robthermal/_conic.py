@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 _TOLERANCE = 1e-7  # looser than the solver's own: a matrix well inside is wanted, not the last digit
 
 

@@ -20,12 +20,33 @@ from .errors import Diverged, InputError
 
 app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False,
                   context_settings={"help_option_names": ["-h", "--help"]},
-                  help="From measured data to verified certificates for thermal systems with thermoelectric modules.")
+                  rich_markup_mode=None)  # markup would swallow units in brackets
+
+_UsageError = typer.BadParameter.__mro__[1]  # not public under one name: typer brings its own click since 0.21
+_INTERRUPTED = 130
 
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"robthermal {rt.__version__}")
+        raise typer.Exit
+
+
+def _place(file: Path | None) -> Path | None:
+    if file is not None and not file.parent.is_dir():  # said before the work, not after it
+        raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
+    return file
+
+
+@app.callback()
+def robthermal(show_version: Annotated[bool, typer.Option(
+        "--version", callback=_print_version, is_eager=True, help="Print the version and exit.")] = False) -> None:
+    """From measured data to verified certificates for thermal systems with thermoelectric modules."""
 
 
 @app.command()
@@ -77,7 +98,8 @@ def check(system: SystemFile, records: Annotated[list[Path] | None, typer.Argume
 
 @app.command()
 def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.")],
-             out: Annotated[Path, typer.Option("--out", help="Record to write (.csv, .parquet, .mat).")],
+             out: Annotated[Path, typer.Option("--out", callback=_place,
+                                               help="Record to write (.csv, .parquet, .mat).")],
              as_json: Json = False) -> None:
     """Simulate a system with the inputs of a record.
 
@@ -97,7 +119,8 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 @app.command()
 def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(help="Training records.")],
               validation: Annotated[list[Path] | None, typer.Option("--validation", help="Held-out record.")] = None,
-              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.")] = Path("calibrated.toml"),
+              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=_place)] = Path(
+                  "calibrated.toml"),
               median_filter: MedianFilter = None, as_json: Json = False) -> None:
     """Fit the parameters in the [fit] table of a system to records.
 
@@ -124,8 +147,10 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
         poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
-        out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).")] = Path("frf.json"),
-        plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png).")] = None,
+        out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=_place)] = Path(
+            "frf.json"),
+        plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png).",
+                                                  callback=_place)] = None,
         as_json: Json = False) -> None:
     """Estimate a frequency response with its covariance, from records that need not be in steady state.
 
@@ -156,20 +181,22 @@ def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.",
                arrangement: Annotated[str, typer.Option(help="orthogonal, zippered, independent.")] = "orthogonal",
                seed: Annotated[int, typer.Option(help="Of the random phases.")] = 0,
                system: Annotated[Path | None, typer.Option("--system", help="For the design check.")] = None,
-               out: Annotated[Path, typer.Option("--out", help="Record to write.")] = Path("excitation.csv"),
+               out: Annotated[Path, typer.Option("--out", help="Record to write.", callback=_place)] = Path(
+                   "excitation.csv"),
                as_json: Json = False) -> None:
     """Design multisine inputs, and say before the experiment what they will leave unresolved.
 
     Example: robthermal excitation m1 m2 --period 7200 --sample-time 1 --band 0.0005 0.1 --amplitude 0.5
     """
     model = rt.read_system(system) if system else None
-    u, design = rt.project.design_excitation(
-        names, period=period, sample_time=sample_time, band=band, amplitude=amplitude, periods=periods,
-        nonnegative=nonnegative, arrangement=arrangement, seed=seed, system=model)
+    u = rt.project.design_excitation(names, period=period, sample_time=sample_time, band=band, amplitude=amplitude,
+                                     periods=periods, nonnegative=nonnegative, arrangement=arrangement, seed=seed)
+    design = rt.signals.design_check(u, sample_time=sample_time, poles=model.poles()) if model else None
     files = rt.project.write_excitation(u, names, out)
-    summary = {"out": [str(file) for file in files], "outcome": design.outcome.text, "good": design.outcome.ok,
-               "crest_factors": u.crest_factors.max(axis=(0, 1)).tolist()}
-    _print(summary, as_json, lambda: _text(str(design), *(f"experiment: {file}" for file in files)))
+    summary = {"out": [str(file) for file in files], "crest_factors": u.crest_factors.max(axis=(0, 1)).tolist(),
+               "design_check": design.outcome.text if design else "not made: give --system"}
+    _print(summary, as_json, lambda: _text(str(design) if design else "No design check without --system.",
+                                           *(f"experiment: {file}" for file in files)))
 
 
 @app.command()
@@ -274,15 +301,27 @@ def main() -> None:
     warnings.simplefilter("always", UserWarning)
     warnings.showwarning = lambda message, *rest, **kwargs: typer.echo(f"note: {message}", err=True)
     try:
-        app(standalone_mode=False)
+        status = app(prog_name="robthermal", standalone_mode=False)  # the exit status, or None where all went well
+    except _UsageError as error:
+        _stop(_usage(error), 2)
     except InputError as error:
         _stop(str(error), 2)
     except Diverged as error:
         _stop(str(error), 1)
-    except typer.Exit as stop:
-        sys.exit(stop.exit_code)
+    except OSError as error:  # a full disk, a folder without permission
+        _stop(f"{error.filename or 'a file'}: {error.strerror or error}", 2)
     except (KeyboardInterrupt, typer.Abort):
-        _stop("interrupted; nothing was written", 130)
+        status = _INTERRUPTED
+    if status == _INTERRUPTED:  # typer turns Ctrl-C into an abort or into this status, depending on its version
+        _stop("interrupted; nothing was written", _INTERRUPTED)
+    sys.exit(status)
+
+
+def _usage(error: Any) -> str:
+    """What is wrong with the command line, and where to look; the help itself where nothing was asked."""
+    said = error.format_message().rstrip(".")
+    command = error.ctx.command_path if error.ctx else "robthermal"
+    return f"{said}. See {command} --help." if said and "\n" not in said else f"no command\n{said}"
 
 
 def _stop(message: str, status: int) -> None:

@@ -80,9 +80,9 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
         base[c, c] += K
         base[h, c] -= K
         base[c, h] -= K
-        points = _hull(region["current"][name]) if hull else _points(module, region["current"][name])
-        vertices = [_module_vertices(variant, ranges[module.hot], ranges[module.cold], points)
-                    for variant in _variants(worst, name, parameters)]
+        variants, current = _variants(worst, name, parameters), region["current"][name]
+        points = _hull(current) if hull else _points(variants, current)
+        vertices = [_module_vertices(variant, ranges[module.hot], ranges[module.cold], points) for variant in variants]
         blocks.append(Block(h, c, np.concatenate(vertices)))
     for link in worst.links:
         a, b = link.between if link.between[0] in index else link.between[::-1]
@@ -103,10 +103,10 @@ def _variants(system: System, name: str, parameters: Mapping[str, Any]) -> list[
             for values in product(*own.values())]
 
 
-def _points(module: Any, current: list[float]) -> Array:
+def _points(variants: list[Any], current: list[float]) -> Array:
     """Points (I, I²) of a range: many where the blocks are not convex in the current."""
     low, high = current
-    concave = module.resistance.slope < 0
+    concave = any(module.resistance.slope < 0 for module in variants)
     currents = np.linspace(low, high, _CURRENTS) if concave else np.unique([low, high, np.clip(0.0, low, high)])
     return np.stack([currents, currents**2], -1)
 

@@ -17,7 +17,7 @@ from ..thermal import System
 from ._jacobian import BoxJacobian
 from ._polytope import MOST, Cuts, Polytope, common_form, polytope
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 Structure = Literal["full", "block"]
 STRUCTURES = ("full", "block")
 LARGEST = 40  # lumps: beyond, a dense matrix inequality is a choice made knowingly
@@ -98,7 +98,7 @@ def best_matrix(box: BoxJacobian, pattern: NDArray[np.bool_], *, cuts: Cuts | No
     vertices, cuts = polytope(box), Cuts() if cuts is None else cuts
     if vertices.count > MOST:
         return None
-    Q = np.eye(len(pattern))
+    Q: Array = np.eye(len(pattern))
     rate, bound = decay_rate(vertices, Q), -largest_growth(vertices)  # V = eᵀEe costs nothing
     shift = 0.0
     share, solves = (0.0 if first else _CLOSE), cuts.solves

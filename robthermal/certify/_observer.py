@@ -18,7 +18,7 @@ from ._lyapunov import check_choice, short_matrices
 from ._polytope import MOST, Cuts, Polytope, common_form
 from ._sections import Currents, Temperatures, made_by, region_section, system_section
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 _SOLVER = "Clarabel semidefinite program, cutting planes"
 _SLACK = (1e-6, 1e-3, 1e-2, 0.1, 0.5)  # share of the way to 1 given up when a proof fails
 _SHOWN = 4  # lumps of an unstable mode
@@ -199,9 +199,9 @@ def _gain(value: ArrayLike, rows: int, columns: int) -> list[list[float]]:
         raise InputError("gain is not a matrix of numbers", where="argument gain",
                          expected=f"shape ({rows}, {columns})") from None
     if gain.shape != (rows, columns) or not np.isfinite(gain).all():
-        raise InputError(f"shape {gain.shape}" + ("" if np.isfinite(gain).all() else " with numbers that are not finite"),
-                         where="argument gain", expected=f"finite numbers, shape ({rows}, {columns}): a row per lump, "
-                                                         "a column per sensor")
+        finite = "" if np.isfinite(gain).all() else " with numbers that are not finite"
+        raise InputError(f"shape {gain.shape}{finite}", where="argument gain",
+                         expected=f"finite numbers, shape ({rows}, {columns}): a row per lump, a column per sensor")
     return gain.tolist()
 
 

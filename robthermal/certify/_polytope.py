@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from .._conic import Form, largest_margin
 from ._jacobian import BoxJacobian
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 MOST = 50_000  # joint vertices that are looked at one by one
 _CHUNK = 4_000_000  # entries held at a time
 _ROUNDS = 25
@@ -123,7 +124,7 @@ def _violations(vertices: Polytope, form: Callable[[Array], Form], Q: Array) -> 
     """Least eigenvalues of the forms at the vertices, with the vertices' numbers, least first."""
     found: list[tuple[float, int]] = []
     for numbers, matrices in vertices.chunks():
-        least = np.linalg.eigvalsh(np.stack([form(M).at(Q) for M in matrices]))[:, 0]
+        least = np.linalg.eigvalsh(np.array([form(M).at(Q) for M in matrices]))[:, 0]
         first = np.argsort(least)[:4 * _ADDED]
         found += [(float(least[i]), int(numbers[i])) for i in first]
     return sorted(found)

@@ -1,5 +1,9 @@
 """Controllers and observers for systems with thermoelectric modules."""
 
+from ._collapse import Collapse as Collapse
+from ._collapse import collapse as collapse
+from ._constant_gain import ConstantGain as ConstantGain
+from ._constant_gain import constant_gain as constant_gain
 from ._controller import Controller as Controller
 from ._controller import Seen as Seen
 from ._feed_forward import DisturbanceObserver as DisturbanceObserver
@@ -11,16 +15,34 @@ from ._linearization import Command as Command
 from ._linearization import FeedbackLinearization as FeedbackLinearization
 from ._linearization import Reach as Reach
 from ._linearization import feedback_linearization as feedback_linearization
+from ._loop import ClosedLoop as ClosedLoop
+from ._loop import simulate_loop as simulate_loop
 from ._lti import LinearController as LinearController
 from ._lti import linear_controller as linear_controller
+from ._observer import Estimate as Estimate
+from ._observer import ExtendedKalmanFilter as ExtendedKalmanFilter
+from ._observer import GainObserver as GainObserver
+from ._observer import Observer as Observer
+from ._observer import observer as observer
+from ._observer_model import ObserverModel as ObserverModel
+from ._observer_model import unobservable as unobservable
 from ._pid import PID as PID
 from ._pid import pid as pid
+from ._placement import Placement as Placement
+from ._placement import place_sensors as place_sensors
 from ._plant import ColdSide as ColdSide
 from ._plant import cold_side as cold_side
+from ._polarity import Polarity as Polarity
+from ._polarity import check_polarity as check_polarity
+from ._reachable import Reachable as Reachable
+from ._reachable import reachable as reachable
 from ._sampling import loop_poles as loop_poles
 from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 
-__all__ = ["Bounds", "ColdSide", "Command", "Controller", "DisturbanceObserver", "FeedForward", "FeedbackLinearization",
-           "LinearController", "PID", "Reach", "Seen", "StateFeedback", "cold_side", "disturbance_observer",
-           "feed_forward", "feedback_linearization", "linear_controller", "loop_poles", "pid", "state_feedback"]
+__all__ = ["Bounds", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain", "Controller",
+           "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization",
+           "GainObserver", "LinearController", "Observer", "ObserverModel", "PID", "Placement", "Polarity", "Reach",
+           "Reachable", "Seen", "StateFeedback", "check_polarity", "cold_side", "collapse", "constant_gain",
+           "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller", "loop_poles",
+           "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]

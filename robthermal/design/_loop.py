@@ -130,7 +130,7 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     >>> system = rt.systems.two_module()
     >>> law = rt.design.feedback_linearization(system)
     >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.05, sample_time=1.0)
-    >>> loop = rt.design.simulate_loop(system, pi, 288.15, law=law, duration=400.0)
+    >>> loop = rt.design.simulate_loop(system, pi, 288.15, law=law, duration=600.0)
     >>> loop.outcome.code
     'settled'
     """
@@ -195,7 +195,7 @@ class _Run:
             raise InputError(f"a set-point is {wanted_cold.min():g} K", where="argument reference", expected="kelvin",
                              remedy="Add 273.15 to degrees Celsius.")
         rows: list[tuple[Any, ...]] = []
-        memory = self.observer.start(self.plant.lumps) if self.observer else None
+        memory = self.observer.start(self.plant.lumps) if self.observer else np.zeros(0)
         state: Array | None = None
         try:
             for k in range(self.n):
@@ -229,8 +229,7 @@ class _Run:
             sigma = np.array([sensor.noise for sensor in self.plant.system.sensors.values()])
             readings = readings + sigma * self.noise.standard_normal(len(sigma))
         names = self.plant.system.sensor_names
-        assert_sensors = self.observer.sensors if self.observer else ()
-        return readings[[names.index(name) for name in assert_sensors]]
+        return readings[[names.index(name) for name in (self.observer.sensors if self.observer else ())]]
 
     def _advance(self, command: Command, named: dict[str, float], k: int) -> None:
         load = {lump: float(values[k]) for lump, values in self.load.items()}

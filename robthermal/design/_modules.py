@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError
 from ..thermal import Module, System
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating]
 _COLDEST = 150.0  # K: below, a temperature is in Celsius
 
 

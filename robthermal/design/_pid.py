@@ -62,9 +62,9 @@ class PID:
         return np.concatenate([z, keep * filtered + (1 - keep) * seen.cold])
 
 
-def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None, proportional: float | Array | None = None,
-        integral: float | Array = 0.0, derivative: float | Array = 0.0, filter_time: float | None = None,
-        tracking_time: float | None = None) -> PID:
+def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
+        proportional: float | Array | None = None, integral: float | Array = 0.0,
+        derivative: float | Array = 0.0, filter_time: float | None = None, tracking_time: float | None = None) -> PID:
     """One PI or PID per module in discrete time.
 
     Parameters
@@ -112,7 +112,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None, 
         ki, kd = kp * w / 4, np.zeros(m)
     else:
         kp, ki, kd = (np.broadcast_to(np.asarray(gain, float), (m,)).copy()
-                      for gain in (proportional, integral, derivative))  # type: ignore[arg-type]  # not None here
+                      for gain in (proportional, integral, derivative))
         non_negative(np.stack([kp, ki, kd]), "proportional, integral, derivative")
     own = kp / np.where(ki > 0, ki, 1.0) if tracking_time is None else positive(tracking_time, "tracking_time", "s")
     tracking = np.where(ki > 0, np.maximum(own, h), np.inf)  # what never integrates must not drift either

@@ -129,7 +129,7 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     others = [i for i in range(full.shape[1]) if i >= n or system.lump_names[i] in hot]
     heaters = eq.B[:, :len(system.inputs)].toarray()[states]
     used_heaters = [j for j in range(heaters.shape[1]) if heaters[:, j].any()]
-    used = [i for i in others if full[states, i].any()]
+    used = np.array([i for i in others if full[states, i].any()], np.intp)
     nodes = (*system.lump_names, *system.ambient_names)
     around = (*(system.input_names[j] for j in used_heaters), *(nodes[i] for i in used))
     drive = np.array([[float(i == c) for c in law.modules.cold] for i in states])

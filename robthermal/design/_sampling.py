@@ -60,7 +60,7 @@ def loop_poles(plant: ColdSide, controller: Controller) -> NDArray[np.complex128
     origin = step(zero)
     matrix = np.column_stack([step(unit) - origin for unit in np.eye(len(zero))])
     moving = (matrix != np.eye(len(zero))).any(axis=1)  # a memory that never changes is a constant, not a pole
-    return np.linalg.eigvals(matrix[np.ix_(moving, moving)])
+    return np.linalg.eigvals(matrix[np.ix_(moving, moving)]).astype(complex)
 
 
 def check_sampling(plant: ColdSide, controller: Controller, at: Callable[[float], Controller] | None = None) -> None:

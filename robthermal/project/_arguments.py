@@ -49,10 +49,10 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     currents = {**default, **dict(_range(text, "--current") for text in current)}
     surroundings = dict(_range(text, "--ambient") for text in ambient)
     points = dict(_value(text, "--setpoint") for text in setpoint)
-    return Boxes(temperature=range_in_kelvin(temperature, unit) if temperature else Boxes().temperature,
-                 current=currents,
-                 ambient={name: range_in_kelvin(pair, unit) for name, pair in surroundings.items()},
-                 setpoint={name: in_kelvin(value, unit) for name, value in points.items()},
+    box = range_in_kelvin(temperature, unit, "--temperature") if temperature else Boxes().temperature
+    return Boxes(temperature=box, current=currents,
+                 ambient={name: range_in_kelvin(pair, unit, "--ambient") for name, pair in surroundings.items()},
+                 setpoint={name: in_kelvin(value, unit, "--setpoint") for name, value in points.items()},
                  method=method)
 
 

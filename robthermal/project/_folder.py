@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -87,3 +88,7 @@ def check_free(target: Path) -> None:
         raise InputError("is a folder with other things in it", where=str(target), remedy="Choose another with --out.")
     if target.exists() and not target.is_dir():
         raise InputError("is a file", where=str(target), remedy="Choose another folder with --out.")
+    above = next(folder for folder in target.absolute().parents if folder.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise InputError(f"cannot be written: {str(above)!r} is not a folder that may be written", where=str(target),
+                         remedy="Choose another folder with --out.")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..identify import FrequencyResponse, etfe, lpm, lrm, lrmp, spectral
-from ..signals import DesignCheck, Excitation, Record, design_check, multisines, read_record
+from ..signals import Excitation, Record, multisines, read_record
 from ..thermal import System
 
 _METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
@@ -84,8 +84,8 @@ def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs:
 
 def design_excitation(names: Sequence[str], *, period: int, sample_time: float, band: tuple[float, float],
                       amplitude: float, periods: int = 1, nonnegative: bool = False, arrangement: str = "orthogonal",
-                      seed: int = 0, system: System | None = None) -> tuple[Excitation, DesignCheck]:
-    """Design multisines for some inputs and check what they will resolve.
+                      seed: int = 0) -> Excitation:
+    """Design multisines for some inputs.
 
     Parameters
     ----------
@@ -105,28 +105,21 @@ def design_excitation(names: Sequence[str], *, period: int, sample_time: float, 
         "orthogonal", "zippered" or "independent".
     seed : int
         Of the random phases.
-    system : System, optional
-        Its poles tell which frequencies the time leaves unresolved.
 
     Returns
     -------
-    excitation : Excitation
-        Signals of all experiments.
-    check : DesignCheck
-        What they cost and resolve.
+    Excitation
 
     Examples
     --------
     >>> import robthermal as rt
-    >>> u, check = rt.project.design_excitation(["m1", "m2"], period=2000, sample_time=1.0, band=(0.001, 0.1),
-    ...                                         amplitude=0.5, system=rt.systems.two_module())
+    >>> u = rt.project.design_excitation(["m1", "m2"], period=2000, sample_time=1.0, band=(0.001, 0.1), amplitude=0.5)
     >>> len(u.experiments)
     2
     """
-    u = multisines(period, inputs=len(names), sample_time=sample_time, seed=seed, band=band, amplitude=amplitude,
-                   offset="nonnegative" if nonnegative else 0.0, periods=periods, phases="low_crest",
-                   arrangement=arrangement)  # type: ignore[arg-type]  # checked by multisines
-    return u, design_check(u, sample_time=sample_time, poles=None if system is None else system.poles())
+    return multisines(period, inputs=len(names), sample_time=sample_time, seed=seed, band=band, amplitude=amplitude,
+                      offset="nonnegative" if nonnegative else 0.0, periods=periods, phases="low_crest",
+                      arrangement=arrangement)  # type: ignore[arg-type]  # checked by multisines
 
 
 def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Path]:
@@ -149,7 +142,7 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
     --------
     >>> from pathlib import Path
     >>> import robthermal as rt
-    >>> u, _ = rt.project.design_excitation(["q"], period=500, sample_time=1.0, band=(0.01, 0.1), amplitude=1.0)
+    >>> u = rt.project.design_excitation(["q"], period=500, sample_time=1.0, band=(0.01, 0.1), amplitude=1.0)
     >>> [p.name for p in rt.project.write_excitation(u, ["q"], Path("u.csv"))]
     ['u.csv']
     """

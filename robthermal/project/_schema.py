@@ -14,6 +14,7 @@ from ..signals import celsius_to_kelvin
 from ..thermal import FitRange, System, fit_in_kelvin, read_system
 
 _MAX_BYTES = 10_000_000
+_COLDEST_KELVIN, _HOTTEST_CELSIUS = 150.0, 250.0  # as in system files
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Pair = tuple[Number, Number]
 Method = Literal["energy", "sum", "max"]
@@ -162,7 +163,7 @@ def read_project(path: str | Path) -> Project:
     train, validation = (tuple(_beside(folder, name, path) for name in names)
                          for names in (head.train, head.validation))
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
-                   data.calibrate.loss, _boxes(system, data.certify), (path, system_file, *train, *validation))
+                   data.calibrate.loss, _boxes(system, data.certify, path), (path, system_file, *train, *validation))
 
 
 def _beside(folder: Path, name: str, project: Path) -> Path:
@@ -186,23 +187,32 @@ def _with_fit(system: System, ranges: dict[str, dict[str, float]], path: Path) -
                          remedy=error.remedy) from None
 
 
-def _boxes(system: System, table: CertifyTable) -> Boxes:
-    unit = system.temperature_unit
-    return Boxes(temperature=range_in_kelvin(table.temperature, unit) if table.temperature else Boxes().temperature,
-                 ambient={name: range_in_kelvin(pair, unit) for name, pair in table.ambient.items()},
+def _boxes(system: System, table: CertifyTable, path: Path) -> Boxes:
+    unit, where = system.temperature_unit, f"{path} [certify]"
+    box = range_in_kelvin(table.temperature, unit, f"{where} temperature") if table.temperature else None
+    return Boxes(temperature=box or Boxes().temperature,
+                 ambient={name: range_in_kelvin(pair, unit, f"{where} ambient.{name}")
+                          for name, pair in table.ambient.items()},
                  current=table.current, heat=table.heat,
-                 setpoint={name: in_kelvin(value, unit) for name, value in table.setpoint.items()},
+                 setpoint={name: in_kelvin(value, unit, f"{where} setpoint.{name}")
+                           for name, value in table.setpoint.items()},
                  method=table.method)
 
 
-def in_kelvin(value: float, unit: str) -> float:
-    """A temperature in the unit of a system file [K]."""
+def in_kelvin(value: float, unit: str, where: str) -> float:
+    """A temperature in the unit of a system file [K]; what looks like the other unit is refused."""
+    if unit == "degC" and value > _HOTTEST_CELSIUS:
+        raise InputError(f"{value:g} °C is above {_HOTTEST_CELSIUS:g} °C: it looks like kelvin", where=where,
+                         remedy="The system file says degC: give degrees Celsius.")
+    if unit == "K" and value < _COLDEST_KELVIN:
+        raise InputError(f"{value:g} K is below {_COLDEST_KELVIN:g} K: it looks like degrees Celsius", where=where,
+                         remedy="The system file says K: give kelvin.")
     return float(celsius_to_kelvin(value)) if unit == "degC" else float(value)
 
 
-def range_in_kelvin(pair: Pair, unit: str) -> tuple[float, float]:
+def range_in_kelvin(pair: Pair, unit: str, where: str) -> tuple[float, float]:
     """Both ends of a range [K]."""
-    return in_kelvin(pair[0], unit), in_kelvin(pair[1], unit)
+    return in_kelvin(pair[0], unit, where), in_kelvin(pair[1], unit, where)
 
 
 def _refusal(error: ValidationError, path: Path) -> InputError:

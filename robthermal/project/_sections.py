@@ -9,6 +9,7 @@ import pandas as pd
 
 from ..calibration import Fit
 from ..report import Figure, Section, Table, box_ranges, current_limits, measured_against_model
+from ..thermal import System
 from ._claims import Certification, Checked
 from ._job import Comparison
 
@@ -35,8 +36,9 @@ def _comparison_figure(c: Comparison) -> Figure:
     figure = measured_against_model(c.record.time, {n: c.record[n] for n in names},
                                     {n: c.calibrated[n] for n in names}, title=f"{c.kind}: {c.record.name}")
     alt = f"Time plot of measured and simulated temperatures, {c.kind} record, with residuals below."
-    caption = (f"Measured (dots) and calibrated model (lines), {c.kind} record; the {len(names)} sensors with the "
-               "largest residual.")
+    shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(c.record.output_names) else (
+        "every sensor")
+    caption = f"Measured (dots) and calibrated model (lines), {c.kind} record; {shown}."
     return Figure.draw(figure, alt=alt, caption=caption)
 
 
@@ -97,7 +99,8 @@ def box_section(result: Certification) -> Section | None:
     low, high = (np.array([pair[side] for pair in box.values()]) - _ZERO for side in (0, 1))
     figure = Figure.draw(box_ranges(list(box), low, high), alt="Range of every lump temperature in the box.",
                          caption="Range that each lump cannot leave, °C.")
-    text = ("For the stated currents, heats and ambients, in whatever sequence, no lump leaves its range once all are "
+    what = "currents, heats and ambients" if result.system.modules else "heats and ambients"
+    text = (f"For the stated {what}, in whatever sequence, no lump leaves its range once all are "
             "inside. The ranges bound what the model can do, also far outside the temperatures at which its parameters "
             "were measured; they are not a prediction of what it will do.")
     return Section("The box that is never left", text, figures=(figure,),
@@ -133,13 +136,22 @@ def certification_sections(result: Certification) -> Iterator[Section]:
     yield Section("Exact claims", "\n\n".join(claims), anchor="exact")
 
 
-ASSUMPTIONS = (
-    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below "
-    "0.1).",
+def assumptions(system: System) -> tuple[str, ...]:
+    """What the claims about a system rest on."""
+    return tuple(text for text in _ASSUMPTIONS if system.modules or text not in _OF_MODULES)
+
+
+_OF_MODULES = (
     "Module properties vary linearly with the mean of the two face temperatures; half of the Joule heat goes to each "
     "face.",
-    "Currents are imposed (current drive). Heats not in the network stay within the stated ranges.",
+    "Currents are imposed (current drive).",
+)
+_ASSUMPTIONS = (
+    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below "
+    "0.1).",
+    *_OF_MODULES,
+    "Heats not in the network stay within the stated ranges.",
     "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of "
     "them.",
-    "Temperatures and currents stay in the stated ranges; for the box that is never left this is itself proven.",
+    "Temperatures, currents and heats stay in the stated ranges; for the box that is never left this is itself proven.",
 )

@@ -11,7 +11,7 @@ from ..thermal import System, write_system
 from ._claims import Certification, Checked
 from ._folder import output_folder
 from ._job import JobResult
-from ._sections import ASSUMPTIONS, certification_sections, comparison_section, parameter_section
+from ._sections import assumptions, certification_sections, comparison_section, parameter_section
 
 _ZERO = 273.15
 
@@ -56,7 +56,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     sections.extend(certification_sections(result.certification))
     report = Report(title=project.name, subtitle=_subtitle(result.system), label=project.label,
                     claims=claims(result.certification), sections=tuple(sections),
-                    provenance=provenance(project.files), assumptions=ASSUMPTIONS, generated=_now())
+                    provenance=provenance(project.files), assumptions=assumptions(result.system), generated=_now())
     with output_folder(out) as folder:
         write_certification(result.certification, report, folder)
         write_system(result.system, folder / "calibrated.toml")
@@ -90,7 +90,7 @@ def write_certify(result: Certification, files: tuple[Path, ...], out: str | Pat
     """
     report = Report(title=result.system.name, subtitle=_subtitle(result.system), label="", claims=claims(result),
                     sections=tuple(certification_sections(result)), provenance=provenance(files),
-                    assumptions=ASSUMPTIONS, generated=_now())
+                    assumptions=assumptions(result.system), generated=_now())
     with output_folder(out) as folder:
         write_certification(result, report, folder)
     return report
@@ -130,7 +130,8 @@ def _claim(checked: Checked, result: Certification) -> Claim:
     cert, verdict = checked.certificate, checked.verdict
     margins = verdict.margins if verdict else {}
     reason = cert.reason if not cert.holds else ("" if checked.good else verdict.reason if verdict else "not verified")
-    return Claim(title=checked.title, sentence=_SENTENCES[checked.key], holds=cert.holds, verified=checked.good,
+    sentences = _SENTENCES if result.system.modules else _SENTENCES | _WITHOUT_MODULES
+    return Claim(title=checked.title, sentence=sentences[checked.key], holds=cert.holds, verified=checked.good,
                  box=_box(result, checked), margin=_margin(checked, margins),
                  how=_HOW.get(cert.kind, cert.kind), reason=reason,
                  file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
@@ -143,6 +144,12 @@ _SENTENCES = {  # the exact sentences, with all numbers, are in the section "Exa
            "ambients do within theirs.",
     "box_contraction": "Inside those ranges any two temperature histories approach each other too: together with the "
                        "claim before, the machine cannot run away thermally from there.",
+}
+_WITHOUT_MODULES = {
+    "contraction": "For every lump temperature in the box any two temperature histories under the same heats approach "
+                   "each other: no thermal runaway inside this box.",
+    "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the heats and ambients do "
+           "within theirs.",
 }
 _HOW = {
     "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
@@ -177,9 +184,9 @@ def _margin(checked: Checked, margins: Mapping[str, float]) -> str:
 
 
 def _subtitle(system: System) -> str:
-    parts = [f"{len(system.lumps)} lumps", f"{len(system.modules)} modules", f"{len(system.inputs)} heaters",
-             f"{len(system.sensors)} sensors"]
-    return f"{system.name}: " + ", ".join(part for part in parts if not part.startswith("0 "))
+    counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
+              "sensor": len(system.sensors)}
+    return f"{system.name}: " + ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
 
 
 def _now() -> str:

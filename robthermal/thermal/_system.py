@@ -69,6 +69,12 @@ class System(Part):
             raise refusal(error) from None
         check_network(self)
 
+    def __repr__(self) -> str:
+        parts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "inputs", "sensors")}
+        return f"<System {self.name!r}: " + ", ".join(f"{count} {table}" for table, count in parts.items() if count) + ">"
+
+    __str__ = __repr__
+
     @property
     def lump_names(self) -> tuple[str, ...]:
         """Lumps in file order: the states."""

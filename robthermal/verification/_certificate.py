@@ -91,14 +91,14 @@ class Certificate:
         try:
             content = json.dumps(self._document(), indent=1, allow_nan=False, default=_plain).encode()
         except (TypeError, ValueError, RecursionError) as error:
-            raise InputError(f"certificate cannot be written: {error}", where=name_of(str(target))) from error
+            raise InputError(f"certificate cannot be written: {error}", where=ascii(str(target))) from error
         if len(content) > _LARGEST:
-            raise InputError(f"certificate of {len(content)} bytes", where=name_of(str(target)),
+            raise InputError(f"certificate of {len(content)} bytes", where=ascii(str(target)),
                              expected=f"at most {_LARGEST} bytes", remedy="Keep large networks in memory.")
         try:
             _replace(target, content)
         except (OSError, ValueError) as error:
-            raise InputError(f"cannot write: {_words(error)}", where=name_of(str(target))) from error
+            raise InputError(f"cannot write: {_words(error)}", where=ascii(str(target))) from error
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Certificate:
@@ -122,7 +122,7 @@ class Certificate:
         """
         if not isinstance(path, (str, os.PathLike)):
             raise InputError(f"{name_of(path)} is not a path", where="path", expected="a text or Path")
-        where = name_of(os.fspath(path))
+        where = ascii(os.fspath(path))
         try:
             return cls._from_document(_parse(_read(path)))
         except InputError as error:

@@ -84,9 +84,9 @@ def claim(problem: Gain) -> str:
     fades = (f"what is left of their start fades as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
              else "if they start together")
     return (f"In the {say_system(problem.system)}, for all {say_region(problem.system, problem.region)}{ambients}"
-            f"{say_parameters(problem.parameters)}: two trajectories in this box under the same currents that differ in "
-            f"one disturbance never part by more than the peak gain times its largest difference, {fades}; the largest "
-            f"gains are {peaks}.")
+            f"{say_parameters(problem.parameters)}: two trajectories in this box under the same currents that differ "
+            f"in one disturbance never part by more than the peak gain times its largest difference, {fades}; the "
+            f"largest gains are {peaks}.")
 
 
 def prove(problem: Gain) -> Proof:

@@ -75,10 +75,10 @@ def _property(part: str, key: str, modules: Mapping[str, int]) -> tuple[int, tup
 def _variants(module: Module, ends: Mapping[tuple[str, int], Interval]) -> tuple[Module, ...]:
     found = []
     for chosen in product(*(sorted(set(pair)) for pair in ends.values())):
-        pairs = {prop: list(getattr(module, prop)) for prop in _PROPERTIES}
-        for (prop, position), value in zip(ends, chosen, strict=True):
-            pairs[prop][position] = value
-        found.append(replace(module, **{prop: tuple(pair) for prop, pair in pairs.items()}))
+        at = dict(zip(ends, chosen, strict=True))
+        S, R, K = ((at.get((prop, 0), value), at.get((prop, 1), slope)) for prop, (value, slope) in
+                   zip(_PROPERTIES, (module.seebeck, module.resistance, module.conductance), strict=True))
+        found.append(replace(module, seebeck=S, resistance=R, conductance=K))
     return tuple(found)
 
 

@@ -1,0 +1,137 @@
+"""Does the loop respond alike to small and large steps? Normalised step responses, with the law and without it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, Outcome
+from ..thermal import Equilibrium, System, steady_state
+from ._constant_gain import constant_gain
+from ._controller import Controller
+from ._linearization import FeedbackLinearization
+from ._loop import ClosedLoop, Law, simulate_loop
+from ._modules import Array
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """Normalised step responses (y - y0)/step with the law and with its constant-gain tangent.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        [s].
+    steps : tuple of float
+        [K].
+    linearised, plain : ndarray, shape (n_steps, n, n_modules)
+        Normalised responses [-].
+    after, before : float
+        Largest spread between the steps at one time, with the law and without: 0 is a linear loop.
+    outcome : Outcome
+        "collapsed", or "limited" when a limit of the law was active in a step: a saturated loop cannot scale.
+    """
+
+    time: Array
+    steps: tuple[float, ...]
+    linearised: Array
+    plain: Array
+    after: float
+    before: float
+    outcome: Outcome
+
+    @property
+    def ratio(self) -> float:
+        """Spread before / after."""
+        return self.before / self.after if self.after > 0 else np.inf
+
+    def __str__(self) -> str:
+        return f"spread {self.before:.4f} without the law, {self.after:.4f} with it. {self.outcome}"
+
+    def plot(self) -> Any:
+        """Plot both families of normalised responses, like Evers figures 5.14-5.15; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(1, 2, sharey=True, layout="constrained")
+        for ax, family, title in zip(axes, (self.plain, self.linearised), ("constant gain", "linearised"), strict=True):
+            for step, response in zip(self.steps, family, strict=True):
+                ax.plot(self.time, response[:, 0], label=f"{step:+g} K")
+            ax.set(xlabel="time [s]", title=title)
+        axes[0].set_ylabel("normalised response [-]")
+        axes[1].legend()
+        return axes
+
+
+def collapse(system: System, controller: Controller, *, law: FeedbackLinearization, base: float,
+             steps: Sequence[float] = (-30.0, -20.0, -10.0, 10.0, 20.0, 30.0), duration: float = 600.0,
+             inputs: Mapping[str, float] | None = None) -> Collapse:
+    """Compare normalised set-point steps of the linearised loop with those of the same controller on a constant gain.
+
+    Parameters
+    ----------
+    system : System
+        The plant.
+    controller : Controller
+        Used for both; the constant gain is the tangent of the law at the base, so that small steps agree.
+    law : FeedbackLinearization
+        The law.
+    base : float
+        Temperature of all cold faces before the steps, in steady state [K].
+    steps : sequence of float, optional
+        [K].
+    duration : float, optional
+        [s].
+    inputs : mapping, optional
+        Ambients [K] and heaters [unit].
+
+    Returns
+    -------
+    Collapse
+
+    Raises
+    ------
+    InputError
+        A base that cannot be held; a step of zero.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> system = rt.systems.two_module()
+    >>> law = rt.design.feedback_linearization(system)
+    >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.02, sample_time=1.0)
+    >>> found = rt.design.collapse(system, pi, law=law, base=298.15, steps=(-15.0, 15.0), duration=200.0)
+    >>> found.ratio > 10
+    True
+    """
+    if len(steps) < 2 or not all(np.isfinite(step) and step != 0 for step in steps):
+        raise InputError(f"steps = {tuple(steps)!r}", where="argument steps", expected="at least two steps, none zero")
+    start = _hold(system, law, base, inputs)
+    at = np.array(list(start.temperatures.values()))
+    current = np.array([start.currents[name] for name in law.names])
+
+    def family(way: Law) -> list[ClosedLoop]:
+        return [simulate_loop(system, controller, base + step, law=way, duration=duration, inputs=inputs, initial=at,
+                              current=current) for step in steps]
+
+    linearised, plain = family(law), family(constant_gain(law, at, current))
+    limited = [f"{step:+g} K" for step, loop in zip(steps, linearised, strict=True) if (loop.limit != "").any()]
+    n = min(len(loop.time) for loop in (*linearised, *plain))
+    after, before = (np.array([(loop.cold[:n] - base) / step for step, loop in zip(steps, loops, strict=True)])
+                     for loops in (linearised, plain))
+    text = (f"A limit was active in the steps {', '.join(limited)}: lower the bandwidth or the steps."
+            if limited else "No limit was active in the linearised loop.")
+    return Collapse(linearised[0].time[:n], tuple(steps), after, before, float(np.ptp(after, axis=0).max()),
+                    float(np.ptp(before, axis=0).max()),
+                    Outcome(not limited, "limited" if limited else "collapsed", text))
+
+
+def _hold(system: System, law: FeedbackLinearization, base: float, inputs: Mapping[str, float] | None) -> Equilibrium:
+    found = steady_state(system, dict(inputs or {}), setpoint=dict.fromkeys(law.names, base))
+    stable = [e for e in found.equilibria if e.stable]
+    if not stable:
+        raise InputError(f"cold faces at {base:g} K cannot be held", where="argument base", expected="a temperature in "
+                         "the range that rt.design.reachable gives", remedy=found.outcome.text)
+    return stable[0]

@@ -1,0 +1,144 @@
+"""Which sensors an observer needs: the smallest set that stays stable over a box of temperatures and currents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, islice
+from math import comb
+from typing import Any, Literal
+
+import pandas as pd
+
+from ..errors import InputError, Outcome
+from ..thermal import System
+from ._error_box import Interval, Temperatures
+from ._observer import GainObserver, Noise, observer
+from ._observer_model import unobservable
+
+_MOST = 2000  # sets of one size that are all tried; beyond, the best smaller set is extended
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Sensor sets by size.
+
+    Parameters
+    ----------
+    sensors : tuple of str
+        Smallest set found that passes; empty if none does.
+    observer : GainObserver or None
+        Its observer; None if there is no such set.
+    best : dict
+        Number of sensors to (sensors, spectral radius of the frozen error over the box) of the best set of that size.
+    outcome : Outcome
+        "found" or "none", and what was and was not proven.
+    """
+
+    sensors: tuple[str, ...]
+    observer: GainObserver | None
+    best: dict[int, tuple[tuple[str, ...], float]]
+    outcome: Outcome
+
+    def to_frame(self) -> pd.DataFrame:
+        """Best set of every size."""
+        return pd.DataFrame([{"sensors": len(names), "set": ", ".join(names), "spectral radius": radius}
+                             for names, radius in self.best.values()])
+
+    def __str__(self) -> str:
+        return f"{self.to_frame().to_string(index=False)}\n{self.outcome.text}"
+
+    def plot(self) -> Any:
+        """Plot the slowest decay against the number of sensors; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, ax = plt.subplots(layout="constrained")
+        sizes = list(self.best)
+        ax.plot(sizes, [radius for _, radius in self.best.values()], "o-")
+        for size, (names, radius) in self.best.items():
+            ax.annotate(" ".join(names), (size, radius), rotation=30, fontsize="small")
+        ax.axhline(1.0, color="k", lw=0.8, ls="--")
+        ax.set(xlabel="sensors", ylabel="spectral radius of the error, worst corner", xticks=sizes)
+        return ax
+
+
+def place_sensors(system: System, *, current: Mapping[str, Interval], temperature: Temperatures,
+                  candidates: Sequence[str] | None = None, sample_time: float = 1.0, radius: float = 1.0,
+                  largest: int = 4, method: Literal["kalman", "positive"] = "kalman",
+                  process_noise: Noise = None) -> Placement:
+    """Find the smallest sensor set whose observer is stable at every frozen corner of a box.
+
+    Parameters
+    ----------
+    system : System
+        Its sensors are the candidates.
+    current : mapping of module to (lower, upper)
+        [A], every module named.
+    temperature : (lower, upper) or mapping of lump to (lower, upper)
+        [K].
+    candidates : sequence of str, optional
+        Sensors to choose from; default all.
+    sample_time : float, optional
+        [s].
+    radius : float, optional
+        The error must have a smaller spectral radius than this at every corner.
+    largest : int, optional
+        Largest set to look at; all sizes up to it are tabulated for the trade-off.
+    method, process_noise
+        As in `observer`.
+
+    Returns
+    -------
+    Placement
+        A screening: necessary, not sufficient for a certificate. All sets of a size are tried up to 2000 of them,
+        beyond that the best smaller set is extended.
+
+    Raises
+    ------
+    InputError
+        Unknown candidates, a size that is not possible.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> found = rt.design.place_sensors(rt.systems.two_module(), temperature=(278.15, 358.15), largest=2,
+    ...                                 current={"m1": (-3.0, 3.0), "m2": (-3.0, 3.0)})
+    >>> len(found.sensors)
+    1
+    """
+    names = tuple(system.sensors) if candidates is None else tuple(candidates)
+    for name in names:
+        if name not in system.sensors:
+            raise InputError(f"there is no sensor {name!r}", where="argument candidates",
+                             expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
+    if not 1 <= largest <= len(names):
+        raise InputError(f"largest = {largest}", where="argument largest", expected=f"1 to {len(names)}")
+    best: dict[int, tuple[tuple[str, ...], float]] = {}
+    observers: dict[int, GainObserver] = {}
+    for size in range(1, largest + 1):
+        for tried in _sets(names, size, best):
+            if unobservable(system, tried) or len({system.sensors[name].lump for name in tried}) < size:
+                continue
+            found = observer(system, tried, sample_time=sample_time, method=method, process_noise=process_noise,
+                             current=current, temperature=temperature)
+            if not isinstance(found, GainObserver):
+                raise InputError(f"method = {method!r}", where="argument method", expected='"kalman" or "positive"')
+            worst = found.spectral_radius(current, temperature)
+            if size not in best or worst < best[size][1]:
+                best[size], observers[size] = (tried, worst), found
+    passing = [size for size, (_, worst) in best.items() if worst < radius]
+    if not passing:
+        return Placement((), None, best, Outcome(False, "none", f"No set of up to {largest} sensors stays below "
+                         f"{radius:g} over this box: lower the current, or add sensors at the modules."))
+    chosen, worst = best[passing[0]]
+    return Placement(chosen, observers[passing[0]], best, Outcome(
+        True, "found", f"{', '.join(chosen)}: spectral radius {worst:.5f} at the worst frozen corner. That is "
+        "necessary, not sufficient: rt.certify.observer proves it or not."))
+
+
+def _sets(names: tuple[str, ...], size: int, best: dict[int, tuple[tuple[str, ...], float]]) -> list[tuple[str, ...]]:
+    """Sets of one size to try."""
+    if comb(len(names), size) <= _MOST or size - 1 not in best:
+        return list(islice(combinations(names, size), _MOST))
+    smaller = best[size - 1][0]
+    return [tuple(name for name in names if name in smaller or name == more) for more in names if more not in smaller]

@@ -1,0 +1,67 @@
+"""Commands frf and excitation: from a designed signal to an estimate that covers the truth."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+
+
+def robthermal(*arguments, cwd):
+    return subprocess.run([sys.executable, "-m", "robthermal", *map(str, arguments)], cwd=cwd, capture_output=True,
+                          text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def setup(tmp_path):
+    """A heated bar, its system file, and a record simulated with noise."""
+    system = rt.System(name="bar", ambients={"room": {"temperature": 298.15}}, lumps={"bar": {"capacity": 40.0}},
+                       links=[{"between": ("bar", "room"), "conductance": 2.0}], sensors={"T": {"lump": "bar"}},
+                       inputs={"q": {"lump": "bar"}})
+    rt.thermal.write_system(system, tmp_path / "bar.toml")
+    done = robthermal("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
+                      "--nonnegative", "--periods", 2, "--system", "bar.toml", "--out", "u.csv", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    drive = rt.read_record(tmp_path / "u.csv", inputs=["q"], outputs=[])
+    assert drive["q"].min() >= -1e-9
+    clean = rt.thermal.simulate(system, drive)
+    noisy = clean.outputs + np.random.default_rng(0).normal(0, 0.01, clean.outputs.shape)
+    rt.Record(sample_time=1.0, inputs=drive.inputs, outputs=noisy, input_names=["q"], output_names=["T"]).save(
+        tmp_path / "run.csv")
+    return system, tmp_path
+
+
+def test_excitation_says_what_stays_unresolved(setup):
+    _, folder = setup
+    shown = robthermal("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
+                       "--system", "bar.toml", cwd=folder)
+    assert shown.returncode == 0 and "time constant" in shown.stdout and (folder / "excitation.csv").is_file()
+
+
+def test_frf_covers_the_truth(setup):
+    system, folder = setup
+    done = robthermal("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--out", "G.json", "--plot", "G.svg",
+                      "--band", 0.002, 0.2, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["inputs"] == ["q"] and summary["outputs"] == ["T"] and (folder / "G.svg").is_file()
+    G = rt.identify.FrequencyResponse.load(folder / "G.json")
+    z = np.exp(2j * np.pi * G.frequencies)
+    p = np.exp(-2.0 / 40.0)
+    truth = 0.5 * (1 - p) / (z - p)
+    inside = np.abs(G.response[0, 0] - truth) <= G.confidence_radius(0.95)[0, 0]
+    assert 0.9 <= inside.mean() <= 0.99
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["run.csv"], "--system"), (["run.csv", "--system", "bar.toml", "--method", "magic"], "--method"),
+    (["run.csv", "--input", "q", "--output", "nothing"], "nothing"),
+    (["run.csv", "--system", "bar.toml", "--half-width", "-1"], "half_width")])
+def test_bad_requests_are_one_message_and_status_two(setup, arguments, words):
+    _, folder = setup
+    done = robthermal("frf", *arguments, cwd=folder)
+    assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
+    assert not (folder / "frf.json").exists()

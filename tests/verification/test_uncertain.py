@@ -1,0 +1,117 @@
+"""Uncertain parameters: closed forms, sampled machines of random networks, malformed ranges."""
+
+from __future__ import annotations
+
+import copy
+
+import certificate_truth as truth
+import numpy as np
+import pytest
+
+from robthermal.errors import InputError
+from robthermal.verification import establish
+
+ROD = {"lumps": {"rod": {"capacity": 10.0}}, "ambients": ["room"], "modules": {},
+       "links": [{"between": ["rod", "room"], "conductance": 0.5}]}
+METHODS = {"sum": {"weights": [1.0]}, "max": {"weights": [1.0]}, "energy": {}, "lyapunov": {"matrix": [[1.0]]}}
+
+
+def rod(method, rate, parameters):
+    region = {"temperature": [280.0, 350.0], "current": {}, "parameters": parameters}
+    return establish("contraction", system=ROD, region=region, made_by={}, margin={},
+                     evidence={"method": method, "rate": rate, **METHODS[method]})
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_least_conductance_and_the_largest_capacity_decide(method):
+    loss = {"links.rod-room.conductance": [0.4, 0.7]}
+    assert rod(method, 0.0399999, loss).holds and not rod(method, 0.0400001, loss).holds
+    if method != "lyapunov":
+        both = {**loss, "lumps.rod.capacity": [8.0, 16.0]}
+        assert rod(method, 0.0249999, both).holds and not rod(method, 0.0250001, both).holds
+
+
+def test_the_claim_names_the_ranges():
+    claim = rod("sum", 0.01, {"links.rod-room.conductance": [0.4, 0.7]}).claim
+    assert "'links.rod-room.conductance' in [0.4, 0.7]" in claim
+
+
+def machines(system, ranges, rng, count):
+    """Systems of the ranges, most at the ends."""
+    for _ in range(count):
+        other = copy.deepcopy(system)
+        for name, pair in ranges.items():
+            value = float(rng.choice(pair)) if rng.random() < 0.8 else float(rng.uniform(*pair))
+            table, rest = name.split(".", 1)
+            if table == "lumps":
+                other["lumps"][rest.removesuffix(".capacity")]["capacity"] = value
+            elif table == "links":
+                link = next(li for li in other["links"] if "-".join(li["between"]) == rest.removesuffix(".conductance"))
+                link["conductance"] = value
+            else:
+                part, prop, key = rest.split(".")
+                other["modules"][part][prop][key] = value
+        yield other
+
+
+def test_no_machine_of_the_ranges_violates_an_accepted_claim():
+    rng = np.random.default_rng(11)
+    accepted = violated = 0
+    for k in range(120):
+        method = list(METHODS)[k % 4]
+        system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.4))
+        names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
+        links = ["-".join(link["between"]) for link in system["links"]]
+        names += [f"links.{name}.conductance" for name in links if links.count(name) == 1]
+        names += [f"modules.m0.{prop}.{key}" for prop in ("seebeck", "resistance", "conductance")
+                  for key in ("value", "slope")]
+        ranges = {}
+        for name in rng.choice(names, 4, replace=False):
+            value = value_of(system, str(name))
+            ranges[str(name)] = sorted((value * float(rng.uniform(0.4, 1)), value * float(rng.uniform(1, 1.8))))
+        region = truth.box(system, float(rng.uniform(0.5, 6)))
+        evidence = truth.evidence_for(method, system, region, float(10 ** rng.uniform(-2.5, -1.3)), rng)
+        cert = establish("contraction", system=system, region={**region, "parameters": ranges}, evidence=evidence,
+                         made_by={}, margin={})
+        worst = max(truth.violation({"system": other, "region": region, "evidence": evidence}, rng, 12)
+                    for other in machines(system, ranges, rng, 8))
+        assert not (cert.holds and worst > 1e-9), (cert.claim, worst)
+        accepted += cert.holds
+        violated += worst > 0
+    assert accepted > 20 and violated > 20
+
+
+def value_of(system, name):
+    table, rest = name.split(".", 1)
+    if table == "lumps":
+        return system["lumps"][rest.removesuffix(".capacity")]["capacity"]
+    if table == "links":
+        return next(li for li in system["links"] if "-".join(li["between"]) == rest.removesuffix(".conductance")
+                    )["conductance"]
+    part, prop, key = rest.split(".")
+    return system["modules"][part][prop][key]
+
+
+@pytest.mark.parametrize(("parameters", "message"), [
+    ({"lumps.attic.capacity": [1, 2]}, "no such number"), ({"links.rod-attic.conductance": [1, 2]}, "no such number"),
+    ({"modules.m.seebeck.value": [1, 2]}, "no such number"), ({"rod": [1, 2]}, "no such number"),
+    ({"lumps.rod.capacity": [0, 2]}, "not positive"), ({"links.rod-room.conductance": [-1, 2]}, "negative"),
+    ({"links.rod-room.conductance": [2, 1]}, "is empty"), ({"links.rod-room.conductance": 2}, "not a list"),
+    ([["links.rod-room.conductance", 1, 2]], "not an object")])
+def test_malformed_ranges_are_refused(parameters, message):
+    with pytest.raises(InputError, match=message):
+        rod("sum", 0.01, parameters)
+
+
+def test_two_links_of_one_name_cannot_be_meant():
+    system = {**ROD, "links": ROD["links"] * 2}
+    region = {"temperature": [280.0, 350.0], "current": {}, "parameters": {"links.rod-room.conductance": [0.4, 0.6]}}
+    with pytest.raises(InputError, match="no such number"):
+        establish("contraction", system=system, region=region, made_by={}, evidence={"method": "energy", "rate": 0.0})
+
+
+def test_kinds_that_do_not_cover_ranges_say_so():
+    region = {"temperature": [280.0, 350.0], "current": {}, "ambient": {"room": [290.0, 300.0]},
+              "parameters": {"links.rod-room.conductance": [0.4, 0.6]}}
+    with pytest.raises(InputError, match="not part of this kind"):
+        establish("invariance", system=ROD, region=region, made_by={}, evidence={})
