@@ -1,4 +1,4 @@
-"""Every tutorial notebook runs from top to bottom, in time, and is stored without outputs."""
+"""Every tutorial notebook runs from top to bottom, and is stored without outputs."""
 
 from __future__ import annotations
 
@@ -11,20 +11,11 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
-LIMIT, LIMIT_TOGETHER = 60.0, 150.0  # processor time [s]: it does not depend on what else the machine is doing
 PATIENCE = 300  # a cell may take this long before it counts as hanging [s]
-
-_taken: dict[str, float] = {}  # seconds by notebook, of those that this process ran
 
 
 def read(path: Path) -> nbformat.NotebookNode:
     return nbformat.read(path, as_version=nbformat.NO_CONVERT)
-
-
-def spent_in_kernels() -> float:
-    """Processor time of all child processes that have ended [s]; zero on Windows, which does not tell."""
-    times = os.times()
-    return times.children_user + times.children_system
 
 
 def by_name(path: Path) -> str:
@@ -53,15 +44,7 @@ def test_runs_and_its_assertions_hold(path: Path, tmp_path: Path, monkeypatch: p
     # The kernel is a process of its own: it must find this checkout, and draw into the notebook.
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])))
     monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
-    before = spent_in_kernels()
     # python3 is the kernel of the running interpreter, whatever the notebook was last edited with.
     here = {"metadata": {"path": str(tmp_path)}}
     NotebookClient(read(path), kernel_name="python3", timeout=PATIENCE, resources=here).execute()
-    _taken[path.stem] = spent_in_kernels() - before
-    assert _taken[path.stem] < LIMIT
     assert not list(tmp_path.iterdir()), "a tutorial leaves no files behind"
-
-
-def test_together_they_are_quick() -> None:
-    # Under pytest-xdist this process may have run only some of them; each has its own limit above.
-    assert sum(_taken.values()) < LIMIT_TOGETHER

@@ -6,6 +6,9 @@ from ._constant_gain import ConstantGain as ConstantGain
 from ._constant_gain import constant_gain as constant_gain
 from ._controller import Controller as Controller
 from ._controller import Seen as Seen
+from ._estimate import Estimate as Estimate
+from ._estimate import Observer as Observer
+from ._extended import ExtendedKalmanFilter as ExtendedKalmanFilter
 from ._feed_forward import DisturbanceObserver as DisturbanceObserver
 from ._feed_forward import FeedForward as FeedForward
 from ._feed_forward import disturbance_observer as disturbance_observer
@@ -19,10 +22,7 @@ from ._loop import ClosedLoop as ClosedLoop
 from ._loop import simulate_loop as simulate_loop
 from ._lti import LinearController as LinearController
 from ._lti import linear_controller as linear_controller
-from ._observer import Estimate as Estimate
-from ._observer import ExtendedKalmanFilter as ExtendedKalmanFilter
 from ._observer import GainObserver as GainObserver
-from ._observer import Observer as Observer
 from ._observer import observer as observer
 from ._observer_model import ObserverModel as ObserverModel
 from ._observer_model import unobservable as unobservable

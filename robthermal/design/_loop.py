@@ -13,10 +13,10 @@ from ..errors import Diverged, InputError, Outcome
 from ..thermal import Stepper, System
 from ._constant_gain import ConstantGain
 from ._controller import Controller, Seen
+from ._estimate import Observer
 from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
 from ._numbers import positive
-from ._observer import Observer
 from ._plant import ColdSide, cold_side
 
 Law = FeedbackLinearization | ConstantGain

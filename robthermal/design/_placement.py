@@ -1,4 +1,4 @@
-"""Which sensors an observer needs: the smallest set that stays stable over a box of temperatures and currents."""
+"""Which sensors an observer needs: the smallest set with a certificate over a box of temperatures and currents."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ import pandas as pd
 
 from ..errors import InputError, Outcome
 from ..thermal import System
+from ..verification import Certificate
+from ._covariances import Noise
 from ._error_box import Interval, Temperatures
-from ._observer import GainObserver, Noise, observer
+from ._observer import GainObserver, observer
 from ._observer_model import unobservable
 
 _MOST = 2000  # sets of one size that are all tried; beyond, the best smaller set is extended
+_TRIED = 3  # of a size are put to the certifier
 
 
 @dataclass(frozen=True)
@@ -26,17 +29,20 @@ class Placement:
     Parameters
     ----------
     sensors : tuple of str
-        Smallest set found that passes; empty if none does.
+        Smallest set found whose observer is certified; empty if none is.
     observer : GainObserver or None
-        Its observer; None if there is no such set.
+        Its observer.
+    certificate : Certificate or None
+        Its certificate.
     best : dict
         Number of sensors to (sensors, spectral radius of the frozen error over the box) of the best set of that size.
     outcome : Outcome
-        "found" or "none", and what was and was not proven.
+        "found" or "none".
     """
 
     sensors: tuple[str, ...]
     observer: GainObserver | None
+    certificate: Certificate | None
     best: dict[int, tuple[tuple[str, ...], float]]
     outcome: Outcome
 
@@ -63,10 +69,9 @@ class Placement:
 
 
 def place_sensors(system: System, *, current: Mapping[str, Interval], temperature: Temperatures,
-                  candidates: Sequence[str] | None = None, sample_time: float = 1.0, radius: float = 1.0,
-                  largest: int = 4, method: Literal["kalman", "positive"] = "kalman",
-                  process_noise: Noise = None) -> Placement:
-    """Find the smallest sensor set whose observer is stable at every frozen corner of a box.
+                  candidates: Sequence[str] | None = None, sample_time: float = 1.0, largest: int = 3,
+                  method: Literal["kalman", "positive"] = "kalman", process_noise: Noise = None) -> Placement:
+    """Find the smallest sensor set whose observer is certified over a box.
 
     Parameters
     ----------
@@ -80,8 +85,6 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
         Sensors to choose from; default all.
     sample_time : float, optional
         [s].
-    radius : float, optional
-        The error must have a smaller spectral radius than this at every corner.
     largest : int, optional
         Largest set to look at; all sizes up to it are tabulated for the trade-off.
     method, process_noise
@@ -90,8 +93,9 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     Returns
     -------
     Placement
-        A screening: necessary, not sufficient for a certificate. All sets of a size are tried up to 2000 of them,
-        beyond that the best smaller set is extended.
+        Sets are screened by the spectral radius of the frozen error, which is necessary; the three best of a size are
+        put to `rt.certify.observer`. All sets of a size are screened up to 2000 of them, beyond that the best smaller
+        set is extended: a smaller certified set may then exist.
 
     Raises
     ------
@@ -102,9 +106,9 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     --------
     >>> import robthermal as rt
     >>> found = rt.design.place_sensors(rt.systems.two_module(), temperature=(278.15, 358.15), largest=2,
-    ...                                 current={"m1": (-3.0, 3.0), "m2": (-3.0, 3.0)})
-    >>> len(found.sensors)
-    1
+    ...                                 current={"m1": (0.0, 1.5), "m2": (0.0, 1.5)})
+    >>> len(found.sensors), found.certificate.holds
+    (1, True)
     """
     names = tuple(system.sensors) if candidates is None else tuple(candidates)
     for name in names:
@@ -114,8 +118,9 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     if not 1 <= largest <= len(names):
         raise InputError(f"largest = {largest}", where="argument largest", expected=f"1 to {len(names)}")
     best: dict[int, tuple[tuple[str, ...], float]] = {}
-    observers: dict[int, GainObserver] = {}
+    proven: tuple[GainObserver, Certificate] | None = None
     for size in range(1, largest + 1):
+        screened = []
         for tried in _sets(names, size, best):
             if unobservable(system, tried) or len({system.sensors[name].lump for name in tried}) < size:
                 continue
@@ -123,17 +128,28 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
                              current=current, temperature=temperature)
             if not isinstance(found, GainObserver):
                 raise InputError(f"method = {method!r}", where="argument method", expected='"kalman" or "positive"')
-            worst = found.spectral_radius(current, temperature)
-            if size not in best or worst < best[size][1]:
-                best[size], observers[size] = (tried, worst), found
-    passing = [size for size, (_, worst) in best.items() if worst < radius]
-    if not passing:
-        return Placement((), None, best, Outcome(False, "none", f"No set of up to {largest} sensors stays below "
-                         f"{radius:g} over this box: lower the current, or add sensors at the modules."))
-    chosen, worst = best[passing[0]]
-    return Placement(chosen, observers[passing[0]], best, Outcome(
-        True, "found", f"{', '.join(chosen)}: spectral radius {worst:.5f} at the worst frozen corner. That is "
-        "necessary, not sufficient: rt.certify.observer proves it or not."))
+            screened.append((found.spectral_radius(current, temperature), found))
+        if not screened:
+            continue
+        screened.sort(key=lambda pair: pair[0])
+        best[size] = (screened[0][1].sensors, screened[0][0])
+        if proven is None:
+            proven = _first_certified([found for radius, found in screened if radius < 1], current, temperature)
+    if proven is None:
+        return Placement((), None, None, best, Outcome(
+            False, "none", f"No set of up to {largest} sensors was certified over this box: lower the current, or add "
+            "sensors at the modules."))
+    return Placement(proven[0].sensors, *proven, best, Outcome(
+        True, "found", f"{', '.join(proven[0].sensors)}: {proven[1].claim}"))
+
+
+def _first_certified(found: list[GainObserver], current: Mapping[str, Interval],
+                     temperature: Temperatures) -> tuple[GainObserver, Certificate] | None:
+    for obs in found[:_TRIED]:
+        certificate = obs.certify(current, temperature)
+        if certificate.holds:
+            return obs, certificate
+    return None
 
 
 def _sets(names: tuple[str, ...], size: int, best: dict[int, tuple[tuple[str, ...], float]]) -> list[tuple[str, ...]]:

@@ -1,0 +1,32 @@
+"""The two-module setup, its law, cold side and a controller."""
+
+import pytest
+
+import robthermal as rt
+
+
+@pytest.fixture(scope="session")
+def system():
+    return rt.systems.two_module()
+
+
+@pytest.fixture(scope="session")
+def law(system):
+    return rt.design.feedback_linearization(system)
+
+
+@pytest.fixture(scope="session")
+def plant(law):
+    return rt.design.cold_side(law)
+
+
+@pytest.fixture(scope="session")
+def pi(plant):
+    return rt.design.pid(plant, bandwidth=0.05, sample_time=1.0)
+
+
+@pytest.fixture(scope="session")
+def constant(system):
+    """The same setup with constant S and R."""
+    return system.with_parameters({f"modules.{m}.{p}.slope": 0.0 for m in system.modules
+                                   for p in ("seebeck", "resistance")})
