@@ -22,7 +22,8 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
                   context_settings={"help_option_names": ["-h", "--help"]},
                   rich_markup_mode=None)  # markup would swallow units in brackets
 
-_UsageError = typer.BadParameter.__mro__[1]  # not public under one name: typer brings its own click since 0.21
+# A wrong command line. It has no public name that all versions share: newer ones of typer bring their own click.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
 
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
@@ -41,6 +42,12 @@ def _place(file: Path | None) -> Path | None:
     if file is not None and not file.parent.is_dir():  # said before the work, not after it
         raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
     return file
+
+
+def _drawing(file: Path | None) -> Path | None:
+    if file is not None and file.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise typer.BadParameter(f"the file name ends in {file.suffix!r}, not in .svg, .png or .pdf")
+    return _place(file)
 
 
 @app.callback()
@@ -149,8 +156,8 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
         out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=_place)] = Path(
             "frf.json"),
-        plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png).",
-                                                  callback=_place)] = None,
+        plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png, .pdf).",
+                                                  callback=_drawing)] = None,
         as_json: Json = False) -> None:
     """Estimate a frequency response with its covariance, from records that need not be in steady state.
 

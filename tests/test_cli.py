@@ -379,7 +379,8 @@ def test_check_refuses_a_record(run: Cli, system: Path, tmp_path: Path, text: st
 
 
 def test_check_refuses_celsius_declared_kelvin(run: Cli, tmp_path: Path) -> None:
-    kelvin = SYSTEM.replace('"degC"', '"K"').replace("= 22.0", "= 295.15").replace("= 35.0\ncurrent", "= 308.15\ncurrent")
+    kelvin = SYSTEM.replace('"degC"', '"K"').replace("= 22.0", "= 295.15")
+    kelvin = kelvin.replace("reference_temperature = 35.0", "reference_temperature = 308.15")
     file = write(tmp_path / "run.csv", RECORD)
     refused(run("check", write(tmp_path / "kelvin.toml", kelvin), file), "run.csv", "room", "22", "Celsius")
 
@@ -453,6 +454,30 @@ def test_output_into_a_missing_folder_is_refused_before_the_work(run: Cli, syste
                                                                  command: list[str]) -> None:
     here = {"SYSTEM": str(system), "RECORD": str(record)}
     refused(run(*(here.get(word, word) for word in command)), "--out" if "--out" in command else "--plot", "'no'")
+
+
+def test_plot_of_an_unknown_kind_is_refused_before_the_work(run: Cli, system: Path, record: Path,
+                                                            tmp_path: Path) -> None:
+    before = everything(tmp_path)
+    refused(run("frf", record, "--system", system, "--out", tmp_path / "f.json", "--plot", tmp_path / "f.xyz"),
+            "--plot", ".xyz", ".svg")
+    assert everything(tmp_path) == before
+
+
+def test_frf_and_excitation_write_what_they_say(run: Cli, tmp_path: Path) -> None:
+    done = run("excitation", "q", "--period", "400", "--sample-time", "1", "--band", "0.005", "0.2", "--amplitude",
+               "1", "--out", tmp_path / "u.csv", "--json")
+    assert done.status == 0 and json.loads(done.out)["out"] == [str(tmp_path / "u.csv")]
+    u = rt.read_record(tmp_path / "u.csv", inputs=["q"], outputs=[])["q"]
+    assert len(u) == 400 and np.abs(u - u.mean()).max() <= 1.0 + 1e-9
+    np.savetxt(tmp_path / "run.csv", np.column_stack([np.arange(1200), np.tile(u, 3), 2 * np.tile(u, 3) + 300]),
+               delimiter=",", header="time,q,T", comments="")
+    out, plot = tmp_path / "G.json", tmp_path / "G.svg"
+    done = run("frf", tmp_path / "run.csv", "--input", "q", "--output", "T", "--method", "etfe", "--band", "0.01",
+               "0.1", "--out", out, "--plot", plot, "--json")
+    assert done.status == 0 and json.loads(done.out)["bins"] > 10
+    np.testing.assert_allclose(rt.identify.FrequencyResponse.load(out).response, 2.0, atol=1e-9)
+    assert plot.read_text(encoding="utf-8").startswith("<?xml")
 
 
 # Help

@@ -43,8 +43,8 @@ def test_excitation_says_what_stays_unresolved(setup):
 
 def test_frf_covers_the_truth(setup):
     system, folder = setup
-    done = robthermal("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--out", "G.json", "--plot", "G.svg",
-                      "--band", 0.002, 0.2, "--json", cwd=folder)
+    done = robthermal("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--out", "G.json",
+                      "--plot", "G.svg", "--band", 0.002, 0.2, "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert summary["inputs"] == ["q"] and summary["outputs"] == ["T"] and (folder / "G.svg").is_file()

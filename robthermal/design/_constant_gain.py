@@ -14,14 +14,14 @@ from ._modules import Array
 
 @dataclass(frozen=True)
 class ConstantGain:
-    """I = I0 - |dI/dv| (v - v0), the tangent of the law at one operating point, with the law's limits.
+    """I = I0 - g (v - v0), g = abs(dI/dv): the tangent of the law at one operating point, with the law's limits.
 
     Parameters
     ----------
     law : FeedbackLinearization
         Whose limits and modules.
     current, heat, gain : ndarray, shape (n_modules,)
-        I0 [A], v0 [W] and |dI/dv| [A/W].
+        I0 [A], v0 [W] and g [A/W].
     """
 
     law: FeedbackLinearization

@@ -65,7 +65,8 @@ def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
     Returns
     -------
     FeedForward
-        Its heat holds the set-point exactly in steady state when the model is right and nothing unmeasured acts.
+        Its heat holds the set-point exactly in steady state when the model is right and nothing unmeasured acts. A
+        `disturbance_observer` goes around it, not inside.
 
     Examples
     --------
@@ -76,6 +77,10 @@ def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
     1.0
     """
     _same_law(plant, controller)
+    if isinstance(controller, DisturbanceObserver):
+        raise InputError("the controller is a disturbance observer", where="argument controller",
+                         expected="a controller without one: it must see all of the heat",
+                         remedy="Turn them round: disturbance_observer(plant, feed_forward(plant, …)).")
     return FeedForward(plant, controller)
 
 

@@ -204,7 +204,7 @@ class FeedbackLinearization:
             np.where(np.isfinite(least), least, 0.0), p), np.inf))
 
     def gain(self, current: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures) -> Array:
-        """Slope |dI/dv| = 1/(S x_c - R I) of the law; it diverges at the optimal current.
+        """Slope -dI/dv = 1/(S x_c - R I) of the law; it diverges at the optimal current.
 
         Parameters
         ----------

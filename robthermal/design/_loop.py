@@ -248,7 +248,7 @@ class _Run:
         reference = reference[:len(cold)]
         return ClosedLoop(self.law, self.h * np.arange(len(cold)), reference, cold, lumps, np.array(believed),
                           fields["current"], fields["voltage"], np.array(wanted), fields["heat"], fields["limit"],
-                          outcome or _judge(self.base, cold, reference, fields["limit"]))
+                          _judge(self.base, cold, reference, fields["limit"]) if outcome is None else outcome)
 
 
 def _judge(law: FeedbackLinearization, cold: Array, reference: Array, limit: np.ndarray) -> Outcome:

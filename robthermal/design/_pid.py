@@ -74,7 +74,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     sample_time : float
         [s].
     bandwidth : float, optional
-        Tune a PI for this crossover frequency [rad/s]: |Kp G| = 1 there, integral action a factor four below.
+        Tune a PI for this crossover frequency [rad/s]: the modulus of Kp G is 1 there, integral action a factor four below.
     proportional, integral, derivative : float or ndarray, optional
         Own gains [W/K], [W/(K s)], [W s/K] instead of a bandwidth.
     filter_time : float, optional

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import block_diag, solve_discrete_are
 
 from ..errors import InputError
 from ._controller import Seen
@@ -59,7 +59,7 @@ class StateFeedback:
         return state + change - np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
 
 
-def state_feedback(plant: ColdSide, *, sample_time: float, settling: float | None = None,
+def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
                    gain: ArrayLike | None = None, integral: ArrayLike | None = None,
                    tracking_time: float | None = None) -> StateFeedback:
     """State feedback with integral action, by LQR or from gains designed elsewhere.
@@ -70,14 +70,14 @@ def state_feedback(plant: ColdSide, *, sample_time: float, settling: float | Non
         What it controls; all its lumps are fed back, measured or estimated (`observer`).
     sample_time : float
         [s].
-    settling : float, optional
-        LQR with a guaranteed decay: every pole of the sampled loop is faster than a time constant of a quarter of
-        this [s]. (The system is shifted by that rate before the Riccati equation is solved.)
+    bandwidth : float, optional
+        LQR tuned like this [rad/s]: the error, and its integral times the bandwidth, are weighed against the heat that
+        moves a face by as much at this frequency.
     gain, integral : array_like, optional
         Own K (n_modules, n) [W/K] and Ki (n_modules, n_modules) [W/(K s)], for example of an LMI, for v = -K x + z,
         ż = Ki (r - y).
     tracking_time : float, optional
-        Anti-windup [s]; default a tenth of the settling time, else ten samples.
+        Anti-windup [s]; default one over the bandwidth, else ten samples.
 
     Returns
     -------
@@ -86,22 +86,21 @@ def state_feedback(plant: ColdSide, *, sample_time: float, settling: float | Non
     Raises
     ------
     InputError
-        Wrong shapes, a loop that is not stable, a settling time below the sample time.
+        Wrong shapes, a loop that is not stable, a sample time too slow for the bandwidth.
 
     Examples
     --------
     >>> import numpy as np, robthermal as rt
     >>> plant = rt.design.cold_side(rt.design.feedback_linearization(rt.systems.two_module()))
-    >>> loop = rt.design.state_feedback(plant, settling=200.0, sample_time=1.0)
-    >>> slowest = abs(rt.design.loop_poles(plant, loop)).max()
-    >>> bool(-1.0 / np.log(slowest) < 200.0 / 4)
+    >>> loop = rt.design.state_feedback(plant, bandwidth=0.05, sample_time=1.0)
+    >>> bool(abs(rt.design.loop_poles(plant, loop)).max() < 1)
     True
     """
     h, m, n = positive(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
-    if (settling is None) == (gain is None):
-        raise InputError("give either settling or gain", where="argument settling", expected="one of the two")
-    if settling is not None:
-        K, Ki = _lqr(plant, h, positive(settling, "settling", "s"))
+    if (bandwidth is None) == (gain is None):
+        raise InputError("give either bandwidth or gain", where="argument bandwidth", expected="one of the two")
+    if bandwidth is not None:
+        K, Ki = _lqr(plant, h, positive(bandwidth, "bandwidth", "rad/s"))
         Kr = K @ np.linalg.pinv(plant.C)
     else:
         K = np.asarray(gain, float)
@@ -110,24 +109,25 @@ def state_feedback(plant: ColdSide, *, sample_time: float, settling: float | Non
         if K.shape != (m, n) or Ki.shape != (m, m):
             raise InputError(f"gain has shape {K.shape}, integral {Ki.shape}", where="arguments gain, integral",
                              expected=f"({m}, {n}) for the lumps {', '.join(plant.lumps)}, and ({m}, {m})")
-    tracking = tracking_time if tracking_time is not None else settling / 10 if settling is not None else 10 * h
+    own = 10 * h if bandwidth is None else max(1 / bandwidth, h)
+    tracking = own if tracking_time is None else tracking_time
     controller = StateFeedback(plant, K, Kr, Ki, positive(tracking, "tracking_time", "s"), h)
     check_sampling(plant, controller)
     return controller
 
 
-def _lqr(plant: ColdSide, h: float, settling: float) -> tuple[Array, Array]:
-    """LQR of the cold side with its integrators, shifted so that everything decays within the settling time."""
-    rate = np.exp(4 * h / settling)
-    if h > settling / 4:
-        raise InputError(f"a sample time of {h:g} s is too slow for a settling time of {settling:g} s",
-                         where="argument sample_time", expected=f"at most {settling / 4:g} s")
+def _lqr(plant: ColdSide, h: float, w: float) -> tuple[Array, Array]:
+    """LQR of the sampled cold side with its integrators: y² + w² (∫y)² against |v / G(jw)|²."""
+    if h * w > 1:
+        raise InputError(f"a sample time of {h:g} s is too slow for a bandwidth of {w:g} rad/s",
+                         where="argument sample_time", expected=f"at most {1 / w:.3g} s")
     A, B = plant.sampled(h)
     m, n = len(plant.law.names), len(A)
-    whole = np.block([[A, np.zeros((n, m))], [-h * plant.C, np.eye(m)]]) * rate
-    drive = np.vstack([B[:, :m], np.zeros((m, m))]) * rate
-    weight = np.diag(np.concatenate([plant.C.sum(axis=0), np.full(m, (4 / settling) ** 2)])) + 1e-9 * np.eye(n + m)
-    size = np.linalg.norm(plant.C @ np.linalg.solve(plant.A, plant.B[:, :m]), 2)
-    P = solve_discrete_are(whole, drive, weight, size**2 * np.eye(m) / 100)
-    both = np.linalg.solve(drive.T @ P @ drive + size**2 * np.eye(m) / 100, drive.T @ P @ whole)
+    whole = np.block([[A, np.zeros((n, m))], [-h * plant.C, np.eye(m)]])
+    drive = np.vstack([B[:, :m], np.zeros((m, m))])
+    G = plant.C @ np.linalg.solve(1j * w * np.eye(n) - plant.A, plant.B[:, :m])
+    heat = np.diag(np.abs(np.diag(G)) ** 2)
+    error = block_diag(plant.C.T @ plant.C, w**2 * np.eye(m))
+    P = solve_discrete_are(whole, drive, error, heat)
+    both = np.linalg.solve(drive.T @ P @ drive + heat, drive.T @ P @ whole)
     return both[:, :n], -both[:, n:]

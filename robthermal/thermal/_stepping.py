@@ -126,8 +126,9 @@ class Stepper:
         u = exogenous_point(self._eq, {**(inputs or {}), **named})
         try:
             self.state = self._integrator.run(self.state, np.array([u, u])).z[-1]
-        except Diverged as error:  # its clock starts at every step
-            raise Diverged(f"at sample {self.time:.6g} s: {error}", time=self.time) from None
+        except Diverged as error:  # its clock starts anew at every step
+            why = str(error).partition(": ")[2]
+            raise Diverged(f"the simulation runs away at {self.time:.6g} s: {why}", time=self.time) from None
         self.time += self.sample_time
         return self.lumps
 

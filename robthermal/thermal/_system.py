@@ -70,8 +70,8 @@ class System(Part):
         check_network(self)
 
     def __repr__(self) -> str:
-        parts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "inputs", "sensors")}
-        return f"<System {self.name!r}: " + ", ".join(f"{count} {table}" for table, count in parts.items() if count) + ">"
+        counts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "inputs", "sensors")}
+        return f"<System {self.name!r}: {', '.join(f'{n} {table}' for table, n in counts.items() if n)}>"
 
     __str__ = __repr__
 

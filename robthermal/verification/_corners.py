@@ -11,7 +11,6 @@ from operator import add as plus
 from flint import arb_mat
 
 from ._definite import approximate, is_positive_preconditioned
-from ._rounded import Rounded, add, is_positive_rounded, rounded
 
 
 @dataclass(frozen=True)
@@ -19,7 +18,6 @@ class Part:
     """One share of the matrix, where it comes from, and whether that is a point of the box (not only of a hull)."""
 
     matrix: arb_mat
-    doubles: Rounded
     where: str
     real: bool
 
@@ -33,12 +31,12 @@ class Failure:
 
 
 def make_part(matrix: arb_mat, where: str, real: bool) -> Part:
-    """Return a share of the matrix with its doubles."""
-    return Part(matrix, rounded(matrix), where, real)
+    """Return a share of the matrix."""
+    return Part(matrix, where, real)
 
 
 def is_positive(part: Part) -> bool:
-    """Prove one matrix positive definite, in doubles where they suffice, else in balls."""
+    """Prove one matrix positive definite in ball arithmetic."""
     return _proven([part])
 
 
@@ -53,7 +51,5 @@ def first_failure(base: Part, groups: Sequence[Sequence[Part]]) -> Failure | Non
 
 
 def _proven(parts: Sequence[Part]) -> bool:
-    if is_positive_rounded(add([part.doubles for part in parts])):
-        return True
     matrix = reduce(plus, (part.matrix for part in parts))
     return is_positive_preconditioned(matrix, approximate(matrix))
