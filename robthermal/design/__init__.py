@@ -4,10 +4,8 @@ from ._collapse import Collapse as Collapse
 from ._collapse import collapse as collapse
 from ._constant_gain import ConstantGain as ConstantGain
 from ._constant_gain import constant_gain as constant_gain
-from ._controller import Controller as Controller
 from ._controller import Seen as Seen
 from ._estimate import Estimate as Estimate
-from ._estimate import Observer as Observer
 from ._extended import ExtendedKalmanFilter as ExtendedKalmanFilter
 from ._feed_forward import DisturbanceObserver as DisturbanceObserver
 from ._feed_forward import FeedForward as FeedForward
@@ -40,9 +38,9 @@ from ._sampling import loop_poles as loop_poles
 from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 
-__all__ = ["Bounds", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain", "Controller",
-           "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization",
-           "GainObserver", "LinearController", "Observer", "ObserverModel", "PID", "Placement", "Polarity", "Reach",
-           "Reachable", "Seen", "StateFeedback", "check_polarity", "cold_side", "collapse", "constant_gain",
-           "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller", "loop_poles",
-           "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]
+__all__ = ["Bounds", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain", "DisturbanceObserver",
+           "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver",
+           "LinearController", "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "Seen",
+           "StateFeedback", "check_polarity", "cold_side", "collapse", "constant_gain", "disturbance_observer",
+           "feed_forward", "feedback_linearization", "linear_controller", "loop_poles", "observer", "pid",
+           "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]

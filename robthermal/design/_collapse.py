@@ -15,6 +15,7 @@ from ._controller import Controller
 from ._linearization import FeedbackLinearization
 from ._loop import ClosedLoop, Law, simulate_loop
 from ._modules import Array
+from ._numbers import expect
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
     >>> found.ratio > 10
     True
     """
+    expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     if len(steps) < 2 or not all(np.isfinite(step) and step != 0 for step in steps):
         raise InputError(f"steps = {tuple(steps)!r}", where="argument steps", expected="at least two steps, none zero")
     start = _hold(system, law, base, inputs)

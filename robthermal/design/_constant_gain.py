@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ._linearization import Command, FeedbackLinearization, Temperatures
 from ._modules import Array
+from ._numbers import expect
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,19 @@ class ConstantGain:
 
     def command(self, v: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures, *,
                 previous: ArrayLike | None = None, sample_time: float | None = None) -> Command:
-        """Current for a wanted heat, by the constant gain; `heat` is what it believes to achieve."""
+        """Current for a wanted heat, by the constant gain; `heat` is what it believes to achieve.
+
+        Parameters
+        ----------
+        v : ndarray
+            Heat wanted into the cold lumps [W].
+        temperatures : ndarray or mapping
+            Lump temperatures [K].
+        previous : ndarray, optional
+            Currents of the sample before [A].
+        sample_time : float
+            Time between samples [s].
+        """
         wanted = self.law.modules.vector(v, "v", "W")
         asked = self.current - self.gain * (wanted - self.heat)
         true = self.law.command(self.law.heat(asked, temperatures), temperatures, previous=previous,
@@ -67,5 +80,6 @@ def constant_gain(law: FeedbackLinearization, temperatures: Temperatures,
     >>> plain.gain.round(4).tolist()  # 1/(S x_c) [A/W]
     [0.0633, 0.0633]
     """
+    expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     at = law.modules.vector(current, "current", "A")
     return ConstantGain(law, at, law.heat(at, temperatures), law.gain(at, temperatures))

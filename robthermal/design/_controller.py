@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..errors import InputError
 from ._modules import Array
 
 
@@ -36,10 +37,47 @@ class Controller(Protocol):
         """[s]."""
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """State from which the output stays at `heat` while the reference is the temperature."""
+        """State from which the output stays at `heat` while the reference is the temperature.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """State at the next sample; wanted and achieved heats differ while a limit is active."""
+        """State at the next sample; wanted and achieved heats differ while a limit is active.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
+
+
+def expect_controller(controller: object) -> None:
+    """Refuse what cannot control."""
+    missing = [name for name in ("sample_time", "start", "heat", "advance") if not hasattr(controller, name)]
+    if missing:
+        raise InputError(f"controller, a {type(controller).__name__}, has no {missing[0]}", where="argument controller",
+                         expected="a controller", remedy="Make one with rt.design.pid, state_feedback or "
+                         "linear_controller.")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..signals import Record
 from ._modules import Array
+from ._numbers import expect
 from ._observer_model import ObserverModel
 
 
@@ -27,13 +28,35 @@ class Observer(Protocol):
         """What it reads."""
 
     def start(self, temperatures: Array) -> Array:
-        """Memory at the first sample, from a first guess of all lumps [K]."""
+        """Memory at the first sample, from a first guess of all lumps [K].
+
+        Parameters
+        ----------
+        temperatures : ndarray or mapping
+            Lump temperatures [K].
+        """
 
     def estimate(self, memory: Array) -> Array:
-        """Estimate of all lumps now, before this sample's readings are used [K]."""
+        """Estimate of all lumps now, before this sample's readings are used [K].
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        """
 
     def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at the next sample, from this sample's readings [K] and held inputs by name."""
+        """Memory at the next sample, from this sample's readings [K] and held inputs by name.
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        readings : ndarray
+            Sensor readings [K].
+        inputs : ndarray
+            Heaters, currents and ambients held over the sample [unit, A, K].
+        """
 
 
 @dataclass(frozen=True)
@@ -77,6 +100,7 @@ class Estimate:
 
 def along(obs: Observer, model: ObserverModel, record: Record, initial: ArrayLike | None) -> Estimate:
     """Run an observer along a record."""
+    expect(record, Record, "record", "rt.read_record")
     missing = [name for name in (*obs.sensors, *model.system.modules, *model.system.inputs) if name not in record]
     if missing:
         raise InputError(f"the record has no column {missing[0]!r}", where="argument record",

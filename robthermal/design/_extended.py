@@ -42,19 +42,47 @@ class ExtendedKalmanFilter:
         return self.model.sensors
 
     def start(self, temperatures: Array) -> Array:
-        """Memory at the first sample: estimate and covariance."""
+        """Memory at the first sample: estimate and covariance.
+
+        Parameters
+        ----------
+        temperatures : ndarray or mapping
+            Lump temperatures [K].
+        """
         return np.concatenate([np.asarray(temperatures, float), self.first.ravel()])
 
     def estimate(self, memory: Array) -> Array:
-        """Estimate of all lumps [K]."""
+        """Estimate of all lumps [K].
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        """
         return memory[:len(self.first)]
 
     def covariance(self, memory: Array) -> Array:
-        """Its own idea of the error's covariance [K²]."""
+        """Its own idea of the error's covariance [K²].
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        """
         return memory[len(self.first):].reshape(self.first.shape)
 
     def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at the next sample: correct, then predict."""
+        """Memory at the next sample: correct, then predict.
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        readings : ndarray
+            Sensor readings [K].
+        inputs : ndarray
+            Heaters, currents and ambients held over the sample [unit, A, K].
+        """
         x, P, C = self.estimate(memory), self.covariance(memory), self.model.C
         u = self.model.exogenous(inputs)
         K = np.linalg.solve(C @ P @ C.T + self.noise, C @ P).T
@@ -65,5 +93,13 @@ class ExtendedKalmanFilter:
         return np.concatenate([self.model.predict(x, u), (M @ P @ M.T + self.process).ravel()])
 
     def run(self, record: Record, initial: ArrayLike | None = None) -> Estimate:
-        """Estimate along a record; see `GainObserver.run`."""
+        """Estimate along a record; see `GainObserver.run`.
+
+        Parameters
+        ----------
+        record : Record
+            Inputs and readings by column name.
+        initial : array_like, optional
+            Temperatures at the start [K].
+        """
         return along(self, self.model, record, initial)

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from ..errors import InputError
-from ._controller import Controller, Seen
+from ._controller import Controller, Seen, expect_controller
 from ._modules import Array
-from ._numbers import positive
+from ._numbers import expect, positive
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -39,15 +39,43 @@ class FeedForward:
         return self.plant.holding_heat(seen.reference, seen.around)
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """State of the controller."""
+        """State of the controller.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
         return self.controller.start(seen, heat - self.plant.holding_heat(seen.cold, seen.around))
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
         return self.controller.heat(state, seen) + self._share(seen)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Advance the controller with its own share."""
+        """Advance the controller with its own share.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
         share = self._share(seen)
         return self.controller.advance(state, seen, wanted - share, achieved - share)
 
@@ -76,7 +104,8 @@ def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
     >>> loop.sample_time
     1.0
     """
-    _same_law(plant, controller)
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    expect_controller(controller)
     if isinstance(controller, DisturbanceObserver):
         raise InputError("the controller is a disturbance observer", where="argument controller",
                          expected="a controller without one: it must see all of the heat",
@@ -117,21 +146,55 @@ class DisturbanceObserver:
         return state[:size], state[size:]
 
     def disturbance(self, state: Array) -> Array:
-        """Estimated unmeasured heat on the cold faces [W]."""
+        """Estimated unmeasured heat on the cold faces [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        """
         return self._split(state)[0][len(self.plant.lumps):]
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Estimates at what is seen, no disturbance."""
+        """Estimates at what is seen, no disturbance.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
         own = np.concatenate([seen.temperatures[self.plant.indices], np.zeros(len(seen.cold))])
         return np.concatenate([own, self.controller.start(seen, heat)])
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
         own, inner = self._split(state)
         return self.controller.heat(inner, seen) - own[len(self.plant.lumps):]
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Advance both: the observer with the achieved heat, the controller with its own share."""
+        """Advance both: the observer with the achieved heat, the controller with its own share.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
         own, inner = self._split(state)
         error = seen.cold - self.plant.C @ own[:len(self.plant.lumps)]
         estimate = self.A @ own + self.B @ np.concatenate([achieved, seen.around]) + self.L @ error
@@ -169,7 +232,8 @@ def disturbance_observer(plant: ColdSide, controller: Controller, *, time_consta
     >>> bool(abs(rt.design.loop_poles(plant, loop)).max() < 1)
     True
     """
-    _same_law(plant, controller)
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    expect_controller(controller)
     h, tau = controller.sample_time, positive(time_constant, "time_constant", "s")
     if tau < 2 * h:
         raise InputError(f"time_constant = {tau:g} s with a sample time of {h:g} s", where="argument time_constant",
@@ -186,10 +250,3 @@ def disturbance_observer(plant: ColdSide, controller: Controller, *, time_consta
     observer = DisturbanceObserver(plant, controller, A, B, L)
     check_sampling(plant, observer)
     return observer
-
-
-def _same_law(plant: ColdSide, controller: Controller) -> None:
-    if not (isinstance(plant, ColdSide) and hasattr(controller, "advance") and hasattr(controller, "sample_time")):
-        raise InputError(f"plant is a {type(plant).__name__}, controller a {type(controller).__name__}",
-                         where="arguments plant, controller",
-                         expected="a ColdSide (rt.design.cold_side) and a controller (rt.design.pid, …)")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import Stepper, System
 from ._constant_gain import ConstantGain
-from ._controller import Controller, Seen
+from ._controller import Controller, Seen, expect_controller
 from ._estimate import Observer
 from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
@@ -154,6 +154,7 @@ class _Run:
                  load: Signals, initial: ArrayLike | Mapping[str, float] | None, drive: str,
                  observer: Observer | None, noise_seed: int | None):
         check_system(system)
+        expect_controller(controller)
         base = _base(law)
         if not set(base.names) <= set(system.modules) or system.lump_names != base.system.lump_names:
             raise InputError("lumps or modules differ from those of the law's system", where="argument system",

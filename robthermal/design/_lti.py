@@ -12,7 +12,7 @@ from scipy.linalg import expm, solve_discrete_are
 from ..errors import InputError
 from ._controller import Seen
 from ._modules import Array
-from ._numbers import positive
+from ._numbers import expect, positive
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -41,17 +41,45 @@ class LinearController:
     sample_time: float
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """State, as constant as possible, from which zero error gives the heat."""
+        """State, as constant as possible, from which zero error gives the heat.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
         n = len(self.A)
         stack, wanted = np.vstack([self.C, np.eye(n) - self.A]), np.concatenate([heat, np.zeros(n)])
         return np.linalg.lstsq(stack, wanted, rcond=None)[0]
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
         return self.C @ state + self.D @ (seen.reference - seen.cold)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Next state, following the achieved heat."""
+        """Next state, following the achieved heat.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
         return self.A @ state + self.B @ (seen.reference - seen.cold) + self.L @ (achieved - wanted)
 
 
@@ -87,6 +115,7 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
     >>> loop.A.round(12).tolist()  # two integrators
     [[1.0, 0.0], [0.0, 1.0]]
     """
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
     h, m = positive(sample_time, "sample_time", "s"), len(plant.law.names)
     if not isinstance(system, control.lti.LTI):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",

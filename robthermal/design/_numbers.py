@@ -1,4 +1,4 @@
-"""Checks of plain numbers, one message each."""
+"""Checks of plain arguments, one message each."""
 
 from __future__ import annotations
 
@@ -28,3 +28,10 @@ def non_negative(values: Array, argument: str) -> None:
         raise InputError(f"{argument} has the value {values.min():g}", where=f"argument {argument}",
                          expected="finite numbers, 0 or more",
                          remedy="Gains are positive: more heat v makes the cold lump warmer.")
+
+
+def expect(value: Any, kind: type, argument: str, maker: str) -> None:
+    """Refuse an argument of another type, naming the function that makes the right one."""
+    if not isinstance(value, kind):
+        raise InputError(f"{argument} is a {type(value).__name__}", where=f"argument {argument}",
+                         expected=f"a {kind.__name__}", remedy=f"Make one with {maker}.")

@@ -57,15 +57,37 @@ class GainObserver:
         return self.model.sensors
 
     def start(self, temperatures: Array) -> Array:
-        """Memory at the first sample."""
+        """Memory at the first sample.
+
+        Parameters
+        ----------
+        temperatures : ndarray or mapping
+            Lump temperatures [K].
+        """
         return np.asarray(temperatures, float)
 
     def estimate(self, memory: Array) -> Array:
-        """Estimate of all lumps [K]."""
+        """Estimate of all lumps [K].
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        """
         return memory
 
     def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at the next sample."""
+        """Memory at the next sample.
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        readings : ndarray
+            Sensor readings [K].
+        inputs : ndarray
+            Heaters, currents and ambients held over the sample [unit, A, K].
+        """
         u = self.model.exogenous(inputs)
         return self.model.predict(memory, u) + self.gain @ (self.model.measured(readings) - self.model.C @ memory)
 

@@ -44,7 +44,17 @@ class ObserverModel:
 
     @classmethod
     def of(cls, system: System, sensors: Sequence[str], sample_time: float) -> ObserverModel:
-        """Sample a system, checking the sensors."""
+        """Sample a system, checking the sensors.
+
+        Parameters
+        ----------
+        system : System
+            Whose model.
+        sensors : sequence of str
+            Sensors in use.
+        sample_time : float
+            Time between samples [s].
+        """
         check_system(system)
         h, names = positive(sample_time, "sample_time", "s"), check_sensors(system, sensors)
         for name in names:
@@ -67,7 +77,13 @@ class ObserverModel:
         return Equations(self.system)
 
     def exogenous(self, inputs: Mapping[str, float]) -> Array:
-        """Heaters, currents and ambients in order; off and nominal where not given."""
+        """Heaters, currents and ambients in order; off and nominal where not given.
+
+        Parameters
+        ----------
+        inputs : ndarray
+            Heaters, currents and ambients held over the sample [unit, A, K].
+        """
         eq = self.equations
         u, names = eq.nominal(), list(self.system.exogenous_names)
         for name, value in inputs.items():
@@ -78,21 +94,51 @@ class ObserverModel:
         return u
 
     def rest(self, x: Array, u: Array) -> Array:
-        """All heat that A x does not hold, f(x, u) [W]: S and R at the estimate."""
+        """All heat that A x does not hold, f(x, u) [W]: S and R at the estimate.
+
+        Parameters
+        ----------
+        x : ndarray
+            Lump temperatures [K].
+        u : ndarray
+            Heaters, currents and ambients [unit, A, K].
+        """
         eq = self.equations
         return eq.heat(x, u) - eq.A @ x
 
     def rest_slope(self, x: Array, u: Array) -> Array:
-        """∂f/∂x at one point, with the S′ and R′ terms [W/K]."""
+        """∂f/∂x at one point, with the S′ and R′ terms [W/K].
+
+        Parameters
+        ----------
+        x : ndarray
+            Lump temperatures [K].
+        u : ndarray
+            Heaters, currents and ambients [unit, A, K].
+        """
         eq = self.equations
         return (eq.jacobian(x, u) - eq.A).toarray()
 
     def predict(self, x: Array, u: Array) -> Array:
-        """State at the next sample [K]."""
+        """State at the next sample [K].
+
+        Parameters
+        ----------
+        x : ndarray
+            Lump temperatures [K].
+        u : ndarray
+            Heaters, currents and ambients [unit, A, K].
+        """
         return self.A_d @ x + self.Gamma @ self.rest(x, u)
 
     def measured(self, readings: Array) -> Array:
-        """Lump temperatures from sensor readings: gain and offset undone [K]."""
+        """Lump temperatures from sensor readings: gain and offset undone [K].
+
+        Parameters
+        ----------
+        readings : ndarray
+            Sensor readings [K].
+        """
         T_ref = next(iter(self.system.ambients.values())).temperature
         parts = [self.system.sensors[name] for name in self.sensors]
         gain, offset = np.array([s.gain for s in parts]), np.array([s.offset for s in parts])
@@ -108,14 +154,10 @@ def check_sensors(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     if isinstance(sensors, str) or not len(tuple(sensors)):
         raise InputError(f"sensors = {sensors!r}", where="argument sensors", expected="a list of sensor names")
     names = tuple(sensors)
-    for name in names:
-        if name not in system.sensors:
-            raise InputError(f"there is no sensor {name!r}", where="argument sensors",
-                             expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
+    hidden = unobservable(system, names)
     lumps = [system.sensors[name].lump for name in names]
     if len(set(lumps)) < len(lumps):
         raise InputError("two of the sensors are on one lump", where="argument sensors", remedy="Name one of them.")
-    hidden = unobservable(system, names)
     if hidden:
         raise InputError(f"sensors {', '.join(names)} do not see lumps {', '.join(hidden)}", where="argument sensors",
                          expected="sensors from which every lump can be reconstructed",
@@ -144,6 +186,11 @@ def unobservable(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     >>> rt.design.unobservable(rt.systems.two_module(), ["T6", "T7"])
     ()
     """
+    check_system(system)
+    for name in sensors:
+        if name not in system.sensors:
+            raise InputError(f"there is no sensor {name!r}", where="argument sensors",
+                             expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
     eq = Equations(system)
     warm = np.full(len(system.lumps), next(iter(system.ambients.values())).temperature)
     root = np.sqrt(eq.capacity)

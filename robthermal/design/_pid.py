@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ._controller import Seen
 from ._modules import Array
-from ._numbers import non_negative, positive
+from ._numbers import expect, non_negative, positive
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -44,17 +44,45 @@ class PID:
     sample_time: float
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Integrators at the heat, derivative filters at rest."""
+        """Integrators at the heat, derivative filters at rest.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
         return np.concatenate([heat, seen.cold])
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
         z, filtered = np.split(state, 2)
         slope = (seen.cold - filtered) / self.filter_time
         return self.proportional * (seen.reference - seen.cold) + z - self.derivative * slope
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Integrate, giving way to limits; advance the filter with the measurement held."""
+        """Integrate, giving way to limits; advance the filter with the measurement held.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
         z, filtered = np.split(state, 2)
         z = z + self.sample_time * self.integral * (seen.reference - seen.cold)
         z = z + -np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
@@ -74,7 +102,8 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     sample_time : float
         [s].
     bandwidth : float, optional
-        Tune a PI for this crossover frequency [rad/s]: the modulus of Kp G is 1 there, integral action a factor four below.
+        Tune a PI for this crossover frequency [rad/s]: the modulus of Kp G is 1 there, integral action takes over a
+        factor four below.
     proportional, integral, derivative : float or ndarray, optional
         Own gains [W/K], [W/(K s)], [W s/K] instead of a bandwidth.
     filter_time : float, optional
@@ -100,6 +129,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     >>> bool(abs(rt.design.loop_poles(plant, controller)).max() < 1)
     True
     """
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
     h = positive(sample_time, "sample_time", "s")
     if (bandwidth is None) == (proportional is None):
         raise InputError("give either bandwidth or proportional", where="argument bandwidth",

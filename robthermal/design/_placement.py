@@ -15,6 +15,7 @@ from ..thermal import System
 from ..verification import Certificate
 from ._covariances import Noise
 from ._error_box import Interval, Temperatures
+from ._modules import check_system
 from ._observer import GainObserver, observer
 from ._observer_model import unobservable
 
@@ -110,6 +111,7 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     >>> len(found.sensors), found.certificate.holds
     (1, True)
     """
+    check_system(system)
     names = tuple(system.sensors) if candidates is None else tuple(candidates)
     for name in names:
         if name not in system.sensors:

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..thermal import Equations
 from ._linearization import FeedbackLinearization
 from ._modules import Array
+from ._numbers import expect
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,13 @@ class ColdSide:
         return np.array([[float(lump == face) for lump in self.lumps] for face in faces])
 
     def sampled(self, sample_time: float) -> tuple[Array, Array]:
-        """Exact zero-order-hold A_d and B_d at a sample time [s]."""
+        """Exact zero-order-hold A_d and B_d at a sample time [s].
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between samples [s].
+        """
         n, m = self.B.shape
         both = np.zeros((n + m, n + m))
         both[:n] = np.hstack([self.A, self.B]) * sample_time
@@ -61,21 +68,43 @@ class ColdSide:
         return exact[:, :n], exact[:, n:]
 
     def to_control(self, sample_time: float = 0.0) -> control.StateSpace:
-        """python-control state space from [v, around] to the cold faces; continuous for sample_time 0."""
+        """python-control state space from [v, around] to the cold faces; continuous for sample_time 0.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between samples [s].
+        """
         A, B = self.sampled(sample_time) if sample_time else (self.A, self.B)
         return control.ss(A, B, self.C, np.zeros((len(self.C), B.shape[1])), dt=sample_time, states=list(self.lumps),
                           inputs=[*(f"heat of {name}" for name in self.law.names), *self.around],
                           outputs=[part.cold for part in self.law.modules.parts])
 
     def surroundings(self, temperatures: Array, exogenous: Mapping[str, float]) -> Array:
-        """Values of `around` from all lump temperatures and the heaters and ambients by name."""
+        """Values of `around` from all lump temperatures and the heaters and ambients by name.
+
+        Parameters
+        ----------
+        temperatures : ndarray or mapping
+            Lump temperatures [K].
+        exogenous : ndarray
+            Heaters, currents and ambients in the order of `System.exogenous_names` [unit, A, K].
+        """
         names = self.law.system.lump_names
         nominal = {name: part.temperature for name, part in self.law.system.ambients.items()}
         return np.array([temperatures[names.index(name)] if name in names else exogenous.get(name, nominal.get(name, 0))
                          for name in self.around])
 
     def holding_heat(self, reference: ArrayLike, around: ArrayLike) -> Array:
-        """Steady heats v that hold the cold faces at a reference, given the surroundings: static feed-forward [W]."""
+        """Steady heats v that hold the cold faces at a reference, given the surroundings: static feed-forward [W].
+
+        Parameters
+        ----------
+        reference : ndarray
+            Set-points [K].
+        around : ndarray
+            Temperatures of the surroundings [K].
+        """
         m = len(self.law.names)
         X = np.linalg.solve(-self.A, self.B)
         to_face = self.C @ X
@@ -112,6 +141,7 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     >>> len(plant.lumps), plant.around
     (8, ('room',))
     """
+    expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     system, eq = law.system, Equations(law.system)
     hot = {part.hot for part in system.modules.values()}
     for name, part in zip(law.names, law.modules.parts, strict=True):

@@ -12,6 +12,7 @@ from ..errors import Diverged, InputError, Outcome
 from ..signals import Record
 from ..thermal import System, simulate
 from ._modules import check_system
+from ._numbers import expect
 
 _CLEAR = 4.0  # the misfit of the other wiring is this many times smaller in variance
 _MOST = 6  # modules: all wirings are compared
@@ -86,6 +87,7 @@ def check_polarity(system: System, record: Record) -> Polarity:
     ('m1',)
     """
     check_system(system)
+    expect(record, Record, "record", "rt.read_record")
     sensors = [name for name in system.sensors if name in record.output_names]
     driven = [name for name in system.modules if name in record.input_names and np.ptp(record[name]) > 0]
     if not sensors or not driven:

@@ -13,6 +13,7 @@ from ..errors import InputError, Outcome
 from ..thermal import Equations, steady_state
 from ._linearization import FeedbackLinearization
 from ._modules import Array
+from ._numbers import expect
 
 _FINE = 1e-3  # K
 _STRIDE = 2.0  # K, first step of the march
@@ -108,6 +109,7 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     >>> answer.outcome.code, round(answer.limit["m1"] - 273.15, 1), answer.binding
     ('unreachable', 11.6, 'runaway')
     """
+    expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     target = law.modules.vector(setpoint, "setpoint", "K")
     if target.min() < 150.0:
         raise InputError(f"a set-point is {target.min():g} K", where="argument setpoint", expected="kelvin",

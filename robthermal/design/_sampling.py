@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ._controller import Controller, Seen
+from ._controller import Controller, Seen, expect_controller
 from ._modules import Array
+from ._numbers import expect
 from ._plant import ColdSide
 
 _FASTEST = 1e-3  # of the sample time asked for: no slower loop is searched below it
@@ -38,6 +39,8 @@ def loop_poles(plant: ColdSide, controller: Controller) -> NDArray[np.complex128
     >>> bool(abs(rt.design.loop_poles(plant, loop)).max() < 1)
     True
     """
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    expect_controller(controller)
     A, B = plant.sampled(controller.sample_time)
     n, m = len(A), len(plant.law.names)
     rest = np.full(len(plant.law.system.lumps), 300.0)

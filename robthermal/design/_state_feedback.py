@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, solve_discrete_are
 from ..errors import InputError
 from ._controller import Seen
 from ._modules import Array
-from ._numbers import positive
+from ._numbers import expect, positive
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -45,16 +45,44 @@ class StateFeedback:
         return self.reference_gain @ seen.reference - self.K @ seen.temperatures[self.plant.indices]
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Integrators that give the heat while the reference is the temperature."""
+        """Integrators that give the heat while the reference is the temperature.
+
+        Parameters
+        ----------
+        seen : Seen
+            What the controller sees at this sample.
+        heat : ndarray
+            Heat in force at the start [W].
+        """
         at_rest = self.reference_gain @ seen.cold - self.K @ seen.temperatures[self.plant.indices]
         return heat - at_rest
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W]."""
+        """Wanted heats v [W].
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        """
         return state + self._proportional(seen)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Integrate the error, giving way to limits."""
+        """Integrate the error, giving way to limits.
+
+        Parameters
+        ----------
+        state : ndarray
+            Memory of the controller.
+        seen : Seen
+            What the controller sees at this sample.
+        wanted : ndarray
+            Heat that was asked for [W].
+        achieved : ndarray
+            Heat the modules give within their limits [W].
+        """
         change = self.sample_time * self.integral @ (seen.reference - seen.cold)
         return state + change - np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
 
@@ -96,6 +124,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     >>> bool(abs(rt.design.loop_poles(plant, loop)).max() < 1)
     True
     """
+    expect(plant, ColdSide, "plant", "rt.design.cold_side")
     h, m, n = positive(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
     if (bandwidth is None) == (gain is None):
         raise InputError("give either bandwidth or gain", where="argument bandwidth", expected="one of the two")
