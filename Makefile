@@ -12,7 +12,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 .PHONY: help demo test lint docs bench clean
 
 help:
-	@echo "make demo    measured data -> calibrated model -> certificates -> build/demo/report.html"
+	@echo "make demo    (simulated) records -> calibrated model -> certificates -> build/demo/report.html"
 	@echo "make test    lint, types, then all tests (import contract, doctests, docs build included)"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"

@@ -169,3 +169,11 @@ def test_anti_windup_lets_go_of_a_limit(plant, system, kind):
         with_it = rt.design.linear_controller(plant, control.append(one, one), sample_time=1.0)
         wound = rt.design.LinearController(with_it.A, with_it.B, with_it.C, with_it.D, 0 * with_it.L, 1.0)
     assert late(with_it) < 1.0 < 2.0 < late(wound)
+
+
+def test_arguments_of_another_kind_are_refused(system, law, plant):
+    for call in (lambda: rt.design.cold_side(3), lambda: rt.design.reachable(3, 280.0),
+                 lambda: rt.design.pid(law, bandwidth=0.1, sample_time=1.0), lambda: rt.design.loop_poles(plant, 3),
+                 lambda: rt.design.feed_forward(plant, law), lambda: rt.design.check_polarity(system, 3)):
+        with pytest.raises(rt.InputError, match="Make one with rt"):
+            call()
