@@ -104,8 +104,8 @@ class VaryingModel:
         Returns
         -------
         pandas.DataFrame
-            Index: parameter. Columns: value (at the mean temperature), slope [per K], std (of the slope), p_value (of the
-            scatter about the line; nan for two temperatures).
+            Index: parameter. Columns: value (at the mean temperature), slope [per K], std (of the slope), p_value
+            (of the scatter about the line; nan for two temperatures).
         """
         middle = float(self.temperatures.mean())
         A = np.column_stack([np.ones_like(self.temperatures), self.temperatures - middle])
