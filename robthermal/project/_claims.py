@@ -136,7 +136,7 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     if boxes.setpoint:
         progress("searching the runaway limit")
         limit_of_load = runaway(system, setpoint=boxes.setpoint)
-        found += [(f"runaway_{name}", f"Closed-form runaway limit of {name}", cert, False)
+        found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
                   for name, cert in limit_of_load.certificates.items()]
     progress("verifying every certificate")
     checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)

@@ -84,7 +84,8 @@ def runaway_section(result: Certification) -> Section | None:
     figure = Figure.draw(ax.figure, alt="Load taken from the cold face against current, with the fold marked.",
                          caption="More current takes more heat only up to the fold.")
     text = ("With its cold face regulated, a module takes more heat with more current only up to I*; a load above q* "
-            "has no equilibrium and the hot side runs away. Limit the controller's current below I*. "
+            "has no equilibrium and the hot side runs away. Limit the controller's current below I*, also where "
+            "the closed form for constant properties is larger. "
             f"{result.runaway.outcome.text}")
     table = Table(result.runaway.table().reset_index(names="module"), "Runaway limits.")
     return Section("Runaway limit of the regulated machine", text, figures=(figure,), tables=(table,),

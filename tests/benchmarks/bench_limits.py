@@ -1,5 +1,8 @@
 """Largest certified currents and runaway limits of the two-module setup beside the published reference table."""
 
+import time
+
+import numpy as np
 from _timing import best_of, header, row
 
 import robthermal as rt
@@ -44,6 +47,25 @@ def folds():
         row(f"{celsius} °C: I* {amps} A ({current}), q* {watts} W ({load})", seconds)
 
 
+def closed_forms(machines=40):
+    """Fold of random single-module machines with constant properties against the root of the cubic."""
+    header(f"fold against the closed form, {machines} random machines with one module")
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    start = time.perf_counter()
+    for _ in range(machines):
+        S, R, K, w = rng.uniform([0.01, 0.5, 0.05, 285], [0.1, 8, 1.5, 315])
+        g, cold = 10 ** rng.uniform(-1, 1), w + rng.uniform(-35, 15)
+        module = {"hot": "h", "cold": "c", "seebeck": S, "resistance": R, "conductance": K}
+        links = [{"between": ("h", "w"), "conductance": g}, {"between": ("c", "w"), "conductance": 0.02}]
+        system = rt.System(ambients={"w": {"temperature": w}}, links=links, modules={"m": module},
+                           lumps={"h": {"capacity": 10.0}, "c": {"capacity": 5.0}})
+        found = rt.certify.runaway(system, setpoint={"m": cold})
+        worst = max(worst, abs(found.current["m"] / found.closed_form["m"] - 1))
+    row(f"largest relative difference {worst:.1e}", time.perf_counter() - start)
+
+
 if __name__ == "__main__":
     limits()
     folds()
+    closed_forms()
