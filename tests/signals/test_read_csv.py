@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import tracemalloc
 import warnings
 from collections.abc import Callable
@@ -106,18 +105,16 @@ def test_faults_are_named(write: Write, case: str) -> None:
     assert str(path) in str(caught.value)
 
 
-def test_a_line_of_100_megabytes_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_line_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "long.csv"
     with path.open("wb") as file:
         for _ in range(100):
             file.write(b"1," * 500_000)
     tracemalloc.start()
-    begin = time.perf_counter()
     with pytest.raises(InputError, match="first line is longer than 64 KiB"):
         read(path)
-    seconds, (_, peak) = time.perf_counter() - begin, tracemalloc.get_traced_memory()
+    _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert seconds < 1.0
     assert peak < 2**20
 
 
