@@ -22,6 +22,7 @@ from .errors import Outcome as Outcome
 if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import calibration as calibration
     from . import certify as certify
+    from . import coupling as coupling
     from . import design as design
     from . import errors as errors
     from . import identify as identify
@@ -40,8 +41,8 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "design", "errors", "identify", "project", "report", "signals", "systems",
-          "thermal", "verification")
+_ROOMS = ("calibration", "certify", "coupling", "design", "errors", "identify", "project", "report", "signals",
+          "systems", "thermal", "verification")
 
 _HOME = {  # public name: the room it lives in
     "Certificate": "verification",

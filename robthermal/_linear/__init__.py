@@ -1,0 +1,17 @@
+"""Linear time-invariant systems: candidates in floats for certificates that the checker proves. No conic solver.
+
+Shared by the rooms certify and coupling; public through `robthermal.certify`.
+"""
+
+from ._bound import GainBound as GainBound
+from ._frequency import frequency_norm as frequency_norm
+from ._frequency import frequency_radius as frequency_radius
+from ._frequency import interval_norms as interval_norms
+from ._frequency import interval_radii as interval_radii
+from ._hinf import hinf as hinf
+from ._levels import hinf_norm as hinf_norm
+from ._peak import peak as peak
+from ._stability import stability as stability
+
+__all__ = ["GainBound", "frequency_norm", "frequency_radius", "hinf", "hinf_norm", "interval_norms", "interval_radii",
+           "peak", "stability"]

@@ -1,0 +1,23 @@
+"""Coupling filters between two controlled subsystems: Youla factors, measured uncertainty, proven robust stability."""
+
+from ._coprime import CoprimeFactors as CoprimeFactors
+from ._coprime import coprime as coprime
+from ._destabilising import Destabilising as Destabilising
+from ._destabilising import destabilising as destabilising
+from ._evaluate import evaluate as evaluate
+from ._filters import Filters as Filters
+from ._inner import inner_factor as inner_factor
+from ._mu import mu as mu
+from ._mu_bound import mu_bound as mu_bound
+from ._mu_result import MuBound as MuBound
+from ._overbound import overbound as overbound
+from ._performance import Performance as Performance
+from ._synthesize import synthesize as synthesize
+from ._uncertainty import Uncertainty as Uncertainty
+from ._uncertainty import dual_youla as dual_youla
+from ._worst_case import WorstCase as WorstCase
+from ._worst_case import worst_case as worst_case
+
+__all__ = ["CoprimeFactors", "Destabilising", "Filters", "MuBound", "Performance", "Uncertainty", "WorstCase",
+           "coprime", "destabilising", "dual_youla", "evaluate", "inner_factor", "mu", "mu_bound", "overbound",
+           "synthesize", "worst_case"]
