@@ -26,14 +26,15 @@ class Form:
     Parameters
     ----------
     terms : tuple of (ndarray, ndarray)
-        Pairs (L, R), each (n, n).
+        Pairs (L, R), each (n, k), Q being (n, n) and the value (k, k).
     """
 
     terms: tuple[tuple[Array, Array], ...]
 
     def at(self, Q: Array) -> Array:
         """Value at a matrix."""
-        half = sum((L.T @ Q @ R for L, R in self.terms), np.zeros_like(Q))
+        side = self.terms[0][0].shape[1]
+        half = sum((L.T @ Q @ R for L, R in self.terms), np.zeros((side, side)))
         return half + half.T
 
 
@@ -97,7 +98,7 @@ def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: 
     still = np.zeros((len(own), 1))
     blocks += [np.hstack([own, still]), np.hstack([-own, still])]
     unit = _stack(np.eye(n)[None])[0]
-    offset = np.concatenate([np.zeros(len(forms) * len(own)), -least * unit, unit])
+    offset = np.concatenate([np.zeros(sum(map(len, blocks[:-2]))), -least * unit, unit])
     A = vstack([csc_matrix(-block) for block in blocks], format="csc")
     cost = np.zeros(len(rows) + 1)
     cost[-1] = -1.0
@@ -105,7 +106,8 @@ def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: 
     settings.verbose = False
     settings.max_threads = 1
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
-    cones = [clarabel.PSDTriangleConeT(n)] * len(blocks)
+    sides = [form.terms[0][0].shape[1] for form in forms] + [n, n]
+    cones = [clarabel.PSDTriangleConeT(side) for side in sides]
     solution = clarabel.DefaultSolver(csc_matrix((len(cost), len(cost))), cost, A, offset, cones, settings).solve()
     y = np.array(solution.x)
     Q = np.zeros((n, n))
@@ -118,8 +120,8 @@ def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: 
 
 def _columns(form: Form, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
     """Stacked values of a form at every symmetric unit matrix, one per column."""
-    n = len(form.terms[0][0])
-    total = np.zeros((len(rows), n, n))
+    side = form.terms[0][0].shape[1]
+    total = np.zeros((len(rows), side, side))
     for L, R in form.terms:
         total += L[rows][:, :, None] * R[columns][:, None, :]
         other = L[columns][:, :, None] * R[rows][:, None, :]

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 import robthermal as rt  # the front door, so that every command loads only the rooms it needs
 
+from ._terminal import (
+    AmbientRange,
+    Box,
+    Json,
+    Out,
+    SystemFile,
+    answer,
+    drawing,
+    exit_unless,
+    place,
+    progress,
+    progress_bar,
+    say,
+    show_report,
+)
 from .errors import Diverged, InputError
 
 app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False,
@@ -26,9 +36,6 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
 
-Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
 
 
@@ -36,18 +43,6 @@ def _print_version(wanted: bool) -> None:
     if wanted:
         typer.echo(f"robthermal {rt.__version__}")
         raise typer.Exit
-
-
-def _place(file: Path | None) -> Path | None:
-    if file is not None and not file.parent.is_dir():  # said before the work, not after it
-        raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
-    return file
-
-
-def _drawing(file: Path | None) -> Path | None:
-    if file is not None and file.suffix.lower() not in (".svg", ".png", ".pdf"):
-        raise typer.BadParameter(f"the file name ends in {file.suffix!r}, not in .svg, .png or .pdf")
-    return _place(file)
 
 
 @app.callback()
@@ -78,11 +73,11 @@ def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="P
 def _run(project: Path, out: Path, as_json: bool) -> None:
     job = rt.project.read_project(project)
     rt.project.check_free(out)
-    with _progress() as say:
-        result = rt.project.run_job(job, say)
-        say("writing the report")
+    with progress() as stage:
+        result = rt.project.run_job(job, stage)
+        stage("writing the report")
         report = rt.project.write_job(result, out)
-    _show_report(report, out, as_json)
+    show_report(report, out, as_json)
 
 
 @app.command()
@@ -100,12 +95,12 @@ def check(system: SystemFile, records: Annotated[list[Path] | None, typer.Argume
                "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
                "records": [{"name": r.name, "samples": len(r), "sample_time_s": r.sample_time, "notes": list(r.notes)}
                            for r in read]}
-    _print(summary, as_json, lambda: _text(f"{found.name}: sound.", *map(str, read)))
+    answer(summary, as_json, lambda: say(f"{found.name}: sound.", *map(str, read)))
 
 
 @app.command()
 def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.")],
-             out: Annotated[Path, typer.Option("--out", callback=_place,
+             out: Annotated[Path, typer.Option("--out", callback=place,
                                                help="Record to write (.csv, .parquet, .mat).")],
              as_json: Json = False) -> None:
     """Simulate a system with the inputs of a record.
@@ -114,19 +109,19 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
     """
     found = rt.read_system(system)
     given = rt.read_record(record, found)
-    with _progress() as say:
-        say("simulating")
+    with progress() as stage:
+        stage("simulating")
         result = rt.thermal.simulate(found, given)
     temperatures = [*result.output_names, *(n for n in result.input_names if n in found.ambients)]
     result.save(out, temperature_unit=found.temperature_unit, temperatures=temperatures)
     summary = {"out": str(out), "samples": len(result), "outputs": list(result.output_names)}
-    _print(summary, as_json, lambda: _text(f"{len(result)} samples of {len(result.output_names)} outputs: {out}"))
+    answer(summary, as_json, lambda: say(f"{len(result)} samples of {len(result.output_names)} outputs: {out}"))
 
 
 @app.command()
 def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(help="Training records.")],
               validation: Annotated[list[Path] | None, typer.Option("--validation", help="Held-out record.")] = None,
-              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=_place)] = Path(
+              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
               median_filter: MedianFilter = None, as_json: Json = False) -> None:
     """Fit the parameters in the [fit] table of a system to records.
@@ -136,12 +131,12 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
     found = rt.read_system(system)
     train, held_out = ([rt.read_record(path, found, median_filter=median_filter) for path in paths]
                        for paths in (records, validation or []))
-    with _progress() as say:
-        say("calibrating")
+    with progress() as stage:
+        stage("calibrating")
         fit = rt.calibrate(found, train, validation=held_out or None)
     rt.thermal.write_system(fit.system, out)
-    _print(fit.to_dict(), as_json, lambda: _text(str(fit), f"calibrated system: {out}"))
-    _exit_unless(bool(fit.outcome))
+    answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
+    exit_unless(bool(fit.outcome))
 
 
 @app.command()
@@ -154,18 +149,18 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
         poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
-        out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=_place)] = Path(
+        out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=place)] = Path(
             "frf.json"),
         plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png, .pdf).",
-                                                  callback=_drawing)] = None,
+                                                  callback=drawing)] = None,
         as_json: Json = False) -> None:
     """Estimate a frequency response with its covariance, from records that need not be in steady state.
 
     Example: robthermal frf run1.csv run2.csv --system setup.toml --method lrmp --out frf.json --plot frf.svg
     """
     model = rt.read_system(system) if system else None
-    with _progress() as say:
-        say("estimating the frequency response")
+    with progress() as stage:
+        stage("estimating the frequency response")
         G = rt.project.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [],
                                          method=method, half_width=half_width, degree=degree, poles=poles or [],
                                          band=band)
@@ -174,7 +169,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         G.plot().flat[0].figure.savefig(plot)
     summary = {"out": str(out), "method": G.method, "bins": len(G), "inputs": list(G.input_names),
                "outputs": list(G.output_names), "suspect_bins": int(G.suspect.sum()), "notes": list(G.notes)}
-    _print(summary, as_json, lambda: _text(str(G), *G.notes, f"frequency response: {out}"))
+    answer(summary, as_json, lambda: say(str(G), *G.notes, f"frequency response: {out}"))
 
 
 @app.command()
@@ -188,7 +183,7 @@ def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.",
                arrangement: Annotated[str, typer.Option(help="orthogonal, zippered, independent.")] = "orthogonal",
                seed: Annotated[int, typer.Option(help="Of the random phases.")] = 0,
                system: Annotated[Path | None, typer.Option("--system", help="For the design check.")] = None,
-               out: Annotated[Path, typer.Option("--out", help="Record to write.", callback=_place)] = Path(
+               out: Annotated[Path, typer.Option("--out", help="Record to write.", callback=place)] = Path(
                    "excitation.csv"),
                as_json: Json = False) -> None:
     """Design multisine inputs, and say before the experiment what they will leave unresolved.
@@ -202,34 +197,109 @@ def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.",
     files = rt.project.write_excitation(u, names, out)
     summary = {"out": [str(file) for file in files], "crest_factors": u.crest_factors.max(axis=(0, 1)).tolist(),
                "design_check": design.outcome.text if design else "not made: give --system"}
-    _print(summary, as_json, lambda: _text(str(design) if design else "No design check without --system.",
-                                           *(f"experiment: {file}" for file in files)))
+    answer(summary, as_json, lambda: say(str(design) if design else "No design check without --system.",
+                                         *(f"experiment: {file}" for file in files)))
 
 
 @app.command()
 def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
-            temperature: Annotated[tuple[float, float] | None, typer.Option(
-                help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")] = None,
+            temperature: Box = None,
             current: Annotated[list[str] | None, typer.Option(
                 help="Range of one module [A]; default its declared limits.", metavar="NAME=LO:HI")] = None,
-            ambient: Annotated[list[str] | None, typer.Option(
-                help="Range of one ambient, in the unit of the file.", metavar="NAME=LO:HI")] = None,
+            ambient: AmbientRange = None,
             setpoint: Annotated[list[str] | None, typer.Option(
                 help="Regulated cold face, in the unit of the file.", metavar="NAME=VALUE")] = None,
-            method: Annotated[str, typer.Option(help="energy, sum or max.")] = "energy", as_json: Json = False) -> None:
+            method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+            structure: Annotated[str, typer.Option(help="With lyapunov: full or block P.")] = "full",
+            large: Annotated[bool, typer.Option(help="With lyapunov: more than 40 lumps too, slowly.")] = False,
+            as_json: Json = False) -> None:
     """Certify a system: contraction in a box, a box that is never left, current limits, runaway limit.
 
     Example: robthermal certify setup.toml --current m1=0:1.5 --current m2=0:1.5 --out certified
     """
     found = rt.read_system(system)
     boxes = rt.project.boxes_from_text(found, temperature=temperature, current=current or [], ambient=ambient or [],
-                                       setpoint=setpoint or [], method=method)
+                                       setpoint=setpoint or [], method=method, structure=structure, large=large)
     rt.project.check_free(out)
-    with _progress() as say:
-        result = rt.project.certify_system(found, boxes, say)
-        say("writing the report")
+    with progress() as stage:
+        result = rt.project.certify_system(found, boxes, stage)
+        stage("writing the report")
         report = rt.project.write_certify(result, (system,), out)
-    _show_report(report, out, as_json)
+    show_report(report, out, as_json)
+
+
+@app.command()
+def design(system: SystemFile, out: Out = Path("robthermal-design"),
+           setpoint: Annotated[list[str] | None, typer.Option(
+               help="Cold face to hold, in the unit of the file; default the lower end of --temperature.",
+               metavar="NAME=VALUE")] = None,
+           current: Annotated[list[str] | None, typer.Option(
+               help="Limits of one module [A]; default the largest that are certified.", metavar="NAME=LO:HI")] = None,
+           ambient: AmbientRange = None, temperature: Box = None,
+           bandwidth: Annotated[float, typer.Option(help="Crossover of the loops [rad/s].")] = 0.02,
+           sample_time: Annotated[float, typer.Option(help="[s].")] = 1.0,
+           sensors: Annotated[str | None, typer.Option(
+               help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
+           method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+           as_json: Json = False) -> None:
+    """Design a controller: certified current limits, linearising law, PI, observer, certificates, report.
+
+    Example: robthermal design setup.toml --setpoint m1=5 --setpoint m2=5 --bandwidth 0.02 --out design
+    """
+    found = rt.read_system(system)
+    wanted = rt.project.design_from_text(
+        found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
+        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method)
+    rt.project.check_free(out)
+    with progress() as stage:
+        result = rt.project.design_system(found, wanted, stage)
+        stage("writing the report")
+        report = rt.project.write_design(result, (system,), out)
+    show_report(report, out, as_json, controller=str(out / "design.json"))
+
+
+@app.command("map")
+def limit_map(system: SystemFile, out: Out = Path("robthermal-map"),
+              ambient: Annotated[str | None, typer.Option(
+                  help="Of all ambients, in the unit of the file; default 10 K around nominal, 5 values.",
+                  metavar="LO,HI,N")] = None,
+              load: Annotated[str | None, typer.Option(
+                  help="Heat into every cold face [W]; default up to the runaway load, 6 values.",
+                  metavar="LO,HI,N")] = None,
+              setpoint: Annotated[str | None, typer.Option(
+                  help="Of all cold faces, in the unit of the file; default the lower end of --temperature to nominal "
+                  "ambient, 3 values.", metavar="LO,HI,N")] = None,
+              temperature: Box = None,
+              method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+              as_json: Json = False) -> None:
+    """Map the allowed current over ambient temperature, heat load and set-point.
+
+    Example: robthermal map setup.toml --ambient 15,35,5 --load 0,5,6 --setpoint 5,15,3 --out map
+    """
+    found = rt.read_system(system)
+    wanted = rt.project.map_from_text(found, ambient=ambient, load=load, setpoint=setpoint, temperature=temperature,
+                                      method=method)
+    rt.project.check_free(out)
+    with progress_bar("conditions") as done:
+        result = rt.project.map_system(found, wanted, done)
+    report = rt.project.write_map(result, found, (system,), out)
+    show_report(report, out, as_json, data=str(out / "map.csv"))
+
+
+@app.command()
+def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their design.", metavar="SPEC.toml")],
+           out: Out = Path("robthermal-coupling"), as_json: Json = False) -> None:
+    """Couple two controlled subsystems: filters, robust stability against measured plants, certificates, report.
+
+    Example: robthermal couple SPEC.toml --out coupled
+    """
+    job = rt.project.read_coupling(spec)
+    rt.project.check_free(out)
+    with progress() as stage:
+        result = rt.project.couple_subsystems(job, stage)
+        stage("writing the report")
+        report = rt.project.write_coupling(result, out)
+    show_report(report, out, as_json, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
 
 
 @app.command()
@@ -250,57 +320,12 @@ def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json
         except InputError as error:
             rows.append({"file": str(path), "valid": None, "reason": str(error), "margins": {}})
             status = 2
-    _print(rows, as_json, lambda: _text(*(f"{_word(r['valid'])}  {r['file']}: {r['reason']}" for r in rows)))
+    answer(rows, as_json, lambda: say(*(f"{_word(r['valid'])}  {r['file']}: {r['reason']}" for r in rows)))
     raise typer.Exit(status)
 
 
 def _word(valid: bool | None) -> str:
     return {True: "valid     ", False: "NOT VALID ", None: "unreadable"}[valid]
-
-
-def _show_report(report: Any, out: Path, as_json: bool) -> None:
-    def show() -> None:
-        table = Table("claim", "answer", "box", "margin")
-        for claim in report.claims:
-            good = claim.holds and claim.verified
-            table.add_row(claim.title, "certified, verified" if good else f"NOT CERTIFIED: {claim.reason}", claim.box,
-                          claim.margin)
-        Console().print(table)
-        _text(f"report: {out / 'report.html'}")
-
-    summary = {"holds": report.holds, "out": str(out), "report": str(out / "report.html"),
-               "claims": [{"title": c.title, "holds": c.holds, "verified": c.verified, "reason": c.reason}
-                          for c in report.claims]}
-    _print(summary, as_json, show)
-    _exit_unless(report.holds)
-
-
-def _print(summary: Any, as_json: bool, show: Callable[[], None]) -> None:
-    if as_json:
-        typer.echo(json.dumps(summary, indent=1, allow_nan=False, default=str))
-    else:
-        show()
-
-
-def _text(*lines: str) -> None:
-    for line in lines:
-        typer.echo(line)
-
-
-def _exit_unless(good: bool) -> None:
-    if not good:
-        raise typer.Exit(1)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """A spinner with the stage on a terminal; nothing in a pipe."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda stage: None
-        return
-    with console.status("starting") as status:
-        yield lambda stage: status.update(stage)
 
 
 def main() -> None:

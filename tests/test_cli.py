@@ -23,7 +23,8 @@ from robthermal import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
-COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "certify", "verify"]
+COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "design", "map", "certify",
+            "couple", "verify"]
 
 SYSTEM = """
 [system]
@@ -271,6 +272,16 @@ def test_certify_says_yes_and_its_certificates_verify(run: Cli, system: Path, tm
     assert run("verify", out).status == 0
 
 
+def test_certify_with_a_full_matrix(run: Cli, system: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = run("certify", system, "--current", "m1=0:1", "--ambient", "room=15:30", "--method", "lyapunov",
+               "--structure", "block", "--out", out, "--json")
+    assert done.status == 0
+    claims = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (out / "certificates").iterdir()}
+    assert claims["contraction"]["evidence"]["method"] == "lyapunov"
+    assert claims["limit_lyapunov_cooling"]["holds"] and claims["limit_sum_cooling"]["holds"]
+
+
 def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = run("certify", system, "--current", "m1=-20:20", "--out", out)
@@ -291,6 +302,7 @@ def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp
     (["--current", "m1=1:0"], ["m1", "(1.0, 0.0)"]),
     (["--current", "m1=nan:1"], ["m1", "nan"]),
     (["--method", "magic"], ["--method", "magic", "energy"]),
+    (["--method", "lyapunov", "--structure", "round"], ["--structure", "round", "block"]),
     (["--temperature", "85", "5"], ["temperature", "lower <= upper"]),
     (["--temperature", "278", "358"], ["--temperature", "278", "kelvin", "degC"]),
     (["--ambient", "room=290:300"], ["--ambient", "290", "kelvin"]),

@@ -62,9 +62,9 @@ def frequency_norm(system: Any, edges: ArrayLike, bounds: ArrayLike, *, left: Ar
 
 
 def frequency_radius(system: Any, edges: ArrayLike, envelopes: ArrayLike, bound: float) -> Certificate:
-    """Certify ρ(|G| R_k) < β at every frequency of interval k: |G| entry by entry, R_k an envelope.
+    """Certify ρ(abs(G) R_k) < β at every frequency of interval k: abs entry by entry, R_k an envelope.
 
-    For every Δ with |Δ| <= R_k entry by entry then det(I - G Δ) is not zero.
+    With β = 1, det(I - G Δ) is then not zero for any Δ with abs(Δ) <= R_k entry by entry.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def interval_norms(system: Any, edges: ArrayLike, *, left: Array | None = None, 
 
 
 def interval_radii(system: Any, edges: ArrayLike, envelopes: ArrayLike) -> Array:
-    """Estimate the largest ρ(|G| R_k) of every interval: floats, no proof.
+    """Estimate the largest ρ(abs(G) R_k) of every interval: floats, no proof.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def coordinates(A: Array, driven: Array, discrete: bool, floor: float = _FLOOR) 
     """T with x = T x̂ in which the states that noise of covariance ``driven`` excites are of size one and unrelated."""
     size = np.sqrt(np.maximum(np.diag(driven), 1e-300))
     W = solve(A, driven + 1e-12 * np.diag(size**2), discrete)
-    if W is None:
+    if W is None or np.diag(W).min() < 0:  # a badly scaled A: floats found nothing
         return None
     try:
         root = np.sqrt(np.maximum(np.diag(W), 1e-300))

@@ -1,5 +1,11 @@
 """Certificates of thermal systems: contraction in a box, current limits, box invariance, runaway, large networks."""
 
+from .._linear import GainBound as GainBound
+from .._linear import frequency_norm as frequency_norm
+from .._linear import frequency_radius as frequency_radius
+from .._linear import hinf as hinf
+from .._linear import peak as peak
+from .._linear import stability as stability
 from ._contraction import contraction as contraction
 from ._enclosure import RunawayFree as RunawayFree
 from ._enclosure import heater_heat as heater_heat
@@ -9,15 +15,19 @@ from ._gains import gains as gains
 from ._invariance import invariance as invariance
 from ._limits import CurrentLimit as CurrentLimit
 from ._limits import largest_current as largest_current
+from ._loop import loop as loop
 from ._maps import LimitMap as LimitMap
 from ._maps import limit_map as limit_map
 from ._network import network as network
 from ._observer import observer as observer
+from ._regulated import largest_regulated_current as largest_regulated_current
+from ._regulated import regulated as regulated
 from ._runaway import Runaway as Runaway
 from ._runaway import runaway as runaway
 from ._thesis import ThesisBounds as ThesisBounds
 from ._thesis import thesis_bounds as thesis_bounds
 
-__all__ = ["CurrentLimit", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds", "contraction", "gains",
-           "heater_heat", "invariance", "largest_current", "limit_map", "network", "observer", "runaway",
-           "runaway_free", "thesis_bounds"]
+__all__ = ["CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds", "contraction",
+           "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
+           "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
+           "runaway_free", "stability", "thesis_bounds"]

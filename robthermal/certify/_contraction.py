@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, establish, not_certified
 from ._energy import energy_rate
-from ._jacobian import box_jacobian
+from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, short_matrices
 from ._polytope import MOST
 from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
@@ -21,8 +22,8 @@ Method = Literal["energy", "sum", "max", "lyapunov"]
 METHODS = ("energy", "sum", "max", "lyapunov")
 _SLACK = (1e-6, 1e-4, 1e-2, 0.1, 0.5)  # share of the rate given up when a proof fails, tried in turn
 _SMALLEST = 1e-12  # 1/s: a rate below this is not claimed
-_SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "HiGHS linear program",
-            "max": "HiGHS linear program", "lyapunov": "Clarabel semidefinite program, cutting planes"}
+_SOLVERS = {"energy": "LAPACK eigenvalues at the vertices", "sum": "Noda iteration, sparse solves",
+            "max": "Noda iteration, sparse solves", "lyapunov": "Clarabel semidefinite program, cutting planes"}
 _Found = tuple[float, Iterator[dict[str, Any]]]  # rate, and ever more accurate evidence for it
 
 
@@ -81,22 +82,45 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     parts: dict[str, Any] = {"system": system_part, "region": region}
     if method == "lyapunov":
         check_choice(system, structure, large)
-        rate, evidence = _with_matrix(system, region, structure)
-    else:
-        rate, evidence = _with_weights(system, region, method)
+    box = box_jacobian(system, region, hull=method == "lyapunov")
+    pattern = block_pattern(system, structure) if method == "lyapunov" else None
+    return best_certificate("contraction", parts, method, box, pattern)
+
+
+def best_certificate(kind: str, parts: Mapping[str, Any], method: str, box: BoxJacobian,
+                     pattern: NDArray[np.bool_] | None = None) -> Certificate:
+    """Certificate with the best evidence that is found for a Jacobian over a box, and proven.
+
+    Parameters
+    ----------
+    kind : str
+        "contraction" or "regulated".
+    parts : mapping
+        Sections system and region.
+    method : str
+        Norm.
+    box : BoxJacobian
+        What to find evidence for; with ``hull=True`` for "lyapunov".
+    pattern : ndarray of bool, optional
+        Entries of P that may differ from zero, for "lyapunov"; default all.
+
+    Returns
+    -------
+    Certificate
+    """
+    rate, evidence = _with_matrix(box, pattern) if method == "lyapunov" else _with_weights(box, method)
     if not rate > _SMALLEST:
-        return not_certified("contraction", **parts, evidence={"method": method},
-                             made_by=made_by(_SOLVERS[method], "none"), reason=_why_not(method, rate))
+        return not_certified(kind, **parts, evidence={"method": method},
+                             made_by=made_by(_SOLVERS[method], "none"), reason=_why_not(kind, method, rate))
     for slack, found in zip(_SLACK, evidence, strict=False):
-        cert = establish("contraction", **parts, made_by=made_by(_SOLVERS[method], _status(slack)),
+        cert = establish(kind, **parts, made_by=made_by(_SOLVERS[method], _status(slack)),
                          evidence={"method": method, "rate": _short(rate * (1 - slack)), **found})
         if cert.holds:
             return cert
     return cert
 
 
-def _with_weights(system: System, region: Mapping[str, Any], method: str) -> _Found:
-    box = box_jacobian(system, region)
+def _with_weights(box: BoxJacobian, method: str) -> _Found:
     if method == "energy":
         return energy_rate(box), ({} for _ in _SLACK)
     found = best_weights(box, method)
@@ -106,8 +130,8 @@ def _with_weights(system: System, region: Mapping[str, Any], method: str) -> _Fo
     return rate, ({"weights": [_short(w) for w in weights / weights.max()]} for _ in _SLACK)
 
 
-def _with_matrix(system: System, region: Mapping[str, Any], structure: str) -> _Found:
-    found = best_matrix(box_jacobian(system, region, hull=True), block_pattern(system, structure))
+def _with_matrix(box: BoxJacobian, pattern: NDArray[np.bool_] | None) -> _Found:
+    found = best_matrix(box, pattern)
     if found is None:
         return np.nan, iter(())
     return found.rate, ({"matrix": matrix} for matrix in short_matrices(found.matrix))
@@ -117,18 +141,19 @@ def _status(slack: float) -> str:
     return f"found; {100 * slack:g} % of the rate given up for short decimals and the proof"
 
 
-def _why_not(method: str, rate: float) -> str:
+def _why_not(kind: str, method: str, rate: float) -> str:
+    search = "largest_current" if kind == "contraction" else "largest_regulated_current"
+    narrow = f"Narrow the current or temperature range (rt.certify.{search} tells how far)"
     if method == "energy":
         return (f"at some vertex of the box the symmetric part of the Jacobian grows at {-rate:.3g} 1/s: V = eᵀEe does "
-                "not decay there. Narrow the current or temperature range (rt.certify.largest_current tells how far).")
+                f"not decay there. {narrow}.")
     if method == "lyapunov":
         if np.isnan(rate):
             return f"more than {MOST} joint vertices: too many for one matrix inequality; use energy, sum or max."
-        return ("no matrix P was found for which V = eᵀPe decays at every vertex of the box. Narrow the current or "
-                "temperature range (rt.certify.largest_current tells how far).")
+        return f"no matrix P was found for which V = eᵀPe decays at every vertex of the box. {narrow}."
     norm = "column" if method == "sum" else "row"
-    return (f"the linear program finds no positive weights for which every {norm} sum is negative over the box. Narrow "
-            "the current or temperature range (rt.certify.largest_current tells how far), or try another method.")
+    return (f"there are no positive weights for which every {norm} sum is negative over the box. "
+            f"{narrow}, or try another method.")
 
 
 def _short(value: float) -> float:

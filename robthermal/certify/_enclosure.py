@@ -20,6 +20,7 @@ from ..thermal import Equations, System
 from ..verification import Certificate, not_certified
 from ._contraction import Method, contraction
 from ._invariance import invariance
+from ._lyapunov import Structure
 from ._sections import (
     Currents,
     Interval,
@@ -70,7 +71,8 @@ class RunawayFree:
 
 
 def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Interval] | None = None,
-                 heat: Mapping[str, Interval] | None = None, method: Method = "energy") -> RunawayFree:
+                 heat: Mapping[str, Interval] | None = None, method: Method = "energy", structure: Structure = "full",
+                 large: bool = False) -> RunawayFree:
     """Certify that a machine cannot run away thermally.
 
     Parameters
@@ -83,8 +85,10 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
         {ambient: (lower, upper)} [K]; default nominal.
     heat : mapping, optional
         {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters.
-    method : {"energy", "sum", "max"}
+    method : {"energy", "sum", "max", "lyapunov"}
         Norm of the contraction.
+    structure, large
+        As in `contraction`.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
                                 made_by=made_by("monotone iteration", "none"))
         return RunawayFree({}, refused, refused, Outcome(False, "not_certified", f"Not certified: {reason}"))
     stays = invariance(system, current=current, temperature=box, ambient=ambient, heat=heat or None)
-    shrinks = contraction(system, current=current, temperature=box, method=method)
+    shrinks = contraction(system, current=current, temperature=box, method=method, structure=structure, large=large)
     return RunawayFree(box, stays, shrinks, _outcome(stays, shrinks, box))
 
 

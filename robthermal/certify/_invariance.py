@@ -19,7 +19,8 @@ from ._sections import (
 
 def invariance(system: System, *, current: Currents, temperature: Temperatures,
                ambient: Mapping[str, Interval] | None = None,
-               heat: Mapping[str, Interval] | None = None) -> Certificate:
+               heat: Mapping[str, Interval] | None = None,
+               parameters: Mapping[str, Interval] | None = None) -> Certificate:
     """Certify that a temperature box is never left.
 
     Parameters
@@ -34,6 +35,8 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
         {ambient: (lower, upper)} [K]; default its nominal temperature.
     heat : mapping, optional
         {lump: (lower, upper)} extra heat, heaters and loads [W]; default none.
+    parameters : mapping, optional
+        Uncertain numbers of the system as in `contraction`.
 
     Returns
     -------
@@ -53,7 +56,7 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     ...                       ambient={"room": (293.15, 303.15)}).holds
     True
     """
-    region = region_section(system, current, temperature)
+    region = region_section(system, current, temperature, parameters)
     nominal = {name: (part.temperature, part.temperature) for name, part in system.ambients.items()}
     region["ambient"] = named_ranges({**nominal, **(ambient or {})}, system.ambient_names, "ambient", "ambient",
                                      kelvin=True)

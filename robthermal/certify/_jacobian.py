@@ -80,7 +80,7 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
         base[c, c] += K
         base[h, c] -= K
         base[c, h] -= K
-        variants, current = _variants(worst, name, parameters), region["current"][name]
+        variants, current = module_variants(worst, name, parameters), region["current"][name]
         points = _hull(current) if hull else _points(variants, current)
         vertices = [_module_vertices(variant, ranges[module.hot], ranges[module.cold], points) for variant in variants]
         blocks.append(Block(h, c, np.concatenate(vertices)))
@@ -96,7 +96,7 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
     return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
 
 
-def _variants(system: System, name: str, parameters: Mapping[str, Any]) -> list[Any]:
+def module_variants(system: System, name: str, parameters: Mapping[str, Any]) -> list[Any]:
     """A module at every combination of the ends of its uncertain parameters; its heat is affine in each of them."""
     own = {key: sorted(set(pair)) for key, pair in parameters.items() if key.startswith(f"modules.{name}.")}
     return [system.with_parameters(dict(zip(own, values, strict=True))).modules[name]

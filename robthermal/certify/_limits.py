@@ -23,6 +23,7 @@ from ._weights import has_weights
 Direction = Literal["symmetric", "cooling", "heating"]
 _SPAN = {"symmetric": (-1.0, 1.0), "cooling": (0.0, 1.0), "heating": (-1.0, 0.0)}
 _HIGHEST = 1e4  # A
+_LOWEST = 1e-6
 _PRECISION = 1e-5
 _PRECISION_MATRIX = 4e-3  # every step may cost seconds
 
@@ -108,9 +109,9 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
     if method == "lyapunov":
         low = _matrix_limit(box, block_pattern(system, structure))
     elif method == "energy":
-        low, _ = _bisect(lambda c: energy_rate(box(c)) > 0)
+        low, _ = bisect(lambda c: energy_rate(box(c)) > 0)
     else:
-        low, _ = _bisect(lambda c: has_weights(box(c), method))
+        low, _ = bisect(lambda c: has_weights(box(c), method))
     for back_off in (0.0, 1e-4, 1e-3, 1e-2, 0.05, 1.0):
         c = low * (1 - back_off)
         certificate = contraction(system, current=_range(system, direction, c), temperature=temperature, method=method,
@@ -121,12 +122,12 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
         False, "not_certified", f"Not certified, not even without current: {certificate.reason}"))
 
 
-def _bisect(holds: Callable[[float], bool]) -> tuple[float, float]:
+def bisect(holds: Callable[[float], bool]) -> tuple[float, float]:
     """Largest current that holds and smallest that does not, close together."""
     low, high = 0.0, 1.0
     while holds(high) and high < _HIGHEST:
         low, high = high, 2 * high
-    while high - low > _PRECISION * high and high < _HIGHEST:
+    while high - low > _PRECISION * high and _LOWEST < high < _HIGHEST:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low, high
@@ -136,8 +137,8 @@ def _matrix_limit(box: Callable[[float, bool], BoxJacobian], pattern: NDArray[np
     """Between what V = eᵀEe reaches and what frozen eigenvalues allow: few matrix inequalities."""
     if polytope(box(1.0, True)).count > MOST:
         return 0.0
-    low, _ = _bisect(lambda c: energy_rate(box(c, False)) > 0)
-    _, high = _bisect(lambda c: largest_growth(polytope(box(c, False))) < 0)
+    low, _ = bisect(lambda c: energy_rate(box(c, False)) > 0)
+    _, high = bisect(lambda c: largest_growth(polytope(box(c, False))) < 0)
     cuts = Cuts()
     while high - low > _PRECISION_MATRIX * high:
         middle = 0.5 * (low + high)

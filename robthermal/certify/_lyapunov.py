@@ -75,7 +75,7 @@ def block_pattern(system: System, structure: str) -> NDArray[np.bool_]:
     return side[:, None] == side[None, :]
 
 
-def best_matrix(box: BoxJacobian, pattern: NDArray[np.bool_], *, cuts: Cuts | None = None,
+def best_matrix(box: BoxJacobian, pattern: NDArray[np.bool_] | None = None, *, cuts: Cuts | None = None,
                 first: bool = False) -> Candidate | None:
     """P with a large decay rate over the box.
 
@@ -83,8 +83,8 @@ def best_matrix(box: BoxJacobian, pattern: NDArray[np.bool_], *, cuts: Cuts | No
     ----------
     box : BoxJacobian
         Picture with ``hull=True``.
-    pattern : ndarray of bool
-        Of `block_pattern`.
+    pattern : ndarray of bool, optional
+        Of `block_pattern`; default all entries.
     cuts : Cuts, optional
         Vertices to begin with.
     first : bool
@@ -98,7 +98,9 @@ def best_matrix(box: BoxJacobian, pattern: NDArray[np.bool_], *, cuts: Cuts | No
     vertices, cuts = polytope(box), Cuts() if cuts is None else cuts
     if vertices.count > MOST:
         return None
-    Q: Array = np.eye(len(pattern))
+    n = len(box.capacity)
+    pattern = np.ones((n, n), bool) if pattern is None else pattern
+    Q: Array = np.eye(n)
     rate, bound = decay_rate(vertices, Q), -largest_growth(vertices)  # V = eᵀEe costs nothing
     shift = 0.0
     share, solves = (0.0 if first else _CLOSE), cuts.solves

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from ._limits import CurrentLimit, largest_current
 from ._sections import Temperatures
 
 _AXES = ("ambient [K]", "setpoint [K]", "load [W]")
+_QUIET = 1e-6  # A: a current this small is none
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,12 @@ class LimitMap:
     ----------
     data : DataFrame
         A row per condition: "ambient [K]", "setpoint [K]", "load [W]" on every cold face; "needed [A]", the largest
-        current a module needs to hold it (nan: no equilibrium does); "runaway [A]", the smallest I* of the modules;
-        "certified [A]", up to which arbitrary currents are certified; "limit [A]", the smaller of the two; "safe",
-        whether the needed current is within the limit.
+        current, cooling or heating, a module needs to hold it (nan: no equilibrium does); "runaway [A]", the smallest
+        I* of the modules; "certified [A]", up to which arbitrary currents are certified; "limit [A]", the smaller of
+        the two; "safe", whether the needed current is within the limit.
     certified : CurrentLimit
-        The certified limit with its certificate: it holds for every condition whose temperatures stay in its box.
+        The certified limit with its certificate: it holds for every condition whose temperatures stay in its box. Its
+        direction is "cooling", or "symmetric" when some condition needs a heating current.
     outcome : Outcome
         How many conditions are safe.
     """
@@ -44,26 +46,30 @@ class LimitMap:
         return f"{self.outcome.text}\n{self.data.round(3).to_string(index=False)}"
 
     def plot(self) -> Any:
-        """Plot limit and needed current over the load, a colour per ambient and set-point; returns the axes."""
+        """Plot needed and allowed current over the load, a panel per set-point; returns the array of axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
-        _, ax = plt.subplots(layout="constrained")
-        for k, ((ambient, setpoint), part) in enumerate(self.data.groupby(list(_AXES[:2]))):
-            label = f"ambient {ambient - 273.15:.3g} °C, set-point {setpoint - 273.15:.3g} °C"
-            ax.plot(part[_AXES[2]], part["needed [A]"], f"C{k}o-", label=label)
-            ax.plot(part[_AXES[2]], part["limit [A]"], f"C{k}--")
-        ax.set(xlabel="load on every cold face [W]", ylabel="current [A]",
-               title="current needed (line) and allowed (dashed)")
-        ax.legend(fontsize="small")
-        return ax
+        panels = list(self.data.groupby("setpoint [K]"))
+        figure, axes = plt.subplots(1, len(panels), sharey=True, squeeze=False, layout="constrained")
+        for ax, (setpoint, panel) in zip(axes[0], panels, strict=True):
+            for k, (ambient, part) in enumerate(panel.groupby("ambient [K]")):
+                ax.plot(part["load [W]"], part["needed [A]"], f"C{k % 6}o-", ms=3, label=f"{ambient - 273.15:.3g} °C")
+                ax.plot(part["load [W]"], part["limit [A]"], f"C{k % 6}--", lw=0.9)
+            ax.set(xlabel="load on every cold face [W]", title=f"set-point {setpoint - 273.15:.3g} °C")
+        axes[0, 0].set(ylabel="current needed (line), allowed (dashed) [A]")
+        lines = [line for line in axes[0, 0].get_lines() if not line.get_label().startswith("_")]
+        figure.legend(handles=lines, title="ambient", ncols=6, fontsize="small", loc="outside upper center")
+        return axes[0]
 
 
 def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[float], load: Sequence[float],
-              temperature: Temperatures, method: Method = "energy", jobs: int = 2) -> LimitMap:
+              temperature: Temperatures, method: Method = "energy", jobs: int = 2,
+              progress: Callable[[int, int], None] = lambda done, total: None) -> LimitMap:
     """Map the allowed current over ambient temperature, set-point and load.
 
     A saturated controller runs on a given current, so the limit must pass the contraction certificate; the regulated
-    loop must stay below its fold I*. The limit is the smaller of the two.
+    loop must stay below its fold I*. The limit is the smaller of the two. Where a condition needs heating, the
+    certificate is for currents of both signs.
 
     Parameters
     ----------
@@ -81,6 +87,8 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
         Of the contraction certificate.
     jobs : int
         Processes.
+    progress : callable, optional
+        Called with the number of ambients and set-points that are done, and how many there are.
 
     Returns
     -------
@@ -105,8 +113,15 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
         raise InputError(f"jobs = {jobs!r}", where="argument jobs", expected="a whole number, at least 1")
     certified = largest_current(system, temperature=temperature, direction="cooling", method=method)
     points = [(T, target) for T in axes[0] for target in axes[1]]
-    found = Parallel(n_jobs=jobs)(delayed(_rows)(system, T, target, axes[2]) for T, target in points)
-    data = pd.DataFrame([row for rows in found for row in rows])
+    progress(0, len(points))
+    rows: list[dict[str, float]] = []
+    work = Parallel(n_jobs=jobs, return_as="generator")(delayed(_rows)(system, *point, axes[2]) for point in points)
+    for done, found in enumerate(work, 1):
+        rows += found
+        progress(done, len(points))
+    data = pd.DataFrame(rows)
+    if (data.pop("lowest [A]") < 0).any():  # [0, c] proves nothing about the heating current of a warm set-point
+        certified = largest_current(system, temperature=temperature, direction="symmetric", method=method)
     data["certified [A]"] = certified.current
     data["limit [A]"] = data[["runaway [A]", "certified [A]"]].min(axis=1)
     data["safe"] = data["needed [A]"] <= data["limit [A]"]
@@ -124,9 +139,10 @@ def _rows(system: System, ambient: float, setpoint: float, loads: Sequence[float
     for load in loads:
         heat = {module.cold: load for module in system.modules.values()}
         states = steady_state(system, surroundings, setpoint=targets, heat=heat)
-        stable = [max(abs(current) for current in e.currents.values()) for e in states.equilibria if e.stable]
-        rows.append({**dict(zip(_AXES, (ambient, setpoint, load), strict=True)),
-                     "needed [A]": min(stable, default=float("nan")), "runaway [A]": limit})
+        stable = [list(e.currents.values()) for e in states.equilibria if e.stable]
+        best = min(stable, key=lambda currents: max(map(abs, currents)), default=[float("nan")])
+        rows.append({**dict(zip(_AXES, (ambient, setpoint, load), strict=True)), "needed [A]": max(map(abs, best)),
+                     "runaway [A]": limit, "lowest [A]": min([i for i in best if i < -_QUIET], default=0.0)})
     return rows
 
 

@@ -15,9 +15,10 @@ from ..verification import Certificate, establish, not_certified
 from ._sections import made_by
 
 _BACK_OFF = (1e-9, 1e-6, 1e-3, 0.1, 0.9)
+_POLICIES = 60
 
 
-def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max") -> Certificate:
+def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max", uncertainty: float = 0.0) -> Certificate:
     """Certify that a sparse Metzler network E ẋ = A x is stable, with a decay rate.
 
     Parameters
@@ -28,6 +29,10 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max") -> C
         Metzler (off-diagonals not negative) [W/K]; need not be symmetric.
     method : {"max", "sum"}
         Row sums A d < 0 or column sums cᵀA < 0.
+    uncertainty : float
+        Relative uncertainty of the conductances [-], method "max" only: every off-diagonal entry and every row sum (the
+        conductance to the ambient) may differ from its value by this share, each on its own; the diagonal follows. Long
+        chains of lumps bear little of it, because A need not stay symmetric.
 
     Returns
     -------
@@ -37,7 +42,8 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max") -> C
     Raises
     ------
     InputError
-        Wrong shapes, negative off-diagonals, or lumps without a path to an ambient (0-based indices are named).
+        Wrong shapes, negative off-diagonals, lumps without a path to an ambient (0-based indices are named), an
+        uncertainty that is not in [0, 1) or with method "sum".
 
     References
     ----------
@@ -53,16 +59,23 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max") -> C
     """
     if method not in ("max", "sum"):
         raise InputError(f"method = {method!r}", where="argument method", expected='"max" or "sum"')
+    if not 0.0 <= uncertainty < 1.0 or (uncertainty and method != "max"):
+        raise InputError(f"uncertainty = {uncertainty!r}", where="argument uncertainty",
+                         expected='a share in [0, 1), with method "max"')
     capacity, matrix = _checked(E, A)
     entries = matrix.tocoo()
     parts: dict[str, Any] = {"system": {"capacity": capacity, "rows": entries.row.astype(np.int64),
-                                        "cols": entries.col.astype(np.int64), "values": entries.data}, "region": {}}
+                                        "cols": entries.col.astype(np.int64), "values": entries.data},
+                             "region": {"uncertainty": float(uncertainty)} if uncertainty else {}}
     tried = csc_array(matrix if method == "max" else matrix.T)
     weights = _solve(tried, capacity)
+    if uncertainty and weights is not None:
+        tried, weights = _worst(csr_array(matrix), capacity, weights, uncertainty)
     author = made_by("SuperLU sparse solve", "found")
     if weights is None or not (np.isfinite(weights).all() and weights.min() > 0):
+        worst = "with the worst conductances found in the range, " if uncertainty else ""
         return not_certified("network", **parts, evidence={"method": method}, made_by=author,
-                             reason=_unstable(weights))
+                             reason=worst + _unstable(weights))
     weights = weights / weights.max()
     rate = float(np.min(-(tried @ weights) / (capacity * weights)))
     for back_off in _BACK_OFF:
@@ -71,6 +84,34 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max") -> C
         if cert.holds:
             break
     return cert
+
+
+def _worst(matrix: csr_array, capacity: np.ndarray, weights: np.ndarray,
+           uncertainty: float) -> tuple[csc_array, np.ndarray | None]:
+    """Worst network for the weights it has itself, and these weights: each row takes its worst factors in turn.
+
+    Weights grow from policy to policy, to the least that serve all of them; without such weights they diverge.
+    """
+    entries = matrix.tocoo()
+    off = entries.row != entries.col
+    loss = matrix.sum(axis=1)
+    rows, cols, values = entries.row[off], entries.col[off], entries.data[off]
+    worst, found, chosen = csc_array(matrix), weights, None
+    for _ in range(_POLICIES):
+        rising = found[cols] > found[rows]
+        if chosen is not None and np.array_equal(rising, chosen):
+            break
+        chosen = rising
+        scaled = values * np.where(rising, 1 + uncertainty, 1 - uncertainty)
+        diagonal = loss * np.where(loss > 0, 1 + uncertainty, 1 - uncertainty) - np.bincount(rows, scaled, len(loss))
+        worst = csc_array(coo_array((np.concatenate([scaled, diagonal]),
+                                     (np.concatenate([rows, np.arange(len(loss))]),
+                                      np.concatenate([cols, np.arange(len(loss))]))), shape=matrix.shape))
+        solved = _solve(worst, capacity)
+        if solved is None or not (np.isfinite(solved).all() and solved.min() > 0):
+            return worst, solved
+        found = solved
+    return worst, found
 
 
 def _solve(matrix: csc_array, capacity: np.ndarray) -> np.ndarray | None:

@@ -15,17 +15,19 @@ from ..thermal import Equations, System
 from ..verification import Certificate, establish, not_certified
 from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import check_choice, short_matrices
+from ._multipliers import Channel, multiplier_form
 from ._polytope import MOST, Cuts, Polytope, common_form
-from ._sections import Currents, Temperatures, made_by, region_section, system_section
+from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
 
 Array = NDArray[np.floating[Any]]
-_SOLVER = "Clarabel semidefinite program, cutting planes"
+_SOLVER = "Clarabel semidefinite program, multipliers or cutting planes"
 _SLACK = (1e-6, 1e-3, 1e-2, 0.1, 0.5)  # share of the way to 1 given up when a proof fails
 _SHOWN = 4  # lumps of an unstable mode
 
 
 def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_time: float = 1.0, current: Currents,
-             temperature: Temperatures, large: bool = False) -> Certificate:
+             temperature: Temperatures, parameters: Mapping[str, Interval] | None = None,
+             large: bool = False) -> Certificate:
     """Certify that the error of a sampled observer shrinks for every temperature, estimate and current in a box.
 
     The observer is x̂⁺ = A_d x̂ + Γ f(x̂, I) + L (y − C x̂): A_d = exp(E⁻¹A T_s) of the passive network with the modules'
@@ -46,6 +48,11 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
         {module: (lower, upper)} [A], every module.
     temperature : tuple or mapping
         Box of temperatures and of estimates [K], as in `contraction`.
+    parameters : mapping, optional
+        Uncertain numbers of the system as in `contraction`, but for capacities: the error shrinks for every combination
+        that plant and observer share. A_d and Γ stay those of the system's own numbers; what the parameters differ from
+        them is part of f. An observer whose model differs from the plant has an error that does not vanish: that is not
+        claimed.
     large : bool
         Search a dense P for more than 40 lumps too, which may take hours.
 
@@ -78,7 +85,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     check_choice(system, "full", large)
     section["sensors"] = sensor_list(system, sensors)
     section["gain"] = _gain(gain, len(system.lumps), len(section["sensors"]))
-    region = region_section(system, current, temperature)
+    region = region_section(system, current, temperature, parameters)
     region["sample_time"] = _positive(sample_time)
     parts: dict[str, Any] = {"system": section, "region": region}
     error = _ErrorMatrices(system, section, region)
@@ -86,14 +93,18 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     worst = _growth(real, system)
     if worst is not None:
         return not_certified("observer", **parts, evidence={}, reason=worst, made_by=made_by(_SOLVER, "not asked"))
-    vertices = error(box_jacobian(system, region, hull=True))
+    hull = box_jacobian(system, region, hull=True)
+    vertices = error(hull)
     if vertices.count > MOST:
         reason = f"more than {MOST} joint vertices: too many for one matrix inequality"
         return not_certified("observer", **parts, evidence={}, reason=reason, made_by=made_by(_SOLVER, "not asked"))
     cuts = Cuts()
     n = len(system.lumps)
-    Q, _ = common_form(vertices, _shrinking, np.ones((n, n), bool), cuts)
+    Q = multiplier_form(vertices.base, error.channels(hull))
     factor = _factor(vertices, Q)
+    if not factor < 1:  # multipliers for each module alone may lose what joint vertices allow
+        Q, _ = common_form(vertices, _shrinking, np.ones((n, n), bool), cuts)
+        factor = _factor(vertices, Q)
     if not factor < 1:
         reason = ("no matrix P was found for which e'Pe shrinks at every vertex of the box, although no frozen matrix "
                   "of it is unstable. Narrow the current or temperature range, or add sensors.")
@@ -101,7 +112,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     root = np.sqrt(Equations(system).capacity)
     for slack, matrix in zip(_SLACK, short_matrices(Q * np.outer(root, root)), strict=False):
         evidence = {"matrix": matrix, "contraction": float(np.ceil((1 - (1 - factor) * (1 - slack)) * 1e12) / 1e12)}
-        status = f"{cuts.solves} matrix inequalities; {100 * slack:g} % of the decay given up for the proof"
+        status = f"{cuts.solves + 1} matrix inequalities; {100 * slack:g} % of the decay given up for the proof"
         cert = establish("observer", **parts, evidence=evidence, made_by=made_by(_SOLVER, status))
         if cert.holds:
             break
@@ -155,6 +166,15 @@ class _ErrorMatrices:
             parts.append(self._scaled(np.unique(part, axis=0)))
         rest = box.base.toarray() - self.A  # modules: f lacks what A holds
         return Polytope(self._scaled(self.passive + self.hold @ rest), tuple(parts))
+
+    def channels(self, box: BoxJacobian) -> list[Channel]:
+        """Every block as heat in (B), temperatures out (S) and slopes (D)."""
+        parts: list[Channel] = []
+        for block in box.blocks:
+            nodes = [block.a] if block.b < 0 else [block.a, block.b]
+            parts.append((self.hold[:, nodes] * self.root[:, None], np.eye(len(self.root))[nodes] / self.root,
+                          block.vertices[:, :len(nodes), :len(nodes)]))
+        return parts
 
     def _scaled(self, M: Array) -> Array:
         return M * self.root[:, None] / self.root

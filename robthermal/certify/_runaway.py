@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ import pandas as pd
 from ..errors import Outcome
 from ..thermal import LoadCurve, System, fold
 from ..verification import Certificate, establish
-from ._sections import made_by
+from ._sections import Interval, made_by, parameter_box
+
+_SLACKS = (0.01, 0.05, 0.2)  # share of the spread over the corners of the constants added to it, tried in turn
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ class Runaway:
         return ax
 
 
-def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[str, float] | None = None) -> Runaway:
+def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[str, float] | None = None,
+            parameters: Mapping[str, Interval] | None = None) -> Runaway:
     """Find the current and load at which modules that hold their cold face run away.
 
     Parameters
@@ -70,6 +74,10 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
         {module: temperature of its cold face} [K].
     ambient : mapping, optional
         Ambient temperatures [K]; default nominal.
+    parameters : mapping, optional
+        Uncertain numbers of the system as in `contraction`. The network's fold is found for each end of each of them;
+        what that does to S, R, K and the heat sink, added up, are the ranges of the closed form's certificates. How the
+        constants follow from the parameters is computed, not proven; for all constants in these ranges the claim is.
 
     Returns
     -------
@@ -78,7 +86,7 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     Raises
     ------
     InputError
-        Unknown modules, Celsius.
+        Unknown modules or parameters, Celsius.
 
     References
     ----------
@@ -96,8 +104,11 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     load = dict(zip(setpoint, curve.load[-1].tolist(), strict=True))
     numbers = {name: _constants(curve, i, name) for i, name in enumerate(setpoint)}
     closed = {name: smallest_root(n) for name, n in numbers.items()}
-    certificates = {name: _certify(system, name, n, closed[name]) for name, n in numbers.items()
-                    if n["sink_conductance"] > 0}
+    box = parameter_box(system, parameters or {})
+    ends = [fold(system.with_parameters({key: end}), setpoint, ambient=ambient) for key, pair in box.items()
+            for end in pair]
+    certificates = {name: _certify(system, name, n, _ranges(n, [_constants(c, i, name) for c in ends]))
+                    for i, (name, n) in enumerate(numbers.items()) if n["sink_conductance"] > 0}
     worst = max(abs(closed[name] / current[name] - 1) for name in setpoint)
     sloped = any(m.seebeck.slope or m.resistance.slope or m.conductance.slope for m in system.modules.values())
     why = " (their S, R, K vary with temperature, the closed form's do not)" if sloped else ""
@@ -142,9 +153,29 @@ def load_at(n: Mapping[str, float], current: float) -> float:
     return top / (g + K - S * I)
 
 
-def _certify(system: System, name: str, numbers: dict[str, float], current: float) -> Certificate:
-    load = load_at(numbers, current)
-    width, spread = 1e-6 * current, 1e-6 * max(abs(load), 1.0)
-    return establish("runaway", system={"name": f"{system.name}, module {name}", **numbers}, region={},
-                     evidence={"current": [current - width, current + width], "load": [load - spread, load + spread]},
-                     made_by=made_by("numpy.roots", "found"))
+def _ranges(numbers: Mapping[str, float], ends: Sequence[Mapping[str, float]]) -> dict[str, list[float]]:
+    """Ranges of the constants that change: the changes at the lower and upper end of every parameter added up."""
+    found = {}
+    for key, value in numbers.items():
+        changes = np.array([end[key] - value for end in ends]).reshape(-1, 2)
+        low, high = changes.min(axis=1, initial=0.0).sum(), changes.max(axis=1, initial=0.0).sum()
+        if low < 0 or high > 0:
+            found[key] = [float(value + low), float(value + high)]
+    return found
+
+
+def _certify(system: System, name: str, numbers: dict[str, float], ranges: Mapping[str, list[float]]) -> Certificate:
+    corners = [{**numbers, **dict(zip(ranges, chosen, strict=True))} for chosen in product(*ranges.values())]
+    currents = np.array([smallest_root(corner) for corner in corners])
+    heats = np.array([load_at(corner, current) for corner, current in zip(corners, currents, strict=True)])
+    for slack in _SLACKS:
+        width = slack * np.ptp(currents) + 1e-6 * currents.max()
+        spread = slack * np.ptp(heats) + 1e-6 * max(np.abs(heats).max(), 1.0)
+        evidence = {"current": [currents.min() - width, currents.max() + width],
+                    "load": [heats.min() - spread, heats.max() + spread]}
+        cert = establish("runaway", system={"name": f"{system.name}, module {name}", **numbers},
+                         region={"parameters": ranges} if ranges else {}, evidence=evidence,
+                         made_by=made_by("numpy.roots", "found"))
+        if cert.holds:
+            break
+    return cert

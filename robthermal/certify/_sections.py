@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -24,6 +24,10 @@ def system_section(system: System) -> dict[str, Any]:
     if not isinstance(system, System):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
+    if system.effects:  # a certificate without them would be about another machine
+        raise InputError(f"{', '.join(system.effects)}: effects that no certificate covers", where="argument system",
+                         expected="lumps, links and modules with S, R and K only",
+                         remedy="Certify the plain network: set them to 0 with system.with_parameters({...}).")
     return {"name": system.name,
             "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
             "ambients": list(system.ambients),
@@ -51,11 +55,11 @@ def region_section(system: System, current: Currents, temperature: Temperatures,
     """Temperature and current box, and the ranges of uncertain parameters, checked against the system."""
     region = {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
     if parameters:
-        region["parameters"] = _parameter_box(system, parameters)
+        region["parameters"] = parameter_box(system, parameters)
     return region
 
 
-def _parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
+def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
     """{parameter name: [lo, hi]} around the values of the system."""
     names = tuple(name for name in system.parameter_names if name.endswith(_UNCERTAIN))
     ranges = named_ranges(parameters, names, "parameters", "parameter that can be uncertain")
@@ -69,12 +73,12 @@ def _parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[s
     return ranges
 
 
-def temperature_box(system: System, temperature: Temperatures) -> Any:
-    """[lo, hi] or {lump: [lo, hi]}, kelvin."""
+def temperature_box(system: System, temperature: Temperatures, lumps: Sequence[str] | None = None) -> Any:
+    """[lo, hi] or {lump: [lo, hi]}, kelvin; of all lumps, or of those named."""
     if isinstance(temperature, Mapping):
-        _same_names(temperature, system.lump_names, "argument temperature", "lump")
-        return {name: _interval(temperature[name], f"argument temperature[{name!r}]", kelvin=True)
-                for name in system.lump_names}
+        names = system.lump_names if lumps is None else tuple(lumps)
+        _same_names(temperature, names, "argument temperature", "lump")
+        return {name: _interval(temperature[name], f"argument temperature[{name!r}]", kelvin=True) for name in names}
     return _interval(temperature, "argument temperature", kelvin=True)
 
 

@@ -12,12 +12,16 @@ from ._mu_bound import mu_bound as mu_bound
 from ._mu_result import MuBound as MuBound
 from ._overbound import overbound as overbound
 from ._performance import Performance as Performance
+from ._simulate import Simulation as Simulation
+from ._simulate import simulate as simulate
+from ._spectra import Spectra as Spectra
+from ._spectra import spectra as spectra
 from ._synthesize import synthesize as synthesize
 from ._uncertainty import Uncertainty as Uncertainty
 from ._uncertainty import dual_youla as dual_youla
 from ._worst_case import WorstCase as WorstCase
 from ._worst_case import worst_case as worst_case
 
-__all__ = ["CoprimeFactors", "Destabilising", "Filters", "MuBound", "Performance", "Uncertainty", "WorstCase",
-           "coprime", "destabilising", "dual_youla", "evaluate", "inner_factor", "mu", "mu_bound", "overbound",
-           "synthesize", "worst_case"]
+__all__ = ["CoprimeFactors", "Destabilising", "Filters", "MuBound", "Performance", "Simulation", "Spectra",
+           "Uncertainty", "WorstCase", "coprime", "destabilising", "dual_youla", "evaluate", "inner_factor", "mu",
+           "mu_bound", "overbound", "simulate", "spectra", "synthesize", "worst_case"]

@@ -27,14 +27,14 @@ class Proofs:
     ----------
     prove : bool
         Whether to make certificates.
-    certificates : list of Certificate
-        Those made so far that hold.
+    certificates : dict of Certificate
+        Those made so far that hold, by what they prove.
     failed : list of str
         What could not be proven.
     """
 
     prove: bool
-    certificates: list[Certificate] = field(default_factory=list)
+    certificates: dict[str, Certificate] = field(default_factory=dict)
     failed: list[str] = field(default_factory=list)
 
     def stable(self, A: Array, dt: float, what: str) -> bool:
@@ -89,7 +89,7 @@ class Proofs:
 
     def _kept(self, certificate: Certificate, what: str) -> bool:
         if certificate.holds:
-            self.certificates.append(certificate)
+            self.certificates[what] = certificate
         else:
             self.failed.append(f"{what}: {certificate.reason}")
         return bool(certificate.holds)

@@ -105,7 +105,7 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
     nominal = proofs.stable(parts.loop_matrix, problem.dt, "internal stability") and prove
     steady = Proofs(prove)  # apart: an unstable controller is no failure unless it was asked for
     controller_stable = steady.stable(parts.coupling_matrix, problem.dt, "stability of the controller") and prove
-    proofs.certificates += steady.certificates
+    proofs.certificates |= steady.certificates
     robustly = nominal and norms["robust"] < 1.0
     broken = _broken(asked or {}, {**norms, "msd": performance.msd_growth})
     outcome = _outcome(problem, nominal, robustly, broken, proofs)
@@ -116,7 +116,7 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
         improvement_1=plus_one(parts.Y), improvement_2=plus_one(parts.X), e12=beside(negative(row[0]), row[1]),
         norms=norms, performance=performance, nominally_stable=nominal, robustly_stable=robustly,
         controller_stable=controller_stable, holds=outcome.ok, worst_frequency=where,
-        requested=dict(requested or {}), certificates=tuple(proofs.certificates), outcome=outcome, basis=basis,
+        requested=dict(requested or {}), proofs=dict(proofs.certificates), outcome=outcome, basis=basis,
         order=order, solve_time=solve_time, problem=problem, asked=dict(asked or {}),
         again=partial(finish, problem))
 

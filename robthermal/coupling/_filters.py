@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ..errors import Outcome
 from ..verification import Certificate
-from . import _files, _plots
+from . import _files
 from ._performance import Performance
 from ._problem import Problem
 from ._reduce import reduce
 from ._sections import sections
+from ._spectra import spectra
 
 Array = NDArray[Any]
 
@@ -63,8 +64,8 @@ class Filters:
         Where "robust" is attained [rad/s].
     requested : dict of float
         The solver's own values.
-    certificates : tuple of Certificate
-        Stability, norms, and the robust number between grid points.
+    proofs : dict of Certificate
+        Stability, norms, and the robust number between grid points, by what they prove.
     outcome : Outcome
         What holds, or why not.
     basis : str
@@ -112,7 +113,7 @@ class Filters:
     holds: bool
     worst_frequency: float
     requested: dict[str, float]
-    certificates: tuple[Certificate, ...]
+    proofs: dict[str, Certificate]
     outcome: Outcome
     basis: str
     order: int
@@ -120,6 +121,11 @@ class Filters:
     problem: Problem
     asked: dict[str, float]
     again: Callable[..., Filters]
+
+    @property
+    def certificates(self) -> tuple[Certificate, ...]:
+        """Everything that is proven."""
+        return tuple(self.proofs.values())
 
     @property
     def verdict(self) -> str:
@@ -206,7 +212,7 @@ class Filters:
         -------
         ndarray of matplotlib axes, shape (3,)
         """
-        return _plots.draw(self)
+        return spectra(self).plot(("improvement", "e12", "robust"))
 
     def __str__(self) -> str:
         rows = [f"coupling ({self.basis}, order {self.order}): {self.outcome.text}"]

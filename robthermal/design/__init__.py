@@ -1,5 +1,7 @@
 """Controllers and observers for systems with thermoelectric modules."""
 
+from ._certify_loop import CertifiedLoop as CertifiedLoop
+from ._certify_loop import certify_loop as certify_loop
 from ._collapse import Collapse as Collapse
 from ._collapse import collapse as collapse
 from ._constant_gain import ConstantGain as ConstantGain
@@ -34,13 +36,15 @@ from ._polarity import Polarity as Polarity
 from ._polarity import check_polarity as check_polarity
 from ._reachable import Reachable as Reachable
 from ._reachable import reachable as reachable
+from ._robust_feedback import corner_plants as corner_plants
 from ._sampling import loop_poles as loop_poles
 from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 
-__all__ = ["Bounds", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain", "DisturbanceObserver",
-           "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver",
-           "LinearController", "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "Seen",
-           "StateFeedback", "check_polarity", "cold_side", "collapse", "constant_gain", "disturbance_observer",
-           "feed_forward", "feedback_linearization", "linear_controller", "loop_poles", "observer", "pid",
-           "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]
+__all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
+           "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization",
+           "GainObserver", "LinearController", "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable",
+           "Seen", "StateFeedback", "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain",
+           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller",
+           "loop_poles", "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback",
+           "unobservable"]

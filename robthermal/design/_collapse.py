@@ -15,7 +15,7 @@ from ._controller import Controller
 from ._linearization import FeedbackLinearization
 from ._loop import ClosedLoop, Law, simulate_loop
 from ._modules import Array
-from ._numbers import expect
+from ._numbers import expect, numbers
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,8 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
     True
     """
     expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
-    if len(steps) < 2 or not all(np.isfinite(step) and step != 0 for step in steps):
+    sizes = numbers(steps, "steps")
+    if sizes.ndim != 1 or len(sizes) < 2 or not sizes.all():
         raise InputError(f"steps = {tuple(steps)!r}", where="argument steps", expected="at least two steps, none zero")
     start = _hold(system, law, base, inputs)
     at = np.array(list(start.temperatures.values()))

@@ -47,9 +47,10 @@ class ConstantGain:
         """
         wanted = self.law.modules.vector(v, "v", "W")
         asked = self.current - self.gain * (wanted - self.heat)
-        true = self.law.command(self.law.heat(asked, temperatures), temperatures, previous=previous,
-                                sample_time=sample_time)
-        beyond = asked > self.law.bounds(temperatures).current
+        optimum = self.law.bounds(temperatures).current
+        beyond = asked > optimum  # where the same heat has a smaller current too: the law must not mirror it
+        heat = self.law.heat(np.minimum(asked, optimum), temperatures)
+        true = self.law.command(heat, temperatures, previous=previous, sample_time=sample_time)
         limit = np.where(beyond & (true.limit == ""), "optimum", true.limit)
         current = np.where(limit == "", asked, true.current)
         return Command(current, true.voltage, self.heat - (current - self.current) / self.gain, limit)

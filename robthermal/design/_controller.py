@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 from ..errors import InputError
 from ._modules import Array
@@ -29,13 +29,12 @@ class Seen:
     around: Array
 
 
-class Controller(Protocol):
+class Controller(ABC):
     """An outer loop: heats v from what is seen; its state is one vector, advanced with the heat *achieved*."""
 
-    @property
-    def sample_time(self) -> float:
-        """[s]."""
+    sample_time: float  # [s]
 
+    @abstractmethod
     def start(self, seen: Seen, heat: Array) -> Array:
         """State from which the output stays at `heat` while the reference is the temperature.
 
@@ -47,6 +46,7 @@ class Controller(Protocol):
             Heat in force at the start [W].
         """
 
+    @abstractmethod
     def heat(self, state: Array, seen: Seen) -> Array:
         """Wanted heats v [W].
 
@@ -58,6 +58,7 @@ class Controller(Protocol):
             What the controller sees at this sample.
         """
 
+    @abstractmethod
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
         """State at the next sample; wanted and achieved heats differ while a limit is active.
 
@@ -72,6 +73,13 @@ class Controller(Protocol):
         achieved : ndarray
             Heat the modules give within their limits [W].
         """
+
+
+def expect_modules(count: int, heat: Array) -> None:
+    """Refuse a loop with another number of modules: one gain would silently act for all."""
+    if len(heat) != count:
+        raise InputError(f"a controller of {count} modules for a law of {len(heat)}", where="argument controller",
+                         expected="one made for the cold side of the same law", remedy="rt.design.cold_side(law).")
 
 
 def expect_controller(controller: object) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ._modules import Array
+from ._numbers import numbers
 from ._observer_model import ObserverModel
 
 Noise = float | Mapping[str, float] | None
@@ -55,8 +56,8 @@ def _per_name(given: float | Mapping[str, float], names: tuple[str, ...], argume
             raise InputError(f"{missing[0]!r} is missing", where=f"argument {argument}",
                              expected="a number for every one of " + ", ".join(names))
         given = [given[name] for name in names]  # type: ignore[assignment]  # an array from here on
-    values = np.broadcast_to(np.asarray(given, float), (len(names),))
-    if not (np.isfinite(values).all() and values.min() > 0):
+    values = np.broadcast_to(numbers(given, argument), (len(names),))
+    if not values.min() > 0:
         raise InputError(f"{argument} has the value {values.min():g}", where=f"argument {argument}",
                          expected="positive standard deviations [K]")
     return values

@@ -9,12 +9,13 @@ from itertools import product
 import numpy as np
 
 from ..errors import InputError
-from ..thermal import System
+from ..thermal import Equations, System
 from ._modules import Array
 from ._observer_model import ObserverModel
 
 Interval = tuple[float, float]
 Temperatures = Interval | Mapping[str, Interval]
+_COLDEST = 150.0  # K: below, a temperature is in Celsius
 _MOST = 256  # combinations of vertices looked at; beyond, a seeded sample of them
 
 
@@ -43,6 +44,7 @@ def blocks(system: System, current: Mapping[str, Interval], temperature: Tempera
     if any(link.natural is not None or link.radiation is not None for link in system.links):
         raise InputError("natural convection and radiation links", where="argument system",
                          expected="linear links over a box", remedy="Give them a linear conductance for this design.")
+    _expect_ranges(current)
     for name in (*system.modules, *current):
         if name not in current or name not in system.modules:
             raise InputError(f"module {name!r} has no range" if name in system.modules else f"no module {name!r}",
@@ -50,9 +52,40 @@ def blocks(system: System, current: Mapping[str, Interval], temperature: Tempera
     return [_block(system, name, _pair(current[name], "current"), temperature) for name in system.modules]
 
 
+def check_box(system: System, current: Mapping[str, Interval], temperature: Temperatures,
+              where: str = "argument temperature") -> None:
+    """Refuse a box of temperatures without the steady state of the currents nearest to zero: nothing stays in it."""
+    _expect_ranges(current)
+    ranges = {name: _pair(current[name], "current") for name in system.modules if name in current}
+    nearest = {name: float(np.clip(0.0, low, high)) for name, (low, high) in ranges.items()}
+    for lump, value in zip(system.lump_names, _settled(system, nearest), strict=False):
+        pair = temperature.get(lump) if isinstance(temperature, Mapping) else temperature
+        low, high = (-np.inf, np.inf) if pair is None else _pair(pair, "temperature", _COLDEST)
+        if not low <= value <= high:
+            at = ", ".join(f"{name} at {amps:g} A" for name, amps in nearest.items())
+            raise InputError(f"the box ({low:g}, {high:g}) K excludes the equilibrium: lump {lump!r} settles at "
+                             f"{value:.2f} K with {at}", where=where,
+                             expected="a box with the temperatures the system works at",
+                             remedy="Widen the box; kelvin, not degrees Celsius.")
+
+
+def _settled(system: System, current: Mapping[str, float]) -> list[float]:
+    """Temperatures at rest with constant currents, by Newton from the initial ones; empty where that does not end."""
+    eq = Equations(system)
+    x, u = eq.initial(), eq.nominal()
+    for name, value in current.items():
+        u[system.exogenous_names.index(name)] = value
+    for _ in range(30):
+        change = np.linalg.solve(eq.jacobian(x, u).toarray(), eq.heat(x, u))
+        x = x - change
+        if np.abs(change).max() < 1e-9:
+            return x.tolist()
+    return []
+
+
 def _block(system: System, name: str, current: Interval, temperature: Temperatures) -> Block:
     part = system.modules[name]
-    faces = [_pair(temperature[lump] if isinstance(temperature, Mapping) else temperature, "temperature", 150.0)
+    faces = [_pair(temperature[lump] if isinstance(temperature, Mapping) else temperature, "temperature", _COLDEST)
              for lump in (part.hot, part.cold)]
     low, high = current
     currents = [(low, low * low), (high, high * high)]
@@ -98,6 +131,11 @@ def error_matrices(model: ObserverModel, gain: Array, found: list[Block]) -> Ite
 def largest_radius(model: ObserverModel, gain: Array, found: list[Block]) -> float:
     """Largest spectral radius of the frozen error matrices: at 1 or above, some constant current is unstable."""
     return max(float(np.abs(np.linalg.eigvals(M)).max()) for M in error_matrices(model, gain, found))
+
+
+def _expect_ranges(current: object) -> None:
+    if not isinstance(current, Mapping):
+        raise InputError(f"current = {current!r}", where="argument current", expected='{"m1": (lower, upper), …} [A]')
 
 
 def _pair(pair: Interval, argument: str, least: float = -np.inf) -> Interval:

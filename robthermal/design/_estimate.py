@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,49 +15,6 @@ from ..signals import Record
 from ._modules import Array
 from ._numbers import expect
 from ._observer_model import ObserverModel
-
-
-class Observer(Protocol):
-    """Estimates all lumps; its memory is one vector."""
-
-    @property
-    def sample_time(self) -> float:
-        """[s]."""
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """What it reads."""
-
-    def start(self, temperatures: Array) -> Array:
-        """Memory at the first sample, from a first guess of all lumps [K].
-
-        Parameters
-        ----------
-        temperatures : ndarray or mapping
-            Lump temperatures [K].
-        """
-
-    def estimate(self, memory: Array) -> Array:
-        """Estimate of all lumps now, before this sample's readings are used [K].
-
-        Parameters
-        ----------
-        memory : ndarray
-            Memory of the observer.
-        """
-
-    def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at the next sample, from this sample's readings [K] and held inputs by name.
-
-        Parameters
-        ----------
-        memory : ndarray
-            Memory of the observer.
-        readings : ndarray
-            Sensor readings [K].
-        inputs : ndarray
-            Heaters, currents and ambients held over the sample [unit, A, K].
-        """
 
 
 @dataclass(frozen=True)
@@ -98,8 +56,74 @@ class Estimate:
         return ax
 
 
-def along(obs: Observer, model: ObserverModel, record: Record, initial: ArrayLike | None) -> Estimate:
-    """Run an observer along a record."""
+class Observer(ABC):
+    """Estimates all lumps; its memory is one vector."""
+
+    model: ObserverModel
+
+    @property
+    def sample_time(self) -> float:
+        """[s]."""
+        return self.model.sample_time
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """What it reads."""
+        return self.model.sensors
+
+    @abstractmethod
+    def start(self, temperatures: Array) -> Array:
+        """Memory at the first sample, from a first guess of all lumps.
+
+        Parameters
+        ----------
+        temperatures : ndarray
+            Lump temperatures [K].
+        """
+
+    @abstractmethod
+    def estimate(self, memory: Array) -> Array:
+        """Estimate of all lumps now, before this sample's readings are used [K].
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        """
+
+    @abstractmethod
+    def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
+        """Memory at the next sample, from this sample's readings and held inputs.
+
+        Parameters
+        ----------
+        memory : ndarray
+            Memory of the observer.
+        readings : ndarray
+            Sensor readings [K].
+        inputs : mapping
+            Heaters, currents and ambients held over the sample, by name [unit, A, K]; off and nominal where not given.
+        """
+
+    def run(self, record: Record, initial: ArrayLike | None = None) -> Estimate:
+        """Estimate along a record.
+
+        Parameters
+        ----------
+        record : Record
+            Currents, heaters, ambients (nominal where absent) and the sensors this observer reads.
+        initial : array_like, shape (n_lumps,), optional
+            First guess [K]; default every lump at its nearest reading.
+
+        Returns
+        -------
+        Estimate
+        """
+        return _along(self, record, initial)
+
+
+def _along(obs: Observer, record: Record, initial: ArrayLike | None) -> Estimate:
+    model = obs.model
     expect(record, Record, "record", "rt.read_record")
     missing = [name for name in (*obs.sensors, *model.system.modules, *model.system.inputs) if name not in record]
     if missing:

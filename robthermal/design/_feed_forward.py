@@ -16,7 +16,20 @@ from ._sampling import check_sampling
 
 
 @dataclass(frozen=True)
-class FeedForward:
+class _Around(Controller):
+    """Something around a controller."""
+
+    plant: ColdSide
+    controller: Controller
+
+    @property
+    def sample_time(self) -> float:  # type: ignore[override]  # its controller's: nobody sets it
+        """[s]."""
+        return self.controller.sample_time
+
+
+@dataclass(frozen=True)
+class FeedForward(_Around):
     """A controller plus the steady heat that holds the reference in the measured surroundings.
 
     Parameters
@@ -27,55 +40,16 @@ class FeedForward:
         Works on what is left.
     """
 
-    plant: ColdSide
-    controller: Controller
-
-    @property
-    def sample_time(self) -> float:
-        """[s]."""
-        return self.controller.sample_time
-
     def _share(self, seen: Seen) -> Array:
         return self.plant.holding_heat(seen.reference, seen.around)
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """State of the controller.
-
-        Parameters
-        ----------
-        seen : Seen
-            What the controller sees at this sample.
-        heat : ndarray
-            Heat in force at the start [W].
-        """
         return self.controller.start(seen, heat - self.plant.holding_heat(seen.cold, seen.around))
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W].
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        """
         return self.controller.heat(state, seen) + self._share(seen)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Advance the controller with its own share.
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        wanted : ndarray
-            Heat that was asked for [W].
-        achieved : ndarray
-            Heat the modules give within their limits [W].
-        """
         share = self._share(seen)
         return self.controller.advance(state, seen, wanted - share, achieved - share)
 
@@ -114,7 +88,7 @@ def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
 
 
 @dataclass(frozen=True)
-class DisturbanceObserver:
+class DisturbanceObserver(_Around):
     """A controller that also cancels the estimated unmeasured heat on the cold faces.
 
     x̂⁺ = A_d x̂ + B_d (achieved + d̂) + B_w w + L_x e, d̂⁺ = d̂ + L_d e, e = y - C x̂. It is driven by the heat that the
@@ -130,16 +104,9 @@ class DisturbanceObserver:
         Augmented model [x̂; d̂] and gain.
     """
 
-    plant: ColdSide
-    controller: Controller
     A: Array
     B: Array
     L: Array
-
-    @property
-    def sample_time(self) -> float:
-        """[s]."""
-        return self.controller.sample_time
 
     def _split(self, state: Array) -> tuple[Array, Array]:
         size = len(self.A)
@@ -156,45 +123,15 @@ class DisturbanceObserver:
         return self._split(state)[0][len(self.plant.lumps):]
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Estimates at what is seen, no disturbance.
-
-        Parameters
-        ----------
-        seen : Seen
-            What the controller sees at this sample.
-        heat : ndarray
-            Heat in force at the start [W].
-        """
+        # estimates at what is seen, no disturbance
         own = np.concatenate([seen.temperatures[self.plant.indices], np.zeros(len(seen.cold))])
         return np.concatenate([own, self.controller.start(seen, heat)])
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W].
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        """
         own, inner = self._split(state)
         return self.controller.heat(inner, seen) - own[len(self.plant.lumps):]
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Advance both: the observer with the achieved heat, the controller with its own share.
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        wanted : ndarray
-            Heat that was asked for [W].
-        achieved : ndarray
-            Heat the modules give within their limits [W].
-        """
         own, inner = self._split(state)
         error = seen.cold - self.plant.C @ own[:len(self.plant.lumps)]
         estimate = self.A @ own + self.B @ np.concatenate([achieved, seen.around]) + self.L @ error

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate
+from ._error_box import check_box
 from ._modules import Array, ModuleSet, Properties
 
 Limits = Mapping[str, tuple[float, float]] | tuple[float, float] | None
@@ -331,6 +332,8 @@ def _certified(modules: ModuleSet, certificate: Certificate) -> tuple[Array, Arr
         if name not in certificate.region["current"]:
             raise InputError(f"the certificate does not know module {name!r}", where="argument certificate",
                              expected="a certificate of this system")
+    check_box(modules.system, certificate.region["current"], certificate.region["temperature"],
+              "argument certificate")
     pairs = [[float(value) for value in certificate.region["current"][name]] for name in modules.names]
     return np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
 

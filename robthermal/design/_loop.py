@@ -190,8 +190,11 @@ class _Run:
 
     def go(self, reference: ArrayLike | Signals, current: Array) -> ClosedLoop:
         """Run to the end, or to the runaway."""
-        wanted_cold = np.broadcast_to(self.base.modules.vector(reference, "reference", "K"),
-                                      (self.n, len(self.base.names)))
+        wanted_cold = self.base.modules.vector(reference, "reference", "K")
+        if wanted_cold.shape not in ((len(self.base.names),), (self.n, len(self.base.names))):
+            raise InputError(f"reference has shape {wanted_cold.shape}", where="argument reference",
+                             expected=f"one row, or {self.n} of them, one per sample")
+        wanted_cold = np.broadcast_to(wanted_cold, (self.n, len(self.base.names)))
         if wanted_cold.min() < 150.0:
             raise InputError(f"a set-point is {wanted_cold.min():g} K", where="argument reference", expected="kelvin",
                              remedy="Add 273.15 to degrees Celsius.")

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from ..errors import InputError
-from ._controller import Seen
+from ._controller import Controller, Seen, expect_modules
 from ._modules import Array
 from ._numbers import expect, positive
 from ._plant import ColdSide
@@ -18,7 +18,7 @@ from ._sampling import check_sampling
 
 
 @dataclass(frozen=True)
-class LinearController:
+class LinearController(Controller):
     """v = C z + D e, z⁺ = A z + B e + L (achieved - wanted), e = r - y.
 
     L makes A - L C stable, so that under an active limit the state follows what is achieved, also for integrators.
@@ -41,45 +41,16 @@ class LinearController:
     sample_time: float
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """State, as constant as possible, from which zero error gives the heat.
-
-        Parameters
-        ----------
-        seen : Seen
-            What the controller sees at this sample.
-        heat : ndarray
-            Heat in force at the start [W].
-        """
+        expect_modules(len(self.C), heat)
+        # as constant as possible, and zero error gives the heat
         n = len(self.A)
         stack, wanted = np.vstack([self.C, np.eye(n) - self.A]), np.concatenate([heat, np.zeros(n)])
         return np.linalg.lstsq(stack, wanted, rcond=None)[0]
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W].
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        """
         return self.C @ state + self.D @ (seen.reference - seen.cold)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Next state, following the achieved heat.
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        wanted : ndarray
-            Heat that was asked for [W].
-        achieved : ndarray
-            Heat the modules give within their limits [W].
-        """
         return self.A @ state + self.B @ (seen.reference - seen.cold) + self.L @ (achieved - wanted)
 
 
@@ -124,18 +95,25 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
         raise InputError(f"{system.ninputs} inputs, {system.noutputs} outputs", where="argument system",
                          expected=f"{m} of each: errors of {', '.join(plant.law.names)} to their heats")
     ss = control.ss(system)
-    A, B, C, D = (np.asarray(M, float) for M in (ss.A, ss.B, ss.C, ss.D))
-    if not ss.dt:  # 0 or None: continuous
-        both = np.zeros((len(A) + m, len(A) + m))
-        both[:len(A)] = np.hstack([A, B]) * h
-        exact = expm(both)[:len(A)]
-        A, B = exact[:, :len(A)], exact[:, len(A):]
-    elif ss.dt is not True and abs(ss.dt - h) > 1e-9 * h:
+    if ss.dt and ss.dt is not True and abs(ss.dt - h) > 1e-9 * h:
         raise InputError(f"the controller's sample time is {ss.dt:g} s", where="argument system",
                          expected=f"{h:g} s, or a continuous-time controller")
-    controller = LinearController(A, B, C, D, _following(A, C), h)
-    check_sampling(plant, controller)
+    controller = _sampled(ss, h)
+    # a discrete one has only this sample time: no other is tried
+    check_sampling(plant, controller, None if ss.dt else lambda time: _sampled(ss, time))
     return controller
+
+
+def _sampled(ss: control.StateSpace, h: float) -> LinearController:
+    """Exact with held input where it is continuous."""
+    A, B, C, D = (np.asarray(M, float) for M in (ss.A, ss.B, ss.C, ss.D))
+    if not ss.dt:  # 0 or None: continuous
+        n, m = B.shape
+        both = np.zeros((n + m, n + m))
+        both[:n] = np.hstack([A, B]) * h
+        exact = expm(both)[:n]
+        A, B = exact[:, :n], exact[:, n:]
+    return LinearController(A, B, C, D, _following(A, C), h)
 
 
 def _following(A: Array, C: Array) -> Array:

@@ -106,7 +106,10 @@ class ModuleSet:
             both = np.broadcast_arrays(*hot, *cold)
             x_h, x_c = np.stack(both[:len(hot)], axis=-1), np.stack(both[len(hot):], axis=-1)
         else:
-            x = np.asarray(temperatures, float)
+            try:
+                x = np.asarray(temperatures, float)
+            except (TypeError, ValueError):
+                x = np.array(np.nan)
             if x.ndim == 0 or x.shape[-1] != len(self.system.lumps):
                 raise InputError(f"temperatures has shape {x.shape}", where="argument temperatures",
                                  expected=f"(..., {len(self.system.lumps)}): every lump of the system, in file order",
@@ -122,6 +125,15 @@ class ModuleSet:
 
     def vector(self, values: ArrayLike | Mapping[str, ArrayLike], argument: str, unit: str) -> Array:
         """One number per module, (..., n_modules), from an array, a mapping, or one number for all."""
+        try:
+            return self._vector(values, argument, unit)
+        except InputError:
+            raise
+        except (TypeError, ValueError):  # text, or arrays that do not fit together
+            raise InputError(f"{argument} = {values!r}", where=f"argument {argument}",
+                             expected=f"numbers [{unit}], one for each of " + ", ".join(self.names)) from None
+
+    def _vector(self, values: ArrayLike | Mapping[str, ArrayLike], argument: str, unit: str) -> Array:
         m = len(self.names)
         if isinstance(values, Mapping):
             extra, missing = set(values) - set(self.names), [name for name in self.names if name not in values]

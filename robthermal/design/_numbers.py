@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ._modules import Array
@@ -20,6 +21,26 @@ def positive(value: Any, argument: str, unit: str) -> float:
         raise InputError(f"{argument} = {value!r}", where=f"argument {argument}",
                          expected=f"a finite number above 0 [{unit}]")
     return number
+
+
+def numbers(value: Any, argument: str) -> NDArray[np.float64]:
+    """An array of finite numbers."""
+    try:
+        array = np.asarray(value, float)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if not np.isfinite(array).all():
+        raise InputError(f"{argument} = {value!r}", where=f"argument {argument}", expected="finite numbers")
+    return array
+
+
+def per_module(value: Any, count: int, argument: str, unit: str) -> NDArray[np.float64]:
+    """One finite number per module, or one for all."""
+    array = numbers(value, argument)
+    if array.shape not in ((), (count,)):
+        raise InputError(f"{argument} has shape {array.shape}", where=f"argument {argument}",
+                         expected=f"one number [{unit}], or {count}, one per module")
+    return np.broadcast_to(array, (count,)).copy()
 
 
 def non_negative(values: Array, argument: str) -> None:

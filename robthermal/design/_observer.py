@@ -1,32 +1,33 @@
-"""Observers of all lumps from a few sensors, with a constant gain: steady Kalman or positive."""
+"""Observers of all lumps from a few sensors, with a constant gain: steady Kalman, positive, or from an LMI."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.linalg import solve_discrete_are
 
 from ..certify import observer as certify_observer
 from ..errors import InputError, Outcome
-from ..signals import Record
 from ..verification import Certificate
 from ._covariances import Noise, process_covariance, reading_covariance
-from ._error_box import Interval, Temperatures, blocks, largest_radius
-from ._estimate import Estimate, along
+from ._error_box import Block, Interval, Temperatures, blocks, check_box, largest_radius
+from ._estimate import Observer
 from ._extended import ExtendedKalmanFilter
 from ._modules import Array
+from ._numbers import positive
 from ._observer_model import ObserverModel
 from ._positive import positive_gain
+from ._robust_gain import helpful_sensors, robust_gain
 
+_METHODS = ("kalman", "positive", "lmi", "ekf")
 _DIRECTIONS = {"symmetric": (-1.0, 1.0), "cooling": (0.0, 1.0), "heating": (-1.0, 0.0)}
 
 
 @dataclass(frozen=True)
-class GainObserver:
+class GainObserver(Observer):
     """x̂⁺ = A_d x̂ + Γ f(x̂, u) + L (y - C x̂), S and R at the estimate.
 
     Parameters
@@ -34,7 +35,8 @@ class GainObserver:
     model : ObserverModel
         A_d, Γ, C.
     gain : ndarray, shape (n_lumps, n_sensors)
-        L, predictor form, lumps in file order: what `rt.certify.observer` takes.
+        L, predictor form, lumps in file order; acts on lump temperatures, readings with gain and offset undone. What
+        `rt.certify.observer` takes for sensors of gain 1; `certify` divides by the others.
     method : str
         How it was found.
     outcome : Outcome
@@ -46,66 +48,15 @@ class GainObserver:
     method: str
     outcome: Outcome
 
-    @property
-    def sample_time(self) -> float:
-        """[s]."""
-        return self.model.sample_time
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """What it reads."""
-        return self.model.sensors
-
     def start(self, temperatures: Array) -> Array:
-        """Memory at the first sample.
-
-        Parameters
-        ----------
-        temperatures : ndarray or mapping
-            Lump temperatures [K].
-        """
         return np.asarray(temperatures, float)
 
     def estimate(self, memory: Array) -> Array:
-        """Estimate of all lumps [K].
-
-        Parameters
-        ----------
-        memory : ndarray
-            Memory of the observer.
-        """
         return memory
 
     def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
-        """Memory at the next sample.
-
-        Parameters
-        ----------
-        memory : ndarray
-            Memory of the observer.
-        readings : ndarray
-            Sensor readings [K].
-        inputs : ndarray
-            Heaters, currents and ambients held over the sample [unit, A, K].
-        """
         u = self.model.exogenous(inputs)
         return self.model.predict(memory, u) + self.gain @ (self.model.measured(readings) - self.model.C @ memory)
-
-    def run(self, record: Record, initial: ArrayLike | None = None) -> Estimate:
-        """Estimate along a record.
-
-        Parameters
-        ----------
-        record : Record
-            Currents, heaters, ambients (nominal where absent) and the sensors this observer reads.
-        initial : array_like, shape (n_lumps,), optional
-            First guess [K]; default every lump at its nearest reading.
-
-        Returns
-        -------
-        Estimate
-        """
-        return along(self, self.model, record, initial)
 
     def spectral_radius(self, current: Mapping[str, Interval], temperature: Temperatures) -> float:
         """Largest spectral radius of the error with currents and temperatures frozen at the corners of a box.
@@ -140,7 +91,9 @@ class GainObserver:
         Certificate
             What `rt.certify.observer` returns for this gain; `holds` may be False.
         """
-        return certify_observer(self.model.system, gain=self.gain, sensors=list(self.sensors),
+        # the certificate's sensors read gain times their lump, this observer undoes that first
+        gain = self.gain / np.array([self.model.system.sensors[name].gain for name in self.sensors])
+        return certify_observer(self.model.system, gain=gain, sensors=list(self.sensors),
                                 sample_time=self.sample_time, current=current, temperature=temperature)
 
     def frozen_limit(self, temperature: Temperatures,
@@ -179,7 +132,7 @@ class GainObserver:
 
 
 def observer(system: Any, sensors: Sequence[str], *, sample_time: float = 1.0,
-             method: Literal["kalman", "positive", "ekf"] = "kalman", process_noise: Noise = None,
+             method: Literal["kalman", "positive", "lmi", "ekf"] = "kalman", process_noise: Noise = None,
              sensor_noise: Noise = None, current: Mapping[str, Interval] | None = None,
              temperature: Temperatures | None = None,
              time_constant: float | None = None) -> GainObserver | ExtendedKalmanFilter:
@@ -193,29 +146,32 @@ def observer(system: Any, sensors: Sequence[str], *, sample_time: float = 1.0,
         Names of sensors.
     sample_time : float, optional
         [s].
-    method : {"kalman", "positive", "ekf"}, optional
+    method : {"kalman", "positive", "lmi", "ekf"}, optional
         Steady Kalman gain of the passive network; a gain that keeps the error matrix nonnegative and contracts over a
-        box; extended Kalman filter.
+        box; the gain nearest to the Kalman gain whose error decays in one quadratic norm over a box, by a linear matrix
+        inequality; extended Kalman filter.
     process_noise : float or mapping of lump to float, optional
         Standard deviation of the unmeasured change of every lump per sample [K]; default from the lumps' declared
         disturbances, 0.01 K where none is declared.
     sensor_noise : float or mapping of sensor to float, optional
         [K]; default the sensors' declared noise.
     current, temperature
-        Box of the positive gain [A], [K].
+        Box of the positive gain and of the matrix inequality [A], [K].
     time_constant : float, optional
-        In which the weighted sum of the errors must decay, for the positive gain [s]; default 1.2 times the fastest
-        possible one.
+        In which the error must decay over the box, for the positive gain (weighted sum; default 1.2 times the fastest
+        possible one) and the matrix inequality (quadratic norm; default any) [s].
 
     Returns
     -------
     GainObserver or ExtendedKalmanFilter
-        With `.gain` for `rt.certify.observer`, `.run(record)` for a record.
+        With `.gain` for `rt.certify.observer`, `.run(record)` for a record. Where the box allows no gain that was
+        asked for, `.outcome` is not ok and, for "lmi", names the sensors that would help.
 
     Raises
     ------
     InputError
-        Sensors that do not see every lump, with the lumps; sensors slower than a sample; noise that is not declared.
+        Sensors that do not see every lump, with the lumps; sensors slower than a sample; noise that is not declared; a
+        missing box.
 
     References
     ----------
@@ -230,19 +186,47 @@ def observer(system: Any, sensors: Sequence[str], *, sample_time: float = 1.0,
     >>> obs.spectral_radius({"m1": (0, 1.5), "m2": (0, 1.5)}, (278.15, 358.15)) < 1
     True
     """
+    if method in ("positive", "lmi") and current is not None and temperature is not None:
+        check_box(system, current, temperature)
+    obs = without_advice(system, sensors, sample_time, method, process_noise, sensor_noise, current, temperature,
+                         time_constant)
+    if method != "lmi" or obs.outcome or current is None or temperature is None:
+        return obs
+    helpful = helpful_sensors(obs.model, blocks(system, current, temperature), _factor(sample_time, time_constant))
+    advice = f" With one of {', '.join(helpful)} added there is one." if helpful else (
+        " No further sensor of the system is enough alone: rt.design.place_sensors(…, keep=[…]) tries sets.")
+    return replace(obs, outcome=replace(obs.outcome, text=obs.outcome.text + advice))
+
+
+def without_advice(system: Any, sensors: Sequence[str], sample_time: float, method: str, process_noise: Noise,
+                   sensor_noise: Noise, current: Mapping[str, Interval] | None, temperature: Temperatures | None,
+                   time_constant: float | None) -> Any:
+    """Design an observer; where it fails, no search for sensors that would help."""
+    if method not in _METHODS:
+        raise InputError(f"method = {method!r}", where="argument method", expected="one of " + ", ".join(_METHODS))
     model = ObserverModel.of(system, sensors, sample_time)
-    if method == "positive":
+    found: list[Block] = []
+    if method in ("positive", "lmi"):
         if current is None or temperature is None:
             raise InputError("no box is given", where="arguments current, temperature",
                              expected='current={"m1": (lower, upper), …} [A] and temperature=(lower, upper) [K]')
-        found = positive_gain(model, blocks(system, current, temperature), time_constant)
-        return GainObserver(model, found.gain, method, found.outcome)
+        found = blocks(system, current, temperature)
+    if method == "positive":
+        gain = positive_gain(model, found, time_constant)
+        return GainObserver(model, gain.gain, method, gain.outcome)
     Q, R = process_covariance(model, process_noise), reading_covariance(model, sensor_noise)
     P = solve_discrete_are(model.A_d.T, model.C.T, Q, R)
     if method == "ekf":
         return ExtendedKalmanFilter(model, Q, R, P)
-    if method != "kalman":
-        raise InputError(f"method = {method!r}", where="argument method", expected='"kalman", "positive" or "ekf"')
     L = np.linalg.solve(model.C @ P @ model.C.T + R, model.C @ P @ model.A_d.T).T
-    return GainObserver(model, L, method, Outcome(True, "designed", "Steady Kalman gain of the passive network; "
-                        "whether it is stable with the modules on is for rt.certify.observer to prove."))
+    if method == "kalman":
+        return GainObserver(model, L, method, Outcome(True, "designed", "Steady Kalman gain of the passive network; "
+                            "whether it is stable with the modules on is for rt.certify.observer to prove."))
+    L, outcome = robust_gain(model, found, _factor(sample_time, time_constant), L)
+    return GainObserver(model, L, method, outcome)
+
+
+def _factor(sample_time: float, time_constant: float | None) -> float:
+    """Decay per sample; 1 where any will do."""
+    tau = np.inf if time_constant is None else positive(time_constant, "time_constant", "s")
+    return float(np.exp(-sample_time / tau))

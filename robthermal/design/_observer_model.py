@@ -151,9 +151,7 @@ class ObserverModel:
 
 def check_sensors(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     """Names of sensors, each once, that see every lump."""
-    if isinstance(sensors, str) or not len(tuple(sensors)):
-        raise InputError(f"sensors = {sensors!r}", where="argument sensors", expected="a list of sensor names")
-    names = tuple(sensors)
+    names = _names(sensors)
     hidden = unobservable(system, names)
     lumps = [system.sensors[name].lump for name in names]
     if len(set(lumps)) < len(lumps):
@@ -187,7 +185,7 @@ def unobservable(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     ()
     """
     check_system(system)
-    for name in sensors:
+    for name in _names(sensors):
         if name not in system.sensors:
             raise InputError(f"there is no sensor {name!r}", where="argument sensors",
                              expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
@@ -209,3 +207,9 @@ def unobservable(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
         hidden.update(np.flatnonzero((share > 0.1).any(axis=1)).tolist())
         first = last
     return tuple(system.lump_names[i] for i in sorted(hidden))
+
+
+def _names(sensors: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(sensors, str) or not isinstance(sensors, Sequence) or not len(sensors):
+        raise InputError(f"sensors = {sensors!r}", where="argument sensors", expected="a list of sensor names")
+    return tuple(sensors)

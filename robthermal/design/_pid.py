@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ._controller import Seen
+from ._controller import Controller, Seen, expect_modules
 from ._modules import Array
-from ._numbers import expect, non_negative, positive
+from ._numbers import expect, non_negative, per_module, positive
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
 
 @dataclass(frozen=True)
-class PID:
+class PID(Controller):
     """One PI or PID per module, anti-windup by back-calculation from the heat the law achieved.
 
     v = Kp (r - y) + z - Kd ẏ_f, with z held exactly over a sample and the filtered derivative sampled exactly.
@@ -44,45 +44,16 @@ class PID:
     sample_time: float
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Integrators at the heat, derivative filters at rest.
-
-        Parameters
-        ----------
-        seen : Seen
-            What the controller sees at this sample.
-        heat : ndarray
-            Heat in force at the start [W].
-        """
+        expect_modules(len(self.proportional), heat)
+        # integrators at the heat, derivative filters at rest
         return np.concatenate([heat, seen.cold])
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W].
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        """
         z, filtered = np.split(state, 2)
         slope = (seen.cold - filtered) / self.filter_time
         return self.proportional * (seen.reference - seen.cold) + z - self.derivative * slope
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Integrate, giving way to limits; advance the filter with the measurement held.
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        wanted : ndarray
-            Heat that was asked for [W].
-        achieved : ndarray
-            Heat the modules give within their limits [W].
-        """
         z, filtered = np.split(state, 2)
         z = z + self.sample_time * self.integral * (seen.reference - seen.cold)
         z = z + -np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
@@ -141,8 +112,9 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
         kp = 1 / np.abs(np.diag(G))
         ki, kd = kp * w / 4, np.zeros(m)
     else:
-        kp, ki, kd = (np.broadcast_to(np.asarray(gain, float), (m,)).copy()
-                      for gain in (proportional, integral, derivative))
+        kp, ki, kd = (per_module(gain, m, name, unit) for gain, name, unit in (
+            (proportional, "proportional", "W/K"), (integral, "integral", "W/(K s)"),
+            (derivative, "derivative", "W s/K")))
         non_negative(np.stack([kp, ki, kd]), "proportional, integral, derivative")
     own = kp / np.where(ki > 0, ki, 1.0) if tracking_time is None else positive(tracking_time, "tracking_time", "s")
     tracking = np.where(ki > 0, np.maximum(own, h), np.inf)  # what never integrates must not drift either

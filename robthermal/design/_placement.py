@@ -14,12 +14,13 @@ from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate
 from ._covariances import Noise
-from ._error_box import Interval, Temperatures
+from ._error_box import Interval, Temperatures, check_box
 from ._modules import check_system
-from ._observer import GainObserver, observer
+from ._observer import GainObserver, without_advice
 from ._observer_model import unobservable
 
 _MOST = 2000  # sets of one size that are all tried; beyond, the best smaller set is extended
+_METHODS = ("kalman", "positive", "lmi")
 _TRIED = 3  # of a size are put to the certifier
 
 
@@ -71,7 +72,8 @@ class Placement:
 
 def place_sensors(system: System, *, current: Mapping[str, Interval], temperature: Temperatures,
                   candidates: Sequence[str] | None = None, sample_time: float = 1.0, largest: int = 3,
-                  method: Literal["kalman", "positive"] = "kalman", process_noise: Noise = None) -> Placement:
+                  method: Literal["kalman", "positive", "lmi"] = "kalman", process_noise: Noise = None,
+                  keep: Sequence[str] = ()) -> Placement:
     """Find the smallest sensor set whose observer is certified over a box.
 
     Parameters
@@ -83,13 +85,15 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     temperature : (lower, upper) or mapping of lump to (lower, upper)
         [K].
     candidates : sequence of str, optional
-        Sensors to choose from; default all.
+        Sensors to choose from; default all that are faster than a sample.
     sample_time : float, optional
         [s].
     largest : int, optional
         Largest set to look at; all sizes up to it are tabulated for the trade-off.
     method, process_noise
-        As in `observer`.
+        As in `observer`; "lmi" finds the smallest sets and takes half a second for each that it looks at.
+    keep : sequence of str, optional
+        Sensors that are there already: only sets with all of them are looked at.
 
     Returns
     -------
@@ -112,24 +116,26 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     (1, True)
     """
     check_system(system)
-    names = tuple(system.sensors) if candidates is None else tuple(candidates)
+    quick = (name for name, sensor in system.sensors.items() if sensor.time_constant + sensor.delay <= sample_time)
+    names = tuple(dict.fromkeys([*keep, *(quick if candidates is None else candidates)]))
     for name in names:
         if name not in system.sensors:
             raise InputError(f"there is no sensor {name!r}", where="argument candidates",
                              expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
-    if not 1 <= largest <= len(names):
-        raise InputError(f"largest = {largest}", where="argument largest", expected=f"1 to {len(names)}")
+    least = max(len(set(keep)), 1)
+    if not isinstance(largest, int) or not least <= largest <= len(names):
+        raise InputError(f"largest = {largest!r}", where="argument largest", expected=f"{least} to {len(names)}")
+    if method not in _METHODS:
+        raise InputError(f"method = {method!r}", where="argument method", expected="one of " + ", ".join(_METHODS))
+    check_box(system, current, temperature)
     best: dict[int, tuple[tuple[str, ...], float]] = {}
     proven: tuple[GainObserver, Certificate] | None = None
-    for size in range(1, largest + 1):
+    for size in range(least, largest + 1):
         screened = []
-        for tried in _sets(names, size, best):
+        for tried in _sets(names, tuple(keep), size, best):
             if unobservable(system, tried) or len({system.sensors[name].lump for name in tried}) < size:
                 continue
-            found = observer(system, tried, sample_time=sample_time, method=method, process_noise=process_noise,
-                             current=current, temperature=temperature)
-            if not isinstance(found, GainObserver):
-                raise InputError(f"method = {method!r}", where="argument method", expected='"kalman" or "positive"')
+            found = without_advice(system, tried, sample_time, method, process_noise, None, current, temperature, None)
             screened.append((found.spectral_radius(current, temperature), found))
         if not screened:
             continue
@@ -154,9 +160,14 @@ def _first_certified(found: list[GainObserver], current: Mapping[str, Interval],
     return None
 
 
-def _sets(names: tuple[str, ...], size: int, best: dict[int, tuple[tuple[str, ...], float]]) -> list[tuple[str, ...]]:
-    """Sets of one size to try."""
-    if comb(len(names), size) <= _MOST or size - 1 not in best:
-        return list(islice(combinations(names, size), _MOST))
-    smaller = best[size - 1][0]
-    return [tuple(name for name in names if name in smaller or name == more) for more in names if more not in smaller]
+def _sets(names: tuple[str, ...], keep: tuple[str, ...], size: int,
+          best: dict[int, tuple[tuple[str, ...], float]]) -> list[tuple[str, ...]]:
+    """Sets of one size to try, sensors in the order of the candidates."""
+    free = [name for name in names if name not in keep]
+    kept = set(keep)
+    if comb(len(free), size - len(kept)) <= _MOST or size - 1 not in best:
+        chosen = [kept.union(more) for more in islice(combinations(free, size - len(kept)), _MOST)]
+    else:
+        smaller = set(best[size - 1][0])
+        chosen = [smaller | {more} for more in free if more not in smaller]
+    return [tuple(name for name in names if name in some) for some in chosen]

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..thermal import Equations
 from ._linearization import FeedbackLinearization
 from ._modules import Array
-from ._numbers import expect
+from ._numbers import expect, numbers
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,8 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
             raise InputError(f"the cold face {part.cold!r} of module {name!r} is another module's hot face",
                              where="argument law", expected="one stage", remedy="Linearise the cold stage only, with "
                              "modules=[…], and let the other stage hold its own temperature.")
-    x = eq.initial() if temperatures is None else np.asarray(temperatures, float)
+    x = eq.initial() if temperatures is None else numbers(temperatures, "temperatures")
+    law.modules.faces(x)
     full = _passive(eq, x)
     n = len(system.lumps)
     free = np.array([i for i, name in enumerate(system.lump_names) if name not in hot], np.intp)

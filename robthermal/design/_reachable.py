@@ -62,7 +62,7 @@ class Reachable:
         if not self.outcome:
             raise InputError("; ".join(f"{name} at {value:g} K" for name, value in self.setpoint.items()),
                              where="argument setpoint", expected=_ranges(self.passive, self.limit),
-                             remedy="Raise the set-point, lower the load, or cool the hot side better.")
+                             remedy="Choose set-points within it, lower the load, or cool the hot side better.")
 
     def plot(self) -> Any:
         """Plot range and set-point of every module [°C]; returns the matplotlib axes."""
@@ -126,7 +126,7 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
                          Outcome(True, "reachable", f"The set-points can be held.{further}"))
     return Reachable(wanted, passive, far, current, why, Outcome(
         False, "unreachable", f"These set-points cannot be held: {_words(why)}. Reachable is {_ranges(passive, far)}. "
-        "Raise the set-point, lower the load, or cool the hot side better."))
+        "Choose set-points within it, lower the load, or cool the hot side better."))
 
 
 @dataclass(frozen=True)

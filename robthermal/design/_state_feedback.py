@@ -1,23 +1,26 @@
-"""State feedback with integral action, sampled exactly."""
+"""State feedback with integral action, sampled exactly: LQR, one gain for several plants, or gains given."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_discrete_are
 
-from ..errors import InputError
-from ._controller import Seen
+from ..errors import InputError, Outcome
+from ._controller import Controller, Seen, expect_modules
 from ._modules import Array
-from ._numbers import expect, positive
+from ._numbers import expect, numbers, positive
 from ._plant import ColdSide
+from ._robust_feedback import robust_gain
 from ._sampling import check_sampling
 
 
 @dataclass(frozen=True)
-class StateFeedback:
+class StateFeedback(Controller):
     """v = z - K x_c + Kr r, z⁺ = z + h Ki (r - y) + (achieved - wanted) h / tracking_time.
 
     Parameters
@@ -32,6 +35,8 @@ class StateFeedback:
         Time in which the integrators give way to an active limit [s].
     sample_time : float
         [s].
+    outcome : Outcome
+        What is known about the loop.
     """
 
     plant: ColdSide
@@ -40,57 +45,29 @@ class StateFeedback:
     integral: Array
     tracking_time: float
     sample_time: float
+    outcome: Outcome = Outcome(True, "designed", "Stable with the linear cold side while no limit is active.")
 
     def _proportional(self, seen: Seen) -> Array:
         return self.reference_gain @ seen.reference - self.K @ seen.temperatures[self.plant.indices]
 
     def start(self, seen: Seen, heat: Array) -> Array:
-        """Integrators that give the heat while the reference is the temperature.
-
-        Parameters
-        ----------
-        seen : Seen
-            What the controller sees at this sample.
-        heat : ndarray
-            Heat in force at the start [W].
-        """
+        expect_modules(len(self.K), heat)
         at_rest = self.reference_gain @ seen.cold - self.K @ seen.temperatures[self.plant.indices]
         return heat - at_rest
 
     def heat(self, state: Array, seen: Seen) -> Array:
-        """Wanted heats v [W].
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        """
         return state + self._proportional(seen)
 
     def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        """Integrate the error, giving way to limits.
-
-        Parameters
-        ----------
-        state : ndarray
-            Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
-        wanted : ndarray
-            Heat that was asked for [W].
-        achieved : ndarray
-            Heat the modules give within their limits [W].
-        """
         change = self.sample_time * self.integral @ (seen.reference - seen.cold)
         return state + change - np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
 
 
 def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
                    gain: ArrayLike | None = None, integral: ArrayLike | None = None,
-                   tracking_time: float | None = None) -> StateFeedback:
-    """State feedback with integral action, by LQR or from gains designed elsewhere.
+                   tracking_time: float | None = None, method: Literal["lqr", "lmi"] = "lqr",
+                   plants: Sequence[Any] = ()) -> StateFeedback:
+    """State feedback with integral action, by LQR, by a matrix inequality, or from gains designed elsewhere.
 
     Parameters
     ----------
@@ -106,10 +83,18 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
         ż = Ki (r - y).
     tracking_time : float, optional
         Anti-windup [s]; default one over the bandwidth, else ten samples.
+    method : {"lqr", "lmi"}, optional
+        How a bandwidth is turned into gains: for this plant alone, or with the least bound on the same cost that holds
+        for this one and all of `plants`.
+    plants : sequence of control.StateSpace or ColdSide, optional
+        For "lmi": further plants the gain must stabilise, with the same lumps as states and the heats v as first
+        inputs; sampled exactly. `corner_plants` makes those of a constant gain.
 
     Returns
     -------
     StateFeedback
+        With "lmi", `.outcome` tells whether one quadratic norm was found that shrinks for every plant; if not, the
+        gains are the LQR's.
 
     Raises
     ------
@@ -128,20 +113,29 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     h, m, n = positive(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
     if (bandwidth is None) == (gain is None):
         raise InputError("give either bandwidth or gain", where="argument bandwidth", expected="one of the two")
+    if method not in ("lqr", "lmi") or (method == "lmi") != bool(len(plants)) or (method == "lmi" and gain is not None):
+        raise InputError(f"method = {method!r} with {len(plants)} plants{'' if gain is None else ' and a gain'}",
+                         where="arguments method, plants", expected='"lqr" without plants, or "lmi" with a bandwidth '
+                         "and plants to stabilise", remedy="rt.design.corner_plants makes those of a constant gain.")
+    outcome = StateFeedback.outcome
     if bandwidth is not None:
-        K, Ki = _lqr(plant, h, positive(bandwidth, "bandwidth", "rad/s"))
+        w = positive(bandwidth, "bandwidth", "rad/s")
+        K, Ki = _lqr(plant, h, w)
+        if plants:
+            found = robust_gain(plant, plants, h, w, (K, Ki))
+            K, Ki, outcome = found.K, found.integral, found.outcome
         Kr = K @ np.linalg.pinv(plant.C)
     else:
-        K = np.asarray(gain, float)
-        Ki = np.zeros((m, m)) if integral is None else np.asarray(integral, float)
+        K = numbers(gain, "gain")
+        Ki = np.zeros((m, m)) if integral is None else numbers(integral, "integral")
         Kr = np.zeros((m, m))
         if K.shape != (m, n) or Ki.shape != (m, m):
             raise InputError(f"gain has shape {K.shape}, integral {Ki.shape}", where="arguments gain, integral",
                              expected=f"({m}, {n}) for the lumps {', '.join(plant.lumps)}, and ({m}, {m})")
     own = 10 * h if bandwidth is None else max(1 / bandwidth, h)
     tracking = own if tracking_time is None else tracking_time
-    controller = StateFeedback(plant, K, Kr, Ki, positive(tracking, "tracking_time", "s"), h)
-    check_sampling(plant, controller)
+    controller = StateFeedback(plant, K, Kr, Ki, positive(tracking, "tracking_time", "s"), h, outcome)
+    check_sampling(plant, controller, lambda time: replace(controller, sample_time=time))
     return controller
 
 

@@ -5,7 +5,17 @@ from ._arguments import certificate_files as certificate_files
 from ._claims import Certification as Certification
 from ._claims import Checked as Checked
 from ._claims import certify_system as certify_system
+from ._couple import Coupling as Coupling
+from ._couple import couple_subsystems as couple_subsystems
+from ._couple_file import CouplingJob as CouplingJob
+from ._couple_file import read_coupling as read_coupling
+from ._couple_report import write_coupling as write_coupling
 from ._demo import demo_project as demo_project
+from ._design import ControllerDesign as ControllerDesign
+from ._design import design_system as design_system
+from ._design_report import write_design as write_design
+from ._design_request import DesignRequest as DesignRequest
+from ._design_request import design_from_text as design_from_text
 from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
 from ._frequency import design_excitation as design_excitation
@@ -14,13 +24,19 @@ from ._frequency import write_excitation as write_excitation
 from ._job import Comparison as Comparison
 from ._job import JobResult as JobResult
 from ._job import run_job as run_job
+from ._map import MapRequest as MapRequest
+from ._map import map_from_text as map_from_text
+from ._map import map_system as map_system
+from ._map import write_map as write_map
 from ._schema import Boxes as Boxes
 from ._schema import Project as Project
 from ._schema import read_project as read_project
 from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
-__all__ = ["Boxes", "Certification", "Checked", "Comparison", "JobResult", "Project", "boxes_from_text",
-           "certificate_files", "certify_system", "check_free", "demo_project", "design_excitation",
-           "estimate_response", "output_folder", "read_project", "run_job", "write_certify", "write_excitation",
-           "write_job"]
+__all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
+           "DesignRequest", "JobResult", "MapRequest", "Project", "boxes_from_text", "certificate_files",
+           "certify_system", "check_free", "couple_subsystems", "demo_project", "design_excitation",
+           "design_from_text", "design_system", "estimate_response", "map_from_text", "map_system", "output_folder",
+           "read_coupling", "read_project", "run_job", "write_certify", "write_coupling", "write_design",
+           "write_excitation", "write_job", "write_map"]

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..thermal import System
-from ._schema import METHODS, Boxes, in_kelvin, range_in_kelvin
+from ._schema import METHODS, STRUCTURES, Boxes, in_kelvin, range_in_kelvin
 
 
 def boxes_from_text(system: System, *, temperature: tuple[float, float] | None = None, current: Sequence[str] = (),
-                    ambient: Sequence[str] = (), setpoint: Sequence[str] = (), method: str = "energy") -> Boxes:
+                    ambient: Sequence[str] = (), setpoint: Sequence[str] = (), method: str = "energy",
+                    structure: str = "full", large: bool = False) -> Boxes:
     """Boxes from command-line values.
 
     Parameters
@@ -25,7 +26,11 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     setpoint : sequence of str
         ``NAME=VALUE`` [unit of the file].
     method : str
-        "energy", "sum" or "max".
+        "energy", "sum", "max" or "lyapunov".
+    structure : str
+        Method "lyapunov": "full" or "block", as in `rt.certify.contraction`.
+    large : bool
+        Method "lyapunov": search P for more than 40 lumps too.
 
     Returns
     -------
@@ -34,7 +39,7 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     Raises
     ------
     InputError
-        A value that does not read, an unknown method.
+        A value that does not read, an unknown method or structure.
 
     Examples
     --------
@@ -43,7 +48,9 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     {'m1': (0.0, 1.5), 'm2': (0.0, 1.5)}
     """
     if method not in METHODS:
-        raise InputError(f"method is {method!r}", where="--method", expected="energy, sum or max")
+        raise InputError(f"method is {method!r}", where="--method", expected="energy, sum, max or lyapunov")
+    if structure not in STRUCTURES:
+        raise InputError(f"structure is {structure!r}", where="--structure", expected="full or block")
     unit = system.temperature_unit
     default = {name: m.current_limits for name, m in system.modules.items() if m.current_limits is not None}
     currents = {**default, **dict(_range(text, "--current") for text in current)}
@@ -53,7 +60,7 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     return Boxes(temperature=box, current=currents,
                  ambient={name: range_in_kelvin(pair, unit, "--ambient") for name, pair in surroundings.items()},
                  setpoint={name: in_kelvin(value, unit, "--setpoint") for name, value in points.items()},
-                 method=method)
+                 method=method, structure=structure, large=large)
 
 
 def certificate_files(paths: Sequence[Path]) -> list[Path]:

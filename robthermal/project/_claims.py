@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from ..certify import (
     CurrentLimit,
@@ -18,7 +19,7 @@ from ..certify import (
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, Verdict, verify
-from ._schema import DIRECTIONS, METHODS, Boxes
+from ._schema import DIRECTIONS, METHODS, Boxes, Method
 
 
 @dataclass(frozen=True)
@@ -116,18 +117,20 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     current = _currents(system, boxes)
     heat = heater_heat(system) if boxes.heat is None else boxes.heat
     progress("certifying the temperature box")
-    box = contraction(system, current=current, temperature=boxes.temperature, method=boxes.method)
+    norm: dict[str, Any] = {"method": boxes.method, "structure": boxes.structure, "large": boxes.large}
+    box = contraction(system, current=current, temperature=boxes.temperature, **norm)
     progress("certifying that no trajectory leaves its box")
-    safe = runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, method=boxes.method)
+    safe = runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, **norm)
     found = [("contraction", "Contraction in the stated box", box, True),
              ("box", "The box is never left", safe.invariance, True)]
     if safe.contraction is not safe.invariance:
         found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
     limits = []
-    for method in METHODS if system.modules else ():
+    for method in _limit_methods(boxes) if system.modules else ():
         for direction in DIRECTIONS:
             progress(f"searching the largest {direction} current, method {method}")
-            limit = largest_current(system, temperature=boxes.temperature, direction=direction, method=method)
+            limit = largest_current(system, temperature=boxes.temperature, direction=direction,
+                                    **{**norm, "method": method})
             limits.append(limit)
             if limit.certificate.holds:
                 found.append((f"limit_{method}_{direction}", f"Largest {direction} current, method {method}",
@@ -142,6 +145,11 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
                     for key, title, cert, required in found)
     return Certification(system, boxes, checked, tuple(limits), limit_of_load, safe)
+
+
+def _limit_methods(boxes: Boxes) -> tuple[Method, ...]:
+    """Methods whose limits are searched: with a full P, which may take minutes, only where it is asked for."""
+    return METHODS if boxes.method == "lyapunov" else tuple(method for method in METHODS if method != "lyapunov")
 
 
 def _currents(system: System, boxes: Boxes) -> dict[str, tuple[float, float]]:

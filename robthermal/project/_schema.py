@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from ..errors import InputError
 from ..signals import celsius_to_kelvin
 from ..thermal import FitRange, System, fit_in_kelvin, read_system
+from ._toml import Number, Table, read_toml, refusal
 
-_MAX_BYTES = 10_000_000
+_REMEDY = "See the documentation, \"Project file\", or start from the demo's."
 _COLDEST_KELVIN, _HOTTEST_CELSIUS = 150.0, 250.0  # as in system files
-Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 Pair = tuple[Number, Number]
-Method = Literal["energy", "sum", "max"]
+Method = Literal["energy", "sum", "max", "lyapunov"]
+Structure = Literal["full", "block"]
 Direction = Literal["symmetric", "cooling", "heating"]
 Initial = Literal["free", "measured", "system"]
 Loss = Literal["linear", "soft_l1", "huber"]
-METHODS: tuple[Method, ...] = ("energy", "sum", "max")
+METHODS: tuple[Method, ...] = ("energy", "sum", "max", "lyapunov")
+STRUCTURES: tuple[Structure, ...] = ("full", "block")
 DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class ProjectTable(_Table):
+class ProjectTable(Table):
     """[project]: files are relative to the project file."""
 
     name: str
@@ -40,7 +37,7 @@ class ProjectTable(_Table):
     median_filter: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
 
-class CalibrateTable(_Table):
+class CalibrateTable(Table):
     """[calibrate]: what `rt.calibrate` may do."""
 
     initial: Initial = "free"
@@ -48,7 +45,7 @@ class CalibrateTable(_Table):
     parameters: dict[str, dict[str, Number]] = {}
 
 
-class CertifyTable(_Table):
+class CertifyTable(Table):
     """[certify]: the boxes of the claims, temperatures in the unit of the system file."""
 
     temperature: Pair | None = None
@@ -57,9 +54,11 @@ class CertifyTable(_Table):
     heat: dict[str, Pair] | None = None
     setpoint: dict[str, Number] = {}
     method: Method = "energy"
+    structure: Structure = "full"
+    large: bool = False
 
 
-class _File(_Table):
+class _File(Table):
     project: ProjectTable
     calibrate: CalibrateTable = CalibrateTable()
     certify: CertifyTable = CertifyTable()
@@ -79,6 +78,10 @@ class Boxes:
         Regulated cold faces [K].
     method : str
         Norm of the contraction.
+    structure : str
+        Method "lyapunov": "full" or "block" P.
+    large : bool
+        Method "lyapunov": search P for more than 40 lumps too.
     """
 
     temperature: tuple[float, float] = (278.15, 358.15)
@@ -87,6 +90,8 @@ class Boxes:
     heat: dict[str, tuple[float, float]] | None = None
     setpoint: dict[str, float] | None = None
     method: Method = "energy"
+    structure: Structure = "full"
+    large: bool = False
 
 
 @dataclass(frozen=True)
@@ -147,16 +152,7 @@ def read_project(path: str | Path) -> Project:
     'Two-module setup (simulated demo)'
     """
     path = Path(path)
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError("is larger than 10 MB", where=str(path), remedy="Is this the right file?")
-        data = _File(**tomllib.loads(path.read_bytes().decode("utf-8-sig")))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
-    except ValidationError as error:
-        raise _refusal(error, path) from None
+    data = read_toml(path, _File, _REMEDY)
     folder, head = path.parent, data.project
     system_file = _beside(folder, head.system, path)
     system = _with_fit(read_system(system_file), data.calibrate.parameters, path)
@@ -181,7 +177,7 @@ def _with_fit(system: System, ranges: dict[str, dict[str, float]], path: Path) -
         fit = {name: FitRange(**bounds) for name, bounds in fit_in_kelvin(ranges, system.temperature_unit).items()}
         return System(**{**dict(system), "fit": fit})
     except ValidationError as error:
-        raise _refusal(error, path) from None
+        raise refusal(error, path, _REMEDY) from None
     except InputError as error:
         raise InputError(error.what, where=f"{path} [calibrate.parameters] {error.where}", expected=error.expected,
                          remedy=error.remedy) from None
@@ -196,7 +192,7 @@ def _boxes(system: System, table: CertifyTable, path: Path) -> Boxes:
                  current=table.current, heat=table.heat,
                  setpoint={name: in_kelvin(value, unit, f"{where} setpoint.{name}")
                            for name, value in table.setpoint.items()},
-                 method=table.method)
+                 method=table.method, structure=table.structure, large=table.large)
 
 
 def in_kelvin(value: float, unit: str, where: str) -> float:
@@ -213,13 +209,3 @@ def in_kelvin(value: float, unit: str, where: str) -> float:
 def range_in_kelvin(pair: Pair, unit: str, where: str) -> tuple[float, float]:
     """Both ends of a range [K]."""
     return in_kelvin(pair[0], unit, where), in_kelvin(pair[1], unit, where)
-
-
-def _refusal(error: ValidationError, path: Path) -> InputError:
-    faults: list[Any] = error.errors(include_url=False)
-    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
-    place = ".".join(str(word) for word in fault["loc"])
-    what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
-        fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
-    return InputError(what, where=str(path),
-                      remedy="See the documentation, \"Project file\", or start from the demo's.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -70,8 +70,8 @@ def limit_section(result: Certification) -> Section:
                          caption="Largest certified current; the lines are the declared limits and the runaway limit "
                                  "I*.")
     text = ("Every module may have any current in the range, at any time and independently, while all lumps are "
-            f"between {low - _ZERO:.6g} and {high - _ZERO:.6g} °C. The three methods are three norms; any one is a "
-            "proof, so the largest value of a direction may be used.")
+            f"between {low - _ZERO:.6g} and {high - _ZERO:.6g} °C. Every method is a norm; any one is a proof, so "
+            "the largest value of a direction may be used.")
     return Section("Current limits", text, figures=(figure,),
                    tables=(Table(pd.DataFrame(rows), "Certified currents."),), anchor="limits")
 
@@ -108,9 +108,9 @@ def box_section(result: Certification) -> Section | None:
                    tables=(Table(result.safe.table().reset_index(names="lump"), "The box."),), anchor="box")
 
 
-def certificate_section(result: Certification) -> Section:
+def certificate_section(checked: Sequence[Checked]) -> Section:
     """Every certificate with its verdict."""
-    table = pd.DataFrame([_certificate_row(c) for c in result.checked])
+    table = pd.DataFrame([_certificate_row(c) for c in checked])
     text = ("Each file holds every number its claim depends on. robthermal verify re-derives the claim from the file "
             "alone, in ball arithmetic, without any solver.")
     return Section("Certificates", text, tables=(Table(table, "Certificates and their independent check."),),
@@ -132,7 +132,7 @@ def certification_sections(result: Certification) -> Iterator[Section]:
     for section in (runaway_section(result), box_section(result)):
         if section is not None:
             yield section
-    yield certificate_section(result)
+    yield certificate_section(result.checked)
     claims = (f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required)
     yield Section("Exact claims", "\n\n".join(claims), anchor="exact")
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from math import log
 from pathlib import Path
 
 from ..report import Claim, Report, file_hash, versions, write_html, write_json, write_junit
@@ -54,11 +55,11 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     if result.fit is not None:
         sections.append(parameter_section(result.fit))
     sections.extend(certification_sections(result.certification))
-    report = Report(title=project.name, subtitle=_subtitle(result.system), label=project.label,
-                    claims=claims(result.certification), sections=tuple(sections),
-                    provenance=provenance(project.files), assumptions=assumptions(result.system), generated=_now())
+    report = Report(title=project.name, subtitle=subtitle(result.system), label=project.label,
+                    claims=claims(result.system, result.certification.checked), sections=tuple(sections),
+                    provenance=provenance(project.files), assumptions=assumptions(result.system), generated=now())
     with output_folder(out) as folder:
-        write_certification(result.certification, report, folder)
+        write_certification(result.certification.checked, report, folder)
         write_system(result.system, folder / "calibrated.toml")
         if result.fit is not None:
             result.fit.table().to_csv(folder / "parameters.csv", index_label="parameter")
@@ -88,37 +89,37 @@ def write_certify(result: Certification, files: tuple[Path, ...], out: str | Pat
     >>> rt.project.write_certify(done, (), "certified").holds
     True
     """
-    report = Report(title=result.system.name, subtitle=_subtitle(result.system), label="", claims=claims(result),
-                    sections=tuple(certification_sections(result)), provenance=provenance(files),
-                    assumptions=assumptions(result.system), generated=_now())
+    report = Report(title=result.system.name, subtitle=subtitle(result.system), label="",
+                    claims=claims(result.system, result.checked), sections=tuple(certification_sections(result)),
+                    provenance=provenance(files), assumptions=assumptions(result.system), generated=now())
     with output_folder(out) as folder:
-        write_certification(result, report, folder)
+        write_certification(result.checked, report, folder)
     return report
 
 
-def write_certification(result: Certification, report: Report, folder: Path) -> None:
+def write_certification(checked: Sequence[Checked], report: Report, folder: Path) -> None:
     """Certificates, report.html, junit.xml and summary.json into an existing folder.
 
     Parameters
     ----------
-    result : Certification
-        Whose certificates.
+    checked : sequence of Checked
+        Certificates.
     report : Report
         What to show.
     folder : Path
         Where.
     """
     (folder / "certificates").mkdir()
-    for checked in result.checked:
-        checked.certificate.save(folder / "certificates" / f"{checked.key}.json")
+    for one in checked:
+        one.certificate.save(folder / "certificates" / f"{one.key}.json")
     write_html(report, folder / "report.html")
     write_junit(report, folder / "junit.xml")
     write_json(report, folder / "summary.json")
 
 
-def claims(result: Certification) -> tuple[Claim, ...]:
-    """Required claims of a certification, for the first screen; the others are in the table of certificates."""
-    return tuple(_claim(checked, result) for checked in result.checked if checked.required)
+def claims(system: System, checked: Sequence[Checked]) -> tuple[Claim, ...]:
+    """Required claims, for the first screen; the others are in the table of certificates."""
+    return tuple(_claim(one, system) for one in checked if one.required)
 
 
 def provenance(files: tuple[Path, ...]) -> Mapping[str, str]:
@@ -126,13 +127,13 @@ def provenance(files: tuple[Path, ...]) -> Mapping[str, str]:
     return {**versions(), **{f"SHA-256 of {file.name}": file_hash(file) for file in files}}
 
 
-def _claim(checked: Checked, result: Certification) -> Claim:
+def _claim(checked: Checked, system: System) -> Claim:
     cert, verdict = checked.certificate, checked.verdict
     margins = verdict.margins if verdict else {}
     reason = cert.reason if not cert.holds else ("" if checked.good else verdict.reason if verdict else "not verified")
-    sentences = _SENTENCES if result.system.modules else _SENTENCES | _WITHOUT_MODULES
+    sentences = _SENTENCES if system.modules else _SENTENCES | _WITHOUT_MODULES
     return Claim(title=checked.title, sentence=sentences[checked.key], holds=cert.holds, verified=checked.good,
-                 box=_box(result, checked), margin=_margin(checked, margins),
+                 box=_box(checked), margin=_margin(checked, margins),
                  how=_HOW.get(cert.kind, cert.kind), reason=reason,
                  file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
 
@@ -144,6 +145,10 @@ _SENTENCES = {  # the exact sentences, with all numbers, are in the section "Exa
            "ambients do within theirs.",
     "box_contraction": "Inside those ranges any two temperature histories approach each other too: together with the "
                        "claim before, the machine cannot run away thermally from there.",
+    "observer": "For every temperature, estimate and current in the box the error of the observer shrinks from sample "
+                "to sample, however the currents change.",
+    "map": "For every lump temperature in the box and every current up to the largest of the map, any two temperature "
+           "histories approach each other: no thermal runaway inside this box.",
 }
 _WITHOUT_MODULES = {
     "contraction": "For every lump temperature in the box any two temperature histories under the same heats approach "
@@ -154,10 +159,11 @@ _WITHOUT_MODULES = {
 _HOW = {
     "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
     "invariance": "On every face of the box the heat flows inwards (Nagumo); re-derived in ball arithmetic.",
+    "observer": "One norm in which the sampled error shrinks everywhere in the box; re-derived in ball arithmetic.",
 }
 
 
-def _box(result: Certification, checked: Checked) -> str:
+def _box(checked: Checked) -> str:
     currents = checked.certificate.region.get("current", {})
     parts = [f"{name}: {float(low):g} to {float(high):g} A" for name, (low, high) in currents.items()]
     box = checked.certificate.region.get("temperature")
@@ -176,6 +182,10 @@ def _box(result: Certification, checked: Checked) -> str:
 def _margin(checked: Checked, margins: Mapping[str, float]) -> str:
     if not checked.good:
         return "none"
+    if checked.certificate.kind == "observer":
+        factor = float(checked.certificate.evidence["contraction"])
+        tau = -float(checked.certificate.region["sample_time"]) / log(factor)
+        return f"errors die out with a time constant of at most {tau:.4g} s (factor {factor:.6g} per sample)"
     if checked.certificate.kind == "contraction":
         rate = float(checked.certificate.evidence["rate"])
         return f"differences die out with a time constant of at most {1 / rate:.4g} s (rate {rate:.4g} 1/s)"
@@ -183,11 +193,13 @@ def _margin(checked: Checked, margins: Mapping[str, float]) -> str:
                      for key, value in margins.items())
 
 
-def _subtitle(system: System) -> str:
+def subtitle(system: System) -> str:
+    """What a machine consists of."""
     counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
               "sensor": len(system.sensors)}
     return f"{system.name}: " + ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
 
 
-def _now() -> str:
+def now() -> str:
+    """Date and time for the report."""
     return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

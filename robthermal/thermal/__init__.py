@@ -3,6 +3,10 @@
 from ._datasheet import DatasheetFit as DatasheetFit
 from ._datasheet import ModuleParameters as ModuleParameters
 from ._datasheet import module_from_datasheet as module_from_datasheet
+from ._effects import AddedEffect as AddedEffect
+from ._effects import EffectKind as EffectKind
+from ._effects import add_effect as add_effect
+from ._effects import effects as effects
 from ._equations import Equations as Equations
 from ._file import fit_in_kelvin as fit_in_kelvin
 from ._file import format_system as format_system
@@ -20,14 +24,21 @@ from ._matrices import MatrixImport as MatrixImport
 from ._matrices import system_from_matrices as system_from_matrices
 from ._matrix_files import read_matrices as read_matrices
 from ._parts import Ambient as Ambient
+from ._parts import Condensation as Condensation
+from ._parts import Drive as Drive
+from ._parts import Feedthrough as Feedthrough
 from ._parts import FitRange as FitRange
+from ._parts import Hysteresis as Hysteresis
 from ._parts import Input as Input
+from ._parts import Lead as Lead
 from ._parts import Linear as Linear
 from ._parts import Link as Link
 from ._parts import Lump as Lump
 from ._parts import Module as Module
 from ._parts import Natural as Natural
+from ._parts import Periodic as Periodic
 from ._parts import Sensor as Sensor
+from ._parts import Step as Step
 from ._polynomials import PolynomialFit as PolynomialFit
 from ._polynomials import Polynomials as Polynomials
 from ._polynomials import module_from_polynomials as module_from_polynomials
@@ -46,9 +57,11 @@ from ._steady import steady_state as steady_state
 from ._stepping import Stepper as Stepper
 from ._system import System as System
 
-__all__ = ["Ambient", "Assembly", "Contact", "DatasheetFit", "Equations", "Equilibrium", "FitRange", "Input", "Layer",
-           "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
-           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Stepper", "System", "Trajectory",
-           "fit_in_kelvin", "fold", "format_system", "hinf_error", "linearize", "load_curve", "materials",
-           "module_from_datasheet", "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce",
-           "simulate", "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_system"]
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
+           "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
+           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
+           "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
+           "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_system", "hinf_error",
+           "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials", "parse_system",
+           "read_matrices", "read_system", "reduce", "simulate", "steady_state", "system_from_matrices",
+           "time_constants", "trajectory", "write_system"]

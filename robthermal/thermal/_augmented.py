@@ -1,39 +1,34 @@
-"""The linear part of a system with its sensors' lags and its energy meters, and the ports where nonlinear heat enters.
-
-State z = [lumps, lagged sensor temperatures, heat received from every ambient, electrical energy of every module].
-The last two groups feed nothing back: they integrate energies, so that the balance of a simulation can be checked.
-"""
+"""The linear part of a simulation: lumps, lags, memories, periodic loads and energy meters, and its derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._equations import Equations
+from ._layout import Layout
+from ._parameter_heat import AFFINE, unit_change
 from ._parameters import locate
-from ._terms import Array, ModuleTerm, Term
-
-LINEAR_FIELDS = {("lumps", "capacity"), ("links", "conductance"), ("modules", "conductance.value"), ("inputs", "gain"),
-                 ("sensors", "time_constant")}
+from ._ports import PortHeat
+from ._terms import Array
 
 
 @dataclass(frozen=True)
 class Augmented:
-    """ż = F z + B u + N q, q the nonlinear heats at the ports.
+    """ż = F z + B w + N q, q the nonlinear heats by target.
 
     Parameters
     ----------
     F : ndarray, shape (n_z, n_z)
         [1/s].
-    B : ndarray, shape (n_z, n_u)
-        Held inputs.
+    B : ndarray, shape (n_z, n_w)
+        Held drives.
     N : ndarray, shape (n_z, n_q)
-        Heat of every term into its first ends, then into its second ends, term by term [K/J].
+        Heat of every target [K/J].
     ports : ndarray of int
-        States whose temperature the terms need.
+        States that the terms need.
     """
 
     F: Array
@@ -42,117 +37,92 @@ class Augmented:
     ports: NDArray[np.intp]
 
 
-def lagged(eq: Equations) -> list[str]:
-    """Sensors with a lag: each has a state of its own."""
-    return [name for name, sensor in eq.system.sensors.items() if sensor.time_constant > 0]
-
-
 def augment(eq: Equations) -> Augmented:
     """Assemble the augmented linear part (dense: for systems of up to a few hundred lumps)."""
-    system, n = eq.system, len(eq.system.lumps)
-    lags, na, m = lagged(eq), len(system.ambients), len(system.modules)
-    nz, nu = n + len(lags) + na + m, len(system.exogenous_names)
-    F, B = np.zeros((nz, nz)), np.zeros((nz, nu))
+    layout, n = Layout(eq), len(eq.system.lumps)
+    heat, nz = PortHeat.of(eq, layout), layout.size
+    F, D = np.zeros((nz, nz)), np.zeros((nz, eq.drives.width))
     F[:n, :n] = eq.A.toarray() / eq.capacity[:, None]
-    B[:n] = eq.B.toarray() / eq.capacity[:, None]
-    for row, name in enumerate(lags, start=n):
-        sensor = system.sensors[name]
-        F[row, row] = -1 / sensor.time_constant
-        F[row, system.lump_names.index(sensor.lump)] = 1 / sensor.time_constant
-    ambient_rows = slice(n + len(lags), n + len(lags) + na)
-    conductance = eq.B[:, nu - na:].toarray()
-    F[ambient_rows, :n] = -conductance.T
-    B[ambient_rows, nu - na:] = np.diag(conductance.sum(axis=0))
-    return Augmented(F, B, _port_heat(eq, nz, n + len(lags)), port_lumps(eq))
+    D[:n] = eq.D.toarray() / eq.capacity[:, None]
+    _sensors(eq, layout, F)
+    _meters(eq, layout, F, D)
+    _memories(eq, layout, F, D)
+    _periodic(eq, layout, F)
+    for column, state in layout.drives.items():  # what a lagged drive heats, its state heats
+        tau = eq.drives.of[column].time_constant
+        F[:, state] += D[:, column]
+        D[:, column] = 0.0
+        F[state, state], D[state, column] = -1 / tau, 1 / tau
+    return Augmented(F, D, heat.N, heat.ports)
 
 
-def port_lumps(eq: Equations) -> NDArray[np.intp]:
-    """Lumps that a nonlinear term touches."""
-    ends = [end for term in eq.terms for end in (term.a, term.b)]
-    nodes = np.unique(np.concatenate(ends)) if ends else np.zeros(0, np.intp)
-    return nodes[nodes < len(eq.system.lumps)]
+def _sensors(eq: Equations, layout: Layout, F: Array) -> None:
+    for name, state in layout.sensors.items():
+        sensor = eq.system.sensors[name]
+        F[state, state] = -1 / sensor.time_constant
+        F[state, eq.index[sensor.lump]] = 1 / sensor.time_constant
 
 
-def _port_heat(eq: Equations, nz: int, first_meter: int) -> Array:
-    n, na = len(eq.system.lumps), len(eq.system.ambients)
-    N, column = np.zeros((nz, sum(2 * len(term.a) for term in eq.terms))), 0
-    for term in eq.terms:
-        for nodes in (term.a, term.b):
-            for pair, node in enumerate(nodes):
-                if node < n:
-                    N[node, column] = 1 / eq.capacity[node]
-                else:  # heat into the ambient: the lumps received as much less
-                    N[first_meter + node - n, column] = -1.0
-                if isinstance(term, ModuleTerm):
-                    N[first_meter + na + pair, column] = 1.0
-                column += 1
-    return N
+def _meters(eq: Equations, layout: Layout, F: Array, D: Array) -> None:
+    n, ambients = len(eq.capacity), eq.drives.ambients
+    conductance = eq.D[:, ambients].toarray()
+    F[layout.ambient_meters, :n] = -conductance.T
+    D[layout.ambient_meters, ambients] = np.diag(conductance.sum(axis=0))
+    D[layout.ambient_meters, eq.drives.one] = conductance.T @ eq.gradient
+    for i, heater in enumerate(eq.system.inputs.values()):
+        D[layout.heater_meters.start + i, i] = heater.gain
+    own = sum(lump.heat for lump in eq.system.lumps.values())
+    D[layout.source_meter, eq.drives.one] = own + sum(sensor.self_heating for sensor in eq.system.sensors.values())
+
+
+def _memories(eq: Equations, layout: Layout, F: Array, D: Array) -> None:
+    for name, state in layout.memories.items():
+        module = eq.system.modules[name]
+        if module.hysteresis is not None:
+            tau, heat, cold = module.hysteresis.time_constant, module.hysteresis.heat, eq.index[module.cold]
+            F[state, state], D[state, eq.drives.signs[name]] = -1 / tau, 1 / tau
+            F[cold, state] += heat / eq.capacity[cold]
+            F[layout.source_meter, state] += heat
+
+
+def _periodic(eq: Equations, layout: Layout, F: Array) -> None:
+    for name, sine in layout.periodic.items():
+        load, lump = eq.system.lumps[name].periodic, eq.index[name]
+        if load is not None:
+            F[sine, sine + 1], F[sine + 1, sine] = 2 * np.pi / load.period, -2 * np.pi / load.period
+            F[lump, sine] += load.heat / eq.capacity[lump]
+            F[layout.source_meter, sine] += load.heat
 
 
 def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
     """Derivative of F, B and N with respect to a parameter of the linear part; None when it has no part in it."""
     table, part, field = locate(eq.system, name)
-    if (table, field) not in LINEAR_FIELDS:
-        return None
-    if table == "lumps":
-        row = eq.system.lump_names.index(part)
-        return _row_scaled(parts, row, -1 / eq.capacity[row])
-    if table == "sensors":
-        if part not in lagged(eq):
-            return None
-        row = len(eq.system.lumps) + lagged(eq).index(part)
-        return _row_scaled(parts, row, -1 / eq.system.sensors[part].time_constant)
-    value = eq.system.parameter(name)  # conductances and gains enter linearly: a difference is exact
-    other = augment(Equations(eq.system.with_parameters({name: value + 1.0})))
-    return Augmented(other.F - parts.F, other.B - parts.B, other.N - parts.N, parts.ports)
+    if (table, field) in AFFINE:  # a difference is exact
+        changed, step = unit_change(eq.system, name)
+        other = augment(Equations(changed))
+        return Augmented(*((new - old) / step for new, old in ((other.F, parts.F), (other.B, parts.B),
+                                                               (other.N, parts.N))), parts.ports)
+    rows = _rows_of_scale(eq, table, part, field)
+    return _rows_scaled(parts, rows, -1 / eq.system.parameter(name)) if rows else None
 
 
-def _row_scaled(parts: Augmented, row: int, factor: float) -> Augmented:
+def _rows_of_scale(eq: Equations, table: str, part: str, field: str) -> list[int]:
+    """Rows that are inversely proportional to a capacity, a time constant or a period."""
+    layout = Layout(eq)
+    if (table, field) == ("lumps", "capacity"):
+        return [eq.index[part]]
+    if (table, field) == ("lumps", "periodic.period"):
+        return [layout.periodic[part], layout.periodic[part] + 1]
+    if (table, field) == ("modules", "hysteresis.time_constant"):
+        return [layout.memories[part]]
+    if (table, field) == ("sensors", "time_constant") and part in layout.sensors:
+        return [layout.sensors[part]]
+    if field == "drive.time_constant" and eq.drives.column[part] in layout.drives:
+        return [layout.drives[eq.drives.column[part]]]
+    return []
+
+
+def _rows_scaled(parts: Augmented, rows: list[int], factor: float) -> Augmented:
     F, B, N = (np.zeros_like(a) for a in (parts.F, parts.B, parts.N))
-    F[row], B[row], N[row] = factor * parts.F[row], factor * parts.B[row], factor * parts.N[row]
+    F[rows], B[rows], N[rows] = factor * parts.F[rows], factor * parts.B[rows], factor * parts.N[rows]
     return Augmented(F, B, N, parts.ports)
-
-
-@dataclass(frozen=True)
-class PortHeat:
-    """Evaluates all terms on temperatures of the ports, with columns renumbered to [ports, ambients]."""
-
-    terms: tuple[Term, ...]
-    columns: tuple[tuple[NDArray[np.intp], NDArray[np.intp]], ...]
-    is_module: tuple[bool, ...]
-
-    @classmethod
-    def of(cls, eq: Equations, ports: NDArray[np.intp]) -> PortHeat:
-        """Renumber the ends of the terms of a system."""
-        n = len(eq.system.lumps)
-        column = np.full(n + len(eq.system.ambients), -1, np.intp)
-        column[ports] = np.arange(ports.size)
-        column[n:] = ports.size + np.arange(len(eq.system.ambients))
-        return cls(eq.terms, tuple((column[t.a], column[t.b]) for t in eq.terms),
-                   tuple(isinstance(t, ModuleTerm) for t in eq.terms))
-
-    def __call__(self, T: Array, current: Array) -> Array:
-        """Heats (..., n_q) at temperatures T (..., n_ports + n_ambients)."""
-        flows: list[Array] = []
-        for term, (a, b), module in zip(self.terms, self.columns, self.is_module, strict=True):
-            flows.extend(term.heat(T[..., a], T[..., b], current if module else current[..., :0]))
-        return np.concatenate(flows, axis=-1) if flows else np.zeros((*T.shape[:-1], 0))
-
-    def slopes(self, T: Array, current: Array) -> Array:
-        """Derivative (..., n_q, n_ports + n_ambients) of the heats with respect to T."""
-        total = sum(2 * len(t.a) for t in self.terms)
-        out, row = np.zeros((*T.shape[:-1], total, T.shape[-1])), 0
-        for term, (a, b), module in zip(self.terms, self.columns, self.is_module, strict=True):
-            s = term.slopes(T[..., a], T[..., b], current if module else current[..., :0])
-            for to_a, to_b in ((s.aa, s.ab), (s.ba, s.bb)):
-                rows = row + np.arange(len(a))
-                out[..., rows, a] += to_a
-                out[..., rows, b] += to_b
-                row += len(a)
-        return out
-
-
-def used_parameters(eq: Equations, names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Split parameter names into those of the linear part and the others."""
-    linear = [name for name in names if locate(eq.system, name)[::2] in LINEAR_FIELDS]
-    return linear, [name for name in names if name not in linear]

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
 from ..signals import Record
-from ._augmented import lagged
 from ._checks import by_lump
 from ._equations import Equations
+from ._layout import Layout
+from ._schedule import Schedule
 from ._terms import Array
 from ._units import LOWEST_KELVIN
 
@@ -48,23 +49,61 @@ def _no_celsius(eq: Equations, u: Array) -> None:
                              expected="kelvin inside a Record", remedy="Add 273.15, or read the file with its unit.")
 
 
-def start_state(eq: Equations, record: Record, initial: Initial, nz: int) -> Array:
+def start_state(eq: Equations, record: Record, initial: Initial, plan: Schedule) -> Array:
     """Augmented state at the first sample; see `Lump.initial` for the default."""
-    lumps = _given(eq, initial)
-    if lumps is None:
-        lumps = _default(eq, record)
-    z = np.zeros(nz)
-    z[:len(lumps)] = lumps
-    for row, name in enumerate(lagged(eq) if nz > len(lumps) else [], start=len(lumps)):
-        z[row] = lumps[eq.system.lump_names.index(eq.system.sensors[name].lump)]
+    layout = Layout(eq)
+    z = np.zeros(layout.size)
+    z[:len(eq.capacity)] = start_lumps(eq, record, initial)
+    settle(eq, layout, z, plan.w[0], record.start_time)
     return z
 
 
-def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence[str], nz: int) -> Array:
+def start_lumps(eq: Equations, record: Record, initial: Initial) -> Array:
+    """Temperatures of the lumps at the first sample."""
+    lumps = _given(eq, initial)
+    return _default(eq, record) if lumps is None else lumps
+
+
+def settle(eq: Equations, layout: Layout, z: Array, w: Array, time: float) -> None:
+    """States beside the lumps at the start: lags settled, no memory of the polarity, periodic loads by the clock."""
+    for name, state in layout.sensors.items():
+        z[state] = z[eq.index[eq.system.sensors[name].lump]]
+    for column, state in layout.drives.items():
+        z[state] = w[column]
+    for name, sine in layout.periodic.items():
+        angle = _angle(eq, name, time)
+        z[sine], z[sine + 1] = np.sin(angle), np.cos(angle)
+
+
+def _angle(eq: Equations, lump: str, time: float) -> float:
+    load = eq.system.lumps[lump].periodic
+    return 0.0 if load is None else 2 * np.pi * time / load.period + load.phase
+
+
+def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence[str],
+                held: Mapping[str, Array]) -> Array:
     """Derivative of `start_state` with respect to named parameters, (n_z, n_parameters)."""
-    n, out = len(eq.system.lumps), np.zeros((nz, len(names)))
-    if initial is not None:
-        return out
+    layout = Layout(eq)
+    out = np.zeros((layout.size, len(names)))
+    if initial is None:
+        _lumps_slope(eq, record, names, out)
+    for column, name in enumerate(names):
+        for sensor, row in layout.sensors.items():
+            out[row, column] = out[eq.index[eq.system.sensors[sensor].lump], column]
+        for drive, row in layout.drives.items():
+            out[row, column] = held[name][0, drive] if name in held else 0.0
+        for lump, sine in layout.periodic.items():
+            load, angle = eq.system.lumps[lump].periodic, _angle(eq, lump, record.start_time)
+            turn = 0.0
+            if name == f"lumps.{lump}.periodic.phase":
+                turn = 1.0
+            elif name == f"lumps.{lump}.periodic.period" and load is not None:
+                turn = -2 * np.pi * record.start_time / load.period**2
+            out[sine, column], out[sine + 1, column] = turn * np.cos(angle), -turn * np.sin(angle)
+    return out
+
+
+def _lumps_slope(eq: Equations, record: Record, names: Sequence[str], out: Array) -> None:
     first = eq.system.ambient_names[0]
     from_ambient = first not in record.input_names and not _measured(eq, record)
     for column, name in enumerate(names):
@@ -72,18 +111,21 @@ def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence
             own = name == f"lumps.{lump}.initial" and part.initial is not None
             shared = name == f"ambients.{first}.temperature" and part.initial is None and from_ambient
             out[i, column] = float(own or shared)
-        for row, sensor in enumerate(lagged(eq), start=n):
-            out[row, column] = out[eq.system.lump_names.index(eq.system.sensors[sensor].lump), column]
-    return out
 
 
-def held_slope(eq: Equations, record: Record, names: Sequence[str]) -> Array:
-    """Derivative of the held inputs: one for an ambient temperature that the record lacks, (n_u, n_parameters)."""
-    out = np.zeros((len(eq.system.exogenous_names), len(names)))
-    for row, ambient in enumerate(eq.system.exogenous_names):
-        if ambient in eq.system.ambients and ambient not in record.input_names:
-            out[row] = [float(name == f"ambients.{ambient}.temperature") for name in names]
-    return out
+def held_slopes(eq: Equations, record: Record, names: Sequence[str], plan: Schedule) -> dict[str, Array]:
+    """Derivative (n_segments, n_w) of the drives with respect to each parameter that acts on them."""
+    found: dict[str, Array] = {}
+    for name in names:
+        dw = eq.drives.parameter(name, plan.u)
+        if dw is not None:
+            found[name] = dw
+    for ambient in eq.system.ambients:  # an ambient that the record lacks is a parameter
+        name = f"ambients.{ambient}.temperature"
+        if name in names and ambient not in record.input_names:
+            found[name] = np.zeros(plan.w.shape)
+            found[name][:, eq.drives.column[ambient]] = 1.0
+    return found
 
 
 def _given(eq: Equations, initial: Initial) -> NDArray[np.float64] | None:

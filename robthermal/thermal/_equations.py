@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
-from ._parameters import locate
-from ._terms import Array, ModuleTerm, NaturalTerm, RadiationTerm, Term
+from ._assembly_terms import terms_of
+from ._drives import Drives
+from ._parameter_heat import add_to_lumps, parameter_heat
+from ._terms import Array, Indices, Term
 
 if TYPE_CHECKING:
     from ._system import System
@@ -22,8 +23,9 @@ if TYPE_CHECKING:
 class Equations:
     """Equations of a thermal system.
 
-    E ẋ = A x + B u + Σ heat of the nonlinear terms, with u the heaters, module currents and ambients in the order of
-    `System.exogenous_names`. A holds the linear links and the modules' conductance at their reference temperature.
+    E ẋ = A x + D w + Σ heat of the nonlinear terms. u are the heaters, module currents and ambients as in a record, in the
+    order of `System.exogenous_names`; w = drives(u) is what heaters and amplifiers make of them, and a 1 for constant
+    heats. A holds the linear links and the modules' conductance at their reference temperature.
 
     Parameters
     ----------
@@ -38,6 +40,8 @@ class Equations:
         Linear network [W/K].
     B : csr_array, shape (n, n_u)
         Heaters [W/unit] and ambients [W/K]; the columns of the currents are empty.
+    D : csr_array, shape (n, n_w)
+        B, constant heats [W], and no more.
 
     Examples
     --------
@@ -51,9 +55,14 @@ class Equations:
     system: System
 
     @cached_property
-    def _index(self) -> dict[str, int]:
+    def index(self) -> dict[str, int]:
         """Node numbers: lumps first, then ambients."""
         return {name: i for i, name in enumerate((*self.system.lumps, *self.system.ambients))}
+
+    @cached_property
+    def drives(self) -> Drives:
+        """What heaters and amplifiers make of u."""
+        return Drives(self.system)
 
     @cached_property
     def capacity(self) -> NDArray[np.float64]:
@@ -63,7 +72,7 @@ class Equations:
     @cached_property
     def _network(self) -> csr_array:
         """Linear heat into the lumps from every node, (n, n + n_ambients) [W/K]."""
-        i = self._index
+        i = self.index
         ends = [(i[link.between[0]], i[link.between[1]], link.conductance) for link in self.system.links]
         ends += [(i[m.hot], i[m.cold], m.conductance.value) for m in self.system.modules.values()]
         a, b, g = (np.array(column) for column in zip(*ends, strict=True)) if ends else (np.zeros(0),) * 3
@@ -81,42 +90,48 @@ class Equations:
     @cached_property
     def B(self) -> csr_array:
         """Heat per unit of every heater [W/unit] and ambient [W/K], (n, n_u)."""
-        n, i = len(self.system.lumps), self._index
-        heaters = list(self.system.inputs.values())
-        rows = [i[h.lump] for h in heaters]
-        own = coo_array(([h.gain for h in heaters], (rows, range(len(heaters)))),
-                        shape=(n, len(heaters) + len(self.system.modules))).tocsc()
-        return csr_array(coo_array(_beside(own, self._network[:, n:])))
+        return csr_array(self.D[:, : self.drives.n_u])
+
+    @cached_property
+    def gradient(self) -> NDArray[np.float64]:
+        """By how much every lump sees its ambients warmer than they are [K], (n,)."""
+        return np.array([lump.gradient for lump in self.system.lumps.values()])
+
+    @cached_property
+    def D(self) -> csr_array:
+        """Heat per unit of every column of w (`drives`), (n, n_w), without the memory of a hysteresis."""
+        n, i, to_ambients = len(self.system.lumps), self.index, coo_array(self._network[:, len(self.system.lumps):])
+        entries = [(i[h.lump], column, h.gain * (1 - (h.feedthrough.share if h.feedthrough else 0.0)))
+                   for column, h in enumerate(self.system.inputs.values())]
+        entries += [(i[h.feedthrough.lump], column, h.gain * h.feedthrough.share)
+                    for column, h in enumerate(self.system.inputs.values()) if h.feedthrough]
+        one = self.drives.one
+        entries += [(i[name], one, lump.heat) for name, lump in self.system.lumps.items() if lump.heat]
+        entries += [(i[s.lump], one, s.self_heating) for s in self.system.sensors.values() if s.self_heating]
+        warm = self._network[:, n:].sum(axis=1) * self.gradient
+        entries += [(int(k), one, warm[k]) for k in np.flatnonzero(warm)]
+        rows, columns, values = zip(*entries, strict=True) if entries else ((), (), ())
+        return csr_array(coo_array(
+            (np.concatenate([np.array(values, float), to_ambients.data]),
+             (np.concatenate([np.array(rows, np.intp), to_ambients.row]),
+              np.concatenate([np.array(columns, np.intp), to_ambients.col + self.drives.ambients.start]))),
+            shape=(n, self.drives.width)))
+
+    @cached_property
+    def settled(self) -> csr_array:
+        """`D` with the memory of every hysteresis at rest at the sign of the present current."""
+        if not self.drives.signs:
+            return self.D
+        found = self.D.tolil()
+        for name, column in self.drives.signs.items():
+            module = self.system.modules[name]
+            found[self.index[module.cold], column] = module.hysteresis.heat if module.hysteresis else 0.0
+        return csr_array(found)
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Nonlinear terms that are present."""
-        found: list[Term] = []
-        if self.system.modules:
-            found.append(self._modules())
-        natural = [link for link in self.system.links if link.natural is not None]
-        if natural:
-            a, b = self._ends(natural)
-            found.append(NaturalTerm(a, b, np.array([link.natural.gain for link in natural if link.natural]),
-                                     np.array([link.natural.exponent for link in natural if link.natural])))
-        radiating = [link for link in self.system.links if link.radiation is not None]
-        if radiating:
-            found.append(RadiationTerm(*self._ends(radiating), np.array([link.radiation for link in radiating], float)))
-        return tuple(found)
-
-    def _ends(self, links: Sequence) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        i = self._index
-        return (np.array([i[link.between[0]] for link in links], np.intp),
-                np.array([i[link.between[1]] for link in links], np.intp))
-
-    def _modules(self) -> ModuleTerm:
-        i, modules = self._index, list(self.system.modules.values())
-        return ModuleTerm(
-            a=np.array([i[m.hot] for m in modules], np.intp), b=np.array([i[m.cold] for m in modules], np.intp),
-            S=np.array([m.seebeck.value for m in modules]), S_slope=np.array([m.seebeck.slope for m in modules]),
-            R=np.array([m.resistance.value for m in modules]), R_slope=np.array([m.resistance.slope for m in modules]),
-            K_slope=np.array([m.conductance.slope for m in modules]),
-            T_ref=np.array([m.reference_temperature for m in modules]))
+        return terms_of(self.system, self.index, self.drives)
 
     def nominal(self) -> NDArray[np.float64]:
         """Exogenous vector u with heaters and currents off and ambients at their nominal temperature."""
@@ -129,7 +144,7 @@ class Equations:
         return np.array([first if lump.initial is None else lump.initial for lump in self.system.lumps.values()])
 
     def ends(self, term: Term, x: Array, u: Array) -> tuple[Array, Array, Array]:
-        """Temperatures at both ends of every pair of a term, and the current through it.
+        """Temperatures at both ends of every pair of a term, and what drives it.
 
         Parameters
         ----------
@@ -141,35 +156,51 @@ class Equations:
         Returns
         -------
         tuple of ndarray
-            Temperatures at the ends a and b [K], shape (..., n_terms), and the currents [A]; none if the term is not
-            the modules'.
+            Temperatures at the ends a and b [K], shape (..., n_pairs), and the drives [A or unit]; none for links.
         """
-        nodes = np.concatenate([x, u[..., u.shape[-1] - len(self.system.ambients):]], axis=-1)
-        first = len(self.system.inputs)
-        current = u[..., first: first + len(self.system.modules)]
-        return nodes[..., term.a], nodes[..., term.b], current if isinstance(term, ModuleTerm) else current[..., :0]
+        return self.driven(term, x, self.drives(u))
+
+    def driven(self, term: Term, x: Array, w: Array) -> tuple[Array, Array, Array]:
+        """As `ends`, from the columns w of `drives`.
+
+        Parameters
+        ----------
+        term : Term
+            One of `terms`.
+        x, w : ndarray
+            Temperatures [K] and drives.
+
+        Returns
+        -------
+        tuple of ndarray
+        """
+        nodes = np.concatenate([x, w[..., self.drives.ambients]], axis=-1)
+        return nodes[..., term.a], nodes[..., term.b], w[..., term.drive]
 
     def heat(self, x: ArrayLike, u: ArrayLike) -> Array:
         """Net heat into every lump, f(x, u).
+
+        What has a memory is taken at rest: delays and lags are over, a hysteresis remembers the present sign, periodic
+        loads are at their mean, 0, and conductance steps have not happened yet.
 
         Parameters
         ----------
         x : array_like, shape (..., n)
             Temperatures [K].
         u : array_like, shape (..., n_u)
-            Exogenous values [unit, A, K].
+            Exogenous values, as in a record [unit, A, K].
 
         Returns
         -------
         ndarray, shape (..., n)
             [W].
         """
-        x, u = np.asarray(x), np.asarray(u)
-        total = (self.A @ x.T + self.B @ u.T).T.astype(np.result_type(x, u, float))
+        x, w = np.asarray(x), self.drives(np.asarray(u))
+        total = (self.A @ x.T + self.settled @ w.T).T.astype(np.result_type(x, w, float))
         for term in self.terms:
-            into_a, into_b = term.heat(*self.ends(term, x, u))
+            into_a, into_b = term.heat(*self.driven(term, x, w))
             for nodes, flow in ((term.a, into_a), (term.b, into_b)):
-                _add_to_lumps(total, nodes, flow)
+                add_to_lumps(total, nodes, flow)
         return total
 
     def jacobian(self, x: ArrayLike, u: ArrayLike) -> csr_array:
@@ -191,7 +222,7 @@ class Equations:
         n, parts = len(self.system.lumps), [self.A]
         for term in self.terms:
             s = term.slopes(*self.ends(term, x, u))
-            parts.append(_square(n, (term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
+            parts.append(_matrix((n, n), (term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
                                  (term.b, term.b, s.bb)))
         return csr_array(sum(parts[1:], start=parts[0]))
 
@@ -209,20 +240,16 @@ class Equations:
             [W/unit, W/A, W/K].
         """
         x, u = np.asarray(x), np.asarray(u)
-        n, nu = len(self.system.lumps), u.size
-        first = len(self.system.inputs)
-        parts = [self.B]
+        n, parts = len(self.system.lumps), [self.B]
+        to_column = self.drives.ambients.start - n  # from the node of an ambient to its column of u
         for term in self.terms:
             s = term.slopes(*self.ends(term, x, u))
-            entries = [(term.a, term.b + first + len(self.system.modules) - n, s.ab),
-                       (term.b, term.a + first + len(self.system.modules) - n, s.ba)]
-            keep = [(row, col, val, (col >= first + len(self.system.modules)) & (row < n)) for row, col, val in entries]
-            if isinstance(term, ModuleTerm):
-                every, columns = np.ones(len(term.a), bool), first + np.arange(len(term.a))
-                keep += [(term.a, columns, s.a_current, every), (term.b, columns, s.b_current, every)]
-            rows, cols, values = (np.concatenate([e[k][e[3]] for e in keep]) for k in range(3))
-            parts.append(csr_array(coo_array((values, (rows, cols)), shape=(n, nu))))
-        return csr_array(sum(parts[1:], start=parts[0]))
+            entries = [(own[other >= n], other[other >= n] + to_column, slope[other >= n])
+                       for own, other, slope in ((term.a, term.b, s.ab), (term.b, term.a, s.ba))]
+            if term.drive.size:
+                entries += [(term.a, term.drive, s.a_drive), (term.b, term.drive, s.b_drive)]
+            parts.append(_matrix(self.B.shape, *entries))
+        return csr_array(sum(parts[1:], start=parts[0]) @ diags_array(self.drives.slopes(u)))
 
     def rate(self, x: ArrayLike, u: ArrayLike) -> Array:
         """ẋ = E⁻¹ f(x, u).
@@ -255,76 +282,11 @@ class Equations:
             Lump index and heat per unit of the parameter, shape of the leading axes of x. Empty for what does not act
             on the lumps (sensors, initial temperatures).
         """
-        x, u = np.asarray(x), np.asarray(u)
-        table, part, field = locate(self.system, name)
-        if table == "lumps":
-            i = self._index[part]
-            return [(i, -self.heat(x, u)[..., i] / self.capacity[i])] if field == "capacity" else []
-        if table == "inputs":
-            column = list(self.system.inputs).index(part)
-            return [(self._index[self.system.inputs[part].lump], u[..., column] * np.ones(x.shape[:-1]))]
-        if table == "ambients":
-            return self._ambient_heat(part, x, u)
-        if table in ("links", "modules"):
-            return self._pair_heat(table, part, field, x, u)
-        return []
-
-    def _ambient_heat(self, name: str, x: Array, u: Array) -> list[tuple[int, Array]]:
-        node = self._index[name]
-        column = node - len(self.system.lumps) + len(self.system.inputs) + len(self.system.modules)
-        linear = self.B[:, [column]].toarray()[:, 0]
-        total = np.broadcast_to(linear, x.shape).astype(np.result_type(x, u, float))
-        for term in self.terms:
-            s = term.slopes(*self.ends(term, x, u))
-            for other, here, slope in ((term.a, term.b, s.ab), (term.b, term.a, s.ba)):
-                _add_to_lumps(total, other, np.where(here == node, slope, 0.0))
-        touched = np.flatnonzero(np.any(total.reshape(-1, total.shape[-1]) != 0, axis=0))
-        return [(int(i), total[..., i]) for i in touched]
-
-    def _pair_heat(self, table: str, part: str, field: str, x: Array, u: Array) -> list[tuple[int, Array]]:
-        if table == "links":
-            ends = next(link.between for link in self.system.links if link.name == part)
-        else:
-            ends = (self.system.modules[part].hot, self.system.modules[part].cold)
-        a, b = self._index[ends[0]], self._index[ends[1]]
-        nodes = np.concatenate([x, u[..., u.shape[-1] - len(self.system.ambients):]], axis=-1)
-        if field in ("conductance", "conductance.value"):
-            flow = nodes[..., b] - nodes[..., a]
-            flows = (flow, -flow)
-        else:
-            flows = self._term_parameter(table, part, field, x, u)
-        return [(node, flow) for node, flow in zip((a, b), flows, strict=True) if node < len(self.system.lumps)]
-
-    def _term_parameter(self, table: str, part: str, field: str, x: Array, u: Array) -> tuple[Array, Array]:
-        kind: type[ModuleTerm | NaturalTerm | RadiationTerm]
-        if table == "modules":
-            kind, number = ModuleTerm, list(self.system.modules).index(part)
-        elif field == "radiation":
-            kind = RadiationTerm
-            number = [li.name for li in self.system.links if li.radiation is not None].index(part)
-        else:
-            kind = NaturalTerm
-            number = [li.name for li in self.system.links if li.natural is not None].index(part)
-        term = next(term for term in self.terms if isinstance(term, kind))
-        into_a, into_b = term.parameter_slopes(field, *self.ends(term, x, u))
-        shape = (*x.shape[:-1], len(term.a))
-        return np.broadcast_to(into_a, shape)[..., number], np.broadcast_to(into_b, shape)[..., number]
+        return parameter_heat(self, name, np.asarray(x), np.asarray(u))
 
 
-def _beside(left: csr_array, right: csr_array) -> coo_array:
-    a, b = coo_array(left), coo_array(right)
-    rows, columns = np.concatenate([a.row, b.row]), np.concatenate([a.col, b.col + left.shape[1]])
-    return coo_array((np.concatenate([a.data, b.data]), (rows, columns)),
-                     shape=(left.shape[0], left.shape[1] + right.shape[1]))
-
-
-def _square(n: int, *entries: tuple[NDArray[np.intp], NDArray[np.intp], Array]) -> csr_array:
+def _matrix(shape: tuple[int, ...], *entries: tuple[Indices, Indices, Array]) -> csr_array:
+    """Sum of entries at (rows, columns), of those inside the shape."""
     rows, columns, values = (np.concatenate([e[k] for e in entries]) for k in range(3))
-    keep = (rows < n) & (columns < n)
-    return csr_array(coo_array((values[keep], (rows[keep], columns[keep])), shape=(n, n)))
-
-
-def _add_to_lumps(total: Array, nodes: NDArray[np.intp], flow: Array) -> None:
-    """Add flow (..., n_terms) to the lumps among nodes; several terms may share a lump."""
-    keep = nodes < total.shape[-1]
-    np.add.at(total, (..., nodes[keep]), flow[..., keep])  # type: ignore[arg-type]  # numpy's stub knows no index tuple
+    keep = (rows < shape[0]) & (columns < shape[1])
+    return csr_array(coo_array((values[keep], (rows[keep], columns[keep])), shape=shape))

@@ -5,17 +5,19 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ._parameters import LISTED
 from ._parts import Part
 from ._system import System, build
 from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN, celsius_to_kelvin, kelvin_to_celsius
 
 _MAX_BYTES = 200_000_000
-_TEMPERATURES = {"ambients": "temperature", "lumps": "initial", "modules": "reference_temperature"}
+_TEMPERATURES = {"ambients": ("temperature",), "lumps": ("initial", "condensation.dew_point"),
+                 "modules": ("reference_temperature",)}
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -162,17 +164,21 @@ def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
     if unit not in ("K", "degC"):
         raise InputError(f"temperature_unit = {unit!r}", where=f"{where} [system]", expected='"degC" or "K"',
                          remedy='Write "degC" or "K".')
-    for table, key in _TEMPERATURES.items():
-        parts = data.get(table, {})
-        if isinstance(parts, dict):
-            data[table] = {name: _part_kelvin(part, key, unit, f"{where} [{table}.{name}] {key}")
-                           for name, part in parts.items()}
+    for table, keys in _TEMPERATURES.items():
+        for key in keys:
+            parts = data.get(table, {})
+            if isinstance(parts, dict):
+                data[table] = {name: _part_kelvin(part, key, unit, f"{where} [{table}.{name}] {key}")
+                               for name, part in parts.items()}
     if isinstance(data.get("fit"), dict):
         data["fit"] = fit_in_kelvin(data["fit"], unit)
     return data
 
 
 def _part_kelvin(part: Any, key: str, unit: str, where: str) -> Any:
+    outer, _, inner = key.partition(".")
+    if isinstance(part, dict) and inner and outer in part:
+        return {**part, outer: _part_kelvin(part[outer], inner, unit, where)}
     if not isinstance(part, dict) or not _is_number(part.get(key)):
         return part
     value = float(part[key])
@@ -220,7 +226,8 @@ def _shifted(bounds: Any, convert: Any) -> Any:
 
 
 def _is_temperature(name: str) -> bool:
-    return any(name.startswith(table + ".") and name.endswith("." + key) for table, key in _TEMPERATURES.items())
+    return any(name.startswith(table + ".") and name.endswith("." + key)
+               for table, keys in _TEMPERATURES.items() for key in keys)
 
 
 def _is_number(value: Any) -> bool:
@@ -232,16 +239,16 @@ def _lines(system: System) -> Iterator[str]:
     yield "[system]"
     yield f"name = {_string(system.name)}"
     yield f"temperature_unit = {_string(system.temperature_unit)}"
-    for table in ("ambients", "lumps", "links", "inputs", "modules", "sensors"):
+    for table in ("ambients", "lumps", "links", "inputs", "modules", "leads", "sensors"):
         parts = getattr(system, table)
-        named = [("[[links]]", link) for link in parts] if table == "links" else [
+        named = [(f"[[{table}]]", part) for part in parts] if table in LISTED else [
             (f"[{table}.{_key(name)}]", part) for name, part in parts.items()]
         for header, part in named:
             yield ""
             yield header
             fields = part.model_dump(exclude_unset=True)
-            if _TEMPERATURES.get(table) in fields and fields[_TEMPERATURES[table]] is not None:
-                fields[_TEMPERATURES[table]] = convert(fields[_TEMPERATURES[table]])
+            for key in _TEMPERATURES.get(table, ()):
+                _convert_key(fields, key, convert)
             yield from (f"{_key(key)} = {_value(value)}" for key, value in fields.items() if value is not None)
     if system.fit:
         yield ""
@@ -249,6 +256,14 @@ def _lines(system: System) -> Iterator[str]:
         for name, bounds in system.fit.items():
             fields = bounds.model_dump(exclude_unset=True)
             yield f"{_string(name)} = {_value(_shifted(fields, convert) if _is_temperature(name) else fields)}"
+
+
+def _convert_key(fields: dict[str, Any], key: str, convert: Callable[[float], float]) -> None:
+    *outer, last = key.split(".")
+    for word in outer:
+        fields = fields.get(word) or {}
+    if fields.get(last) is not None:
+        fields[last] = convert(fields[last])
 
 
 def _value(value: Any) -> str:

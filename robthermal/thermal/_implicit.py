@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from ..errors import Diverged
+from ..errors import Diverged, InputError
 from ._equations import Equations
-from ._terms import Array, ModuleTerm
+from ._terms import Array
 
 _GAMMA = 1 - np.sqrt(0.5)
 _WEIGHTS = np.array([1 - _GAMMA, _GAMMA])
@@ -26,12 +26,14 @@ _FINEST = 20
 
 @dataclass(frozen=True)
 class Run:
-    """Kept temperatures (n, n_keep), stored heat (n,), heat from ambients (n, n_a), electrical energy (n, n_m) [J]."""
+    """Kept temperatures (n, n_keep) and energies [J] as in `Trajectory`."""
 
     lumps: Array
     stored: Array
     ambient_heat: Array
     electrical_energy: Array
+    heater_heat: Array
+    source_heat: Array
 
 
 @dataclass
@@ -116,7 +118,7 @@ def run_implicit(eq: Equations, x0: Array, u: Array, h: float, tolerance: float,
         When no step length is short enough.
     """
     stepper, x, level = _Stepper(eq, h, tolerance), x0, 0
-    meters: Array = np.zeros(len(eq.system.ambients) + len(eq.system.modules))
+    meters: Array = np.zeros(len(eq.system.ambients) + len(eq.system.modules) + len(eq.system.inputs) + 1)
     lumps, stored, energy = [x0[keep]], [0.0], [meters]
     for k in range(len(u) - 1):
         x, meters, level = _sample(stepper, x, u[k], meters, level, k)
@@ -124,8 +126,9 @@ def run_implicit(eq: Equations, x0: Array, u: Array, h: float, tolerance: float,
         stored.append(float(eq.capacity @ (x - x0)))
         energy.append(meters)
     meter = np.array(energy)
-    na = len(eq.system.ambients)
-    return Run(np.array(lumps), np.array(stored), meter[:, :na], meter[:, na:])
+    na, nm = len(eq.system.ambients), len(eq.system.modules)
+    return Run(np.array(lumps), np.array(stored), meter[:, :na], meter[:, na:na + nm], meter[:, na + nm:-1],
+               meter[:, -1])
 
 
 def _sample(stepper: _Stepper, x: Array, u: Array, meters: Array, level: int, k: int) -> tuple[Array, Array, int]:
@@ -154,16 +157,30 @@ def _sample(stepper: _Stepper, x: Array, u: Array, meters: Array, level: int, k:
 
 
 def _flows(eq: Equations, x: Array, u: Array) -> Array:
-    """Heat flow from every ambient into the lumps, then electrical power of every module [W]."""
-    n, na = len(eq.system.lumps), len(eq.system.ambients)
-    conductance = eq.B[:, u.size - na:]
-    ambient = conductance.sum(axis=0) * u[u.size - na:] - conductance.T @ x
-    power = np.zeros(len(eq.system.modules))
+    """Heat from every ambient, electrical power of every module, heat of every heater, and of all other sources [W]."""
+    n, w, one = len(eq.capacity), eq.drives(u), eq.drives.one
+    conductance = eq.D[:, eq.drives.ambients]
+    ambient = conductance.sum(axis=0) * w[eq.drives.ambients] - conductance.T @ (x - eq.gradient)
+    constant = eq.D[:, [one]].sum() - (conductance.T @ eq.gradient).sum()
+    power = {"modules": np.zeros(len(eq.system.modules)), "sources": np.array([constant]),
+             "inputs": np.array([heater.gain for heater in eq.system.inputs.values()]) * w[:len(eq.system.inputs)]}
     for term in eq.terms:
-        into_a, into_b = term.heat(*eq.ends(term, x, u))
-        if isinstance(term, ModuleTerm):
-            power = into_a + into_b
+        into_a, into_b = term.heat(*eq.driven(term, x, w))
+        if term.account == "sources":
+            power["sources"] += into_a.sum() + into_b.sum()
+        elif term.account:
+            np.add.at(power[term.account], term.payers, into_a + into_b)
         for nodes, flow in ((term.a, into_a), (term.b, into_b)):
             outside = nodes >= n
             np.subtract.at(ambient, nodes[outside] - n, flow[outside])
-    return np.concatenate([ambient, power])
+    return np.concatenate([ambient, power["modules"], power["inputs"], power["sources"]])
+
+
+def refuse_memory(eq: Equations) -> None:
+    """Refuse effects that need states or times of their own; large networks have none."""
+    timed = ("drive.delay", "drive.time_constant", "hysteresis.heat", "periodic.heat", "step.relative")
+    for name in eq.system.effects:
+        if name.endswith(timed):
+            raise InputError(f"{name} in a network of {len(eq.capacity)} lumps", where="argument system",
+                             expected="effects without memory in networks of more than a few hundred lumps",
+                             remedy="Reduce the model first (rt.thermal.reduce), or leave the effect out.")

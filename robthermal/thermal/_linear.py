@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from ..errors import InputError
-from ._augmented import lagged
 from ._checks import by_lump
 from ._equations import Equations
+from ._layout import Layout
 from ._sensors import source_states
 from ._steady import exogenous_point
 from ._system import System, equations
@@ -40,8 +40,8 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     -------
     control.StateSpace
         Deviations from the operating point; inputs, states and outputs carry the names of the system (a lagged sensor
-        adds a state "NAME_lag"; without sensors the outputs are all lumps). Sensor delays are not part of a state
-        space.
+        or drive adds a state "NAME_lag"; without sensors the outputs are all lumps). Delays are not part of a state
+        space; a hysteresis, a periodic load and a conductance step are taken as in `Equations.heat`.
 
     Raises
     ------
@@ -67,7 +67,8 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
         exact = expm(both)[:len(A)]
         A, B = exact[:, :len(A)], exact[:, len(A):]
     C, outputs = _outputs(eq, len(A))
-    states = [*system.lump_names, *(f"{name}_lag" for name in lagged(eq))]
+    drives = [system.exogenous_names[column] for column in Layout(eq).drives]
+    states = [*system.lump_names, *(f"{name}_lag" for name in (*Layout(eq).sensors, *drives))]
     return control.ss(A, B, C, np.zeros((len(C), B.shape[1])), dt=sample_time, name=system.name,
                       inputs=list(system.exogenous_names), outputs=outputs, states=states)
 
@@ -119,14 +120,18 @@ def _point(eq: Equations, temperatures: ArrayLike | Mapping[str, float] | None) 
 
 def _matrices(eq: Equations, x: Array, u: Array) -> tuple[Array, Array]:
     """A (with the lags as states) and B, [1/s] and [K/s per unit]."""
-    n, lags = len(eq.capacity), lagged(eq)
-    A, B = np.zeros((n + len(lags), n + len(lags))), np.zeros((n + len(lags), u.size))
+    n, layout = len(eq.capacity), Layout(eq)
+    size = n + len(layout.sensors) + len(layout.drives)
+    A, B = np.zeros((size, size)), np.zeros((size, u.size))
     A[:n, :n] = eq.jacobian(x, u).toarray() / eq.capacity[:, None]
     B[:n] = eq.input_jacobian(x, u).toarray() / eq.capacity[:, None]
-    for row, name in enumerate(lags, start=n):
+    for name, row in layout.sensors.items():
         sensor = eq.system.sensors[name]
         A[row, row] = -1 / sensor.time_constant
-        A[row, eq.system.lump_names.index(sensor.lump)] = 1 / sensor.time_constant
+        A[row, eq.index[sensor.lump]] = 1 / sensor.time_constant
+    for column, row in layout.drives.items():  # the state follows u; the lumps follow the state
+        A[row, row] = -1 / eq.drives.of[column].time_constant
+        A[:n, row], B[:n, column], B[row, column] = B[:n, column], 0.0, -A[row, row]
     return A, B
 
 

@@ -28,6 +28,7 @@ def check_network(system: System) -> None:
     _names_used_once(system)
     _links_exist(system)
     _modules_exist(system)
+    _effects_exist(system)
     for table, parts in (("inputs", system.inputs), ("sensors", system.sensors)):
         for name, part in parts.items():
             _known(part.lump, system.lumps, f"[{table}.{name}] lump", "a lump")
@@ -86,6 +87,25 @@ def _modules_exist(system: System) -> None:
                              remedy="Describe both as one module (in series: add their Seebeck coefficients, "
                                     "resistances and conductances), or give each faces of its own.")
         pairs[pair] = name
+
+
+def _effects_exist(system: System) -> None:
+    names: set[str] = set()
+    for number, lead in enumerate(system.leads, start=1):
+        where = f"[[leads]] number {number}"
+        _known(lead.module, system.modules, f"{where} module", "a module")
+        _known(lead.lump, system.lumps, f"{where} lump", "a lump")
+        if lead.name in names:
+            raise InputError(f"the lead name {lead.name!r} is used twice", where=where,
+                             remedy='Add name = "…" to one of them, or add up their resistances.')
+        names.add(lead.name)
+    for name, heater in system.inputs.items():
+        if heater.feedthrough is not None:
+            where = f"[inputs.{name}] feedthrough"
+            _known(heater.feedthrough.lump, system.lumps, where, "a lump")
+            if heater.feedthrough.lump == heater.lump:
+                raise InputError(f"{heater.lump!r} is the heater's own lump", where=where, expected="another lump",
+                                 remedy="Name the lump that receives a share of its heat.")
 
 
 def _path_to_ambient(system: System) -> None:

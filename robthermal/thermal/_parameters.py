@@ -15,21 +15,25 @@ if TYPE_CHECKING:
     from ._system import System
 
 _LINEAR = tuple(f"{p}.{k}" for p in ("seebeck", "resistance", "conductance") for k in ("value", "slope"))
+_DRIVE = tuple(f"drive.{key}" for key in ("gain", "offset", "cubic", "clip", "delay", "time_constant"))
 FIELDS: dict[str, tuple[str, ...]] = {
     "ambients": ("temperature",),
-    "lumps": ("capacity", "disturbance", "initial"),
-    "links": ("conductance", "natural.gain", "natural.exponent", "radiation"),
-    "inputs": ("gain",),
-    "modules": (*_LINEAR, "reference_temperature"),
-    "sensors": ("noise", "time_constant", "offset", "gain", "delay"),
+    "lumps": ("capacity", "disturbance", "initial", "heat", "gradient", "periodic.heat", "periodic.period",
+              "periodic.phase", "condensation.conductance", "condensation.dew_point"),
+    "links": ("conductance", "natural.gain", "natural.exponent", "radiation", "step.relative", "step.time"),
+    "inputs": ("gain", *_DRIVE, "power_slope", "feedthrough.share"),
+    "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
+                "hysteresis.time_constant", *_DRIVE),
+    "leads": ("resistance",),
+    "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating"),
 }
+LISTED = ("links", "leads")  # tables that are lists of named parts
 
 
 def parts_of(system: System, table: str) -> Mapping[str, Part]:
-    """Parts of one table by name (links too)."""
-    if table == "links":
-        return {link.name: link for link in system.links}
-    return getattr(system, table)
+    """Parts of one table by name (links and leads too)."""
+    parts = getattr(system, table)
+    return {part.name: part for part in parts} if table in LISTED else parts
 
 
 def parameter_names(system: System) -> Iterator[str]:
@@ -39,6 +43,19 @@ def parameter_names(system: System) -> Iterator[str]:
             for field in fields:
                 if _get(part, field) is not None:
                     yield f"{table}.{name}.{field}"
+
+
+EFFECT_SIZES = {  # zero or absent: the effect is not there
+    "lumps": ("heat", "gradient", "periodic.heat", "condensation.conductance"), "links": ("step.relative",),
+    "inputs": (*_DRIVE, "power_slope", "feedthrough.share"), "leads": ("resistance",), "sensors": ("self_heating",),
+    "modules": ("thomson", "joule_split", "hysteresis.heat", *_DRIVE)}
+
+
+def present_effects(system: System) -> Iterator[str]:
+    """Names of the effects' sizes that are not zero."""
+    for table, fields in EFFECT_SIZES.items():
+        for name, part in parts_of(system, table).items():
+            yield from (f"{table}.{name}.{field}" for field in fields if _get(part, field))
 
 
 def locate(system: System, name: str) -> tuple[str, str, str]:
@@ -75,7 +92,7 @@ def replace_parameters(system: System, values: Mapping[str, float]) -> System:
     for table, parts in changes.items():
         new = {name: _changed(part, parts[name], f"{table}.{name}") if name in parts else part
                for name, part in parts_of(system, table).items()}
-        update[table] = tuple(new.values()) if table == "links" else new
+        update[table] = tuple(new.values()) if table in LISTED else new
     return system.model_copy(update=update)
 
 
@@ -88,7 +105,7 @@ def _get(part: Any, field: str) -> float | None:
 def _changed(part: Part, fields: Mapping[str, float], where: str) -> Part:
     data = part.model_dump(exclude_unset=True)
     if "name" in type(part).model_fields:
-        data["name"] = getattr(part, "name")  # noqa: B009 - only links have one
+        data["name"] = getattr(part, "name")  # noqa: B009 - only links and leads have one
     for field, value in fields.items():
         *outer, last = field.split(".")
         target = data

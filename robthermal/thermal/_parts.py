@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
-from ._units import LOWEST_KELVIN
-
-Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
-Kelvin = Annotated[float, Field(ge=LOWEST_KELVIN, allow_inf_nan=False, strict=True)]
-Name = Annotated[str, Field(min_length=1, max_length=200)]
-Range = tuple[Finite, Finite]
-
-
-class Part(BaseModel):
-    """Immutable; unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-def _ordered(value: Range | None) -> Range | None:
-    if value is not None and not value[0] < value[1]:
-        raise ValueError("must be [lower, upper] with lower < upper")
-    return value
+from ._effect_parts import Condensation as Condensation
+from ._effect_parts import Drive as Drive
+from ._effect_parts import Feedthrough as Feedthrough
+from ._effect_parts import Hysteresis as Hysteresis
+from ._effect_parts import Lead as Lead
+from ._effect_parts import Periodic as Periodic
+from ._effect_parts import Step as Step
+from ._part import Finite, Kelvin, NonNegative, Positive, Range, ordered
+from ._part import Name as Name
+from ._part import Part as Part
 
 
 class Ambient(Part):
@@ -51,11 +41,23 @@ class Lump(Part):
         Unmeasured random heat [W/√Hz].
     initial : float, optional
         Temperature at the start [K]; default: the nearest measured value, else the first ambient.
+    heat : float
+        Constant heat source [W].
+    gradient : float
+        What its links to ambients see is the ambient plus this [K].
+    periodic : Periodic, optional
+        Periodic heat.
+    condensation : Condensation, optional
+        Heat below the dew point.
     """
 
     capacity: Positive
     disturbance: NonNegative = 0.0
     initial: Kelvin | None = None
+    heat: Finite = 0.0
+    gradient: Finite = 0.0
+    periodic: Periodic | None = None
+    condensation: Condensation | None = None
 
 
 class Natural(Part):
@@ -86,6 +88,8 @@ class Link(Part):
         Natural convection added to it.
     radiation : float, optional
         Coefficient of Ta⁴ - Tb⁴ [W/K⁴].
+    step : Step, optional
+        Sudden change of the linear part.
     name : str
         Default "a-b".
     """
@@ -94,6 +98,7 @@ class Link(Part):
     conductance: NonNegative = 0.0
     natural: Natural | None = None
     radiation: NonNegative | None = None
+    step: Step | None = None
     name: str = ""
 
     @model_validator(mode="after")
@@ -118,13 +123,22 @@ class Input(Part):
         [W per unit of the record column].
     limits : tuple of float, optional
         Range of the record column [unit].
+    drive : Drive
+        What the heater makes of its column; default: exactly that.
+    power_slope : float, optional
+        The heat is multiplied by 1 + power_slope (T_lump - T_ref) [1/K], T_ref the first ambient's nominal temperature.
+    feedthrough : Feedthrough, optional
+        Part of the heat that goes to another lump.
     """
 
     lump: Name
     gain: Finite = 1.0
     limits: Range | None = None
+    drive: Drive = Drive()
+    power_slope: Finite | None = None
+    feedthrough: Feedthrough | None = None
 
-    _check = field_validator("limits")(_ordered)
+    _check = field_validator("limits")(ordered)
 
 
 class Linear(Part):
@@ -159,6 +173,14 @@ class Module(Part):
         [K].
     current_limits : tuple of float, optional
         [A].
+    thomson : float
+        Thomson coefficient: ½ thomson I (T_hot - T_cold) is taken from both faces [V/K].
+    joule_split : float
+        Unequal Joule heat: joule_split R I² more at the cold face, less at the hot one [-].
+    hysteresis : Hysteresis, optional
+        Memory of the polarity.
+    drive : Drive
+        What the amplifier makes of its column; default: exactly that.
     """
 
     hot: Name
@@ -168,8 +190,12 @@ class Module(Part):
     conductance: Linear
     reference_temperature: Kelvin = 298.15
     current_limits: Range | None = None
+    thomson: Finite = 0.0
+    joule_split: Finite = 0.0
+    hysteresis: Hysteresis | None = None
+    drive: Drive = Drive()
 
-    _check = field_validator("current_limits")(_ordered)
+    _check = field_validator("current_limits")(ordered)
 
     @field_validator("seebeck", "resistance", "conductance", mode="before")
     @classmethod
@@ -205,6 +231,8 @@ class Sensor(Part):
         [-].
     delay : float
         Pure delay [s].
+    self_heating : float
+        Heat of the sensor into its lump [W].
     """
 
     lump: Name
@@ -213,6 +241,7 @@ class Sensor(Part):
     offset: Finite = 0.0
     gain: Positive = 1.0
     delay: NonNegative = 0.0
+    self_heating: Finite = 0.0
 
 
 class FitRange(Part):

@@ -9,15 +9,36 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
-from ._parts import Ambient, FitRange, Input, Linear, Link, Lump, Module, Natural, Part, Sensor
+from ._parts import (
+    Ambient,
+    Condensation,
+    Drive,
+    Feedthrough,
+    FitRange,
+    Hysteresis,
+    Input,
+    Lead,
+    Linear,
+    Link,
+    Lump,
+    Module,
+    Natural,
+    Part,
+    Periodic,
+    Sensor,
+    Step,
+)
 
 _PARTS: dict[str, type[Part]] = {"ambients": Ambient, "lumps": Lump, "links": Link, "inputs": Input,
-                                 "modules": Module, "sensors": Sensor, "fit": FitRange}
-_INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resistance": Linear, "conductance": Linear}
-_TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "sensors", "fit")
+                                 "modules": Module, "leads": Lead, "sensors": Sensor, "fit": FitRange}
+_INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resistance": Linear, "conductance": Linear,
+                                 "drive": Drive, "hysteresis": Hysteresis, "periodic": Periodic, "step": Step,
+                                 "condensation": Condensation, "feedthrough": Feedthrough}
+_TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "sensors", "fit")
 
 _EXPECTED = {
     "missing": "this key to be present", "greater_than": "a number above {gt}", "greater_than_equal": "at least {ge}",
+    "less_than_equal": "at most {le}",
     "finite_number": "a finite number", "float_type": "a number", "string_type": "text", "dict_type": "a table",
     "model_type": "a table", "tuple_type": "a list", "too_short": "two values", "too_long": "two values",
     "string_too_short": "a name", "literal_error": "{expected}", "model_attributes_type": "a table",
@@ -50,8 +71,8 @@ def _place(loc: tuple[int | str, ...]) -> tuple[str, str]:
     words = [str(word) for word in loc if word != "[key]"]
     if len(words) <= 1:
         return "[system]", words[0] if words else ""
-    if words[0] == "links":
-        return f"[[links]] number {int(words[1]) + 1}", ".".join(words[2:])
+    if words[0] in ("links", "leads"):
+        return f"[[{words[0]}]] number {int(words[1]) + 1}", ".".join(words[2:])
     if words[0] == "fit":
         return f'[fit] "{words[1]}"', ".".join(words[2:])
     return f"[{words[0]}.{words[1]}]", ".".join(words[2:])

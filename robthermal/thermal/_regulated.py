@@ -16,7 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ._equations import Equations
 from ._system import System, equations
-from ._terms import Array, Indices, ModuleTerm
+from ._module_term import ModuleTerm
+from ._terms import Array, Indices
 from ._units import LOWEST_KELVIN
 
 _POINTS = 60  # of a load curve

@@ -6,7 +6,7 @@ dz_(k+1) = F_k dz_k + P_k dθ, with F_k and P_k from one batched linear solve ov
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ._augmented import Augmented, slope
 from ._collocation import DEGREE, Step, step_matrices
 from ._exponential import Integrator, Path
-from ._parameters import locate
-from ._terms import Array, ModuleTerm, NaturalTerm, RadiationTerm
+from ._schedule import Schedule
+from ._terms import Array
 
 _CHUNK = 1024
 _IMAGINARY = 1e-40
@@ -39,71 +39,92 @@ class Sensitivity:
         Whose steps are differentiated.
     names : sequence of str
         Parameter names.
-    held : ndarray, shape (n_u, n_parameters)
-        Derivative of the held inputs (an ambient that the record lacks).
+    held : mapping of str to ndarray, shape (n_segments, n_w)
+        Derivative of the drives with respect to those parameters that act on them.
+    jumps : mapping of str to ndarray, shape (n_segments, n_free)
+        What moving the times of jumps adds to the derivative of the state at the start of a segment.
     """
 
-    def __init__(self, integrator: Integrator, names: Sequence[str], held: Array):
+    def __init__(self, integrator: Integrator, names: Sequence[str], held: Mapping[str, Array],
+                 jumps: Mapping[str, Array]):
         self.by = integrator
-        self.names, self.held = list(names), held
-        n = len(integrator.eq.capacity) + sum(s.time_constant > 0 for s in integrator.eq.system.sensors.values())
-        self.n_free = n  # meters feed nothing back
+        self.names, self.held, self.jumps = list(names), held, jumps
+        self.n_free = integrator.layout.n_free  # meters feed nothing back
         self._linear = {name: part for name in self.names
                         if (part := slope(integrator.eq, integrator.parts, name)) is not None}
-        self._steps: dict[tuple[str, int], Step] = {}
+        self._steps: dict[tuple[str, int, int], Step] = {}
 
-    def _step_slope(self, name: str, level: int) -> Step:
+    def _step_slope(self, name: str, kind: int, level: int) -> Step:
         """Derivative of the step matrices by a complex step."""
-        if (name, level) not in self._steps:
+        if (name, kind, level) not in self._steps:
             parts, d = self.by.parts, self._linear[name]
             moved = Augmented(parts.F + 1j * _IMAGINARY * d.F, parts.B + 1j * _IMAGINARY * d.B,
                               parts.N + 1j * _IMAGINARY * d.N, parts.ports)
-            s = step_matrices(moved, self.by.h / 2**level)
-            self._steps[name, level] = Step(*(m.imag / _IMAGINARY for m in (s.K, s.Ku, s.M)))
-        return self._steps[name, level]
+            s = step_matrices(moved, self.by.lengths[kind] / 2**level)
+            self._steps[name, kind, level] = Step(*(m.imag / _IMAGINARY for m in (s.K, s.Ku, s.M)))
+        return self._steps[name, kind, level]
 
-    def along(self, path: Path, u: Array, start: Array) -> Array:
+    def along(self, path: Path, plan: Schedule, start: Array) -> Array:
         """Propagate along a path.
 
         Parameters
         ----------
         path : Path
             From `Integrator.run`.
-        u : ndarray, shape (n_samples, n_u)
-            Its inputs.
+        plan : Schedule
+            Its drives.
         start : ndarray, shape (n_z, n_parameters)
             Derivative of the initial state.
 
         Returns
         -------
-        ndarray, shape (n_samples, n_free, n_parameters)
+        ndarray, shape (n_segments, n_free, n_parameters)
+            At the start of every segment, just before a jump.
         """
-        out = np.empty((len(u), self.n_free, len(self.names)))
+        out = np.empty((len(plan.w), self.n_free, len(self.names)))
         out[0] = now = start[:self.n_free]
-        for first in range(0, len(path.sample), _CHUNK):
+        jumps = {self.names.index(name): jump for name, jump in self.jumps.items()}
+        for first in range(0, len(path.segment), _CHUNK):
             chunk = slice(first, first + _CHUNK)
-            maps = self.transitions(path.starts[chunk], u[path.sample[chunk]], path.level[chunk])
-            for i, k in enumerate(path.sample[chunk]):
-                now = maps.F[i] @ now + maps.P[i]
+            maps = self.transitions(path, plan, chunk)
+            for i, k in enumerate(path.segment[chunk], start=first):
+                if jumps and (i == 0 or path.segment[i - 1] != k):
+                    now = now.copy()
+                    for column, jump in jumps.items():
+                        now[:, column] += jump[k]
+                now = maps.F[i - first] @ now + maps.P[i - first]
                 out[k + 1] = now
         return out
 
-    def transitions(self, starts: Array, u: Array, level: NDArray[np.integer]) -> Transitions:
-        """Linear maps of steps that start at `starts` (n_steps, n_z) with inputs u (n_steps, n_u)."""
-        n = self.n_free
-        F, P = np.empty((len(u), n, n)), np.empty((len(u), n, len(self.names)))
-        for one in np.unique(level):
-            own = level == one
-            F[own], P[own] = self._of_level(starts[own], u[own], int(one))
+    def transitions(self, path: Path, plan: Schedule, chunk: slice) -> Transitions:
+        """Linear maps of a chunk of steps."""
+        n, segment, level = self.n_free, path.segment[chunk], path.level[chunk]
+        kind = plan.kind[segment]
+        F, P = np.empty((len(segment), n, n)), np.empty((len(segment), n, len(self.names)))
+        for which, depth in {(int(a), int(b)) for a, b in zip(kind, level, strict=True)}:
+            own = (kind == which) & (level == depth)
+            held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
+            F[own], P[own] = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
         return Transitions(F, P)
 
-    def _of_level(self, z: Array, u: Array, level: int) -> tuple[Array, Array]:
-        step, ports = self.by.step(level), self.by.ports
+    def rate_slope(self, name: str, states: Array, w: Array) -> Array:
+        """Derivative (n, n_free) of ż with respect to a parameter at fixed states (n, n_free) and drives."""
+        n, parts = self.n_free, self.by.parts
+        V = np.concatenate([states[:, self.by.ports], w], axis=1)
+        out: Array = np.zeros((len(states), n))
+        if name in self._linear:
+            d = self._linear[name]
+            out = states @ d.F[:n, :n].T + w @ d.B[:n].T + self.by.port_heat(V) @ d.N[:n].T
+        heat = self.by.port_heat.parameter(name, V)
+        return out if heat is None else out + heat @ parts.N[:n].T
+
+    def _of_length(self, z: Array, w: Array, held: Mapping[str, Array], kind: int, level: int) -> tuple[Array, Array]:
+        step, ports = self.by.step(kind, level), self.by.ports
         nodes, n, np_ = DEGREE * ports.size, self.n_free, ports.size
-        T, current = self._port_temperatures(step, z, u)
-        q = self.by.port_heat(T, current)
-        G = self.by.port_heat.slopes(T, current)  # (S, p+1, nq, np + na)
-        direct = self._direct(step, level, z, u, T, current, q, G)  # (S, rows, P)
+        V = self._at_ports(step, z, w)
+        q = self.by.port_heat(V)
+        G = self.by.port_heat.slopes(V)  # (S, p+1, nq, np + nw)
+        direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, P)
         S = len(z)
         M = step.M.reshape(step.M.shape[0], DEGREE + 1, self.by.nq)
         coupled = np.empty((S, nodes, DEGREE + 1, np_))
@@ -112,69 +133,45 @@ class Sensitivity:
         A = np.eye(nodes) - coupled[:, :, 1:].reshape(S, nodes, nodes)
         rhs = np.concatenate([np.broadcast_to(step.K[:nodes, :n], (S, nodes, n)), direct[:, :nodes]], axis=2)
         rhs[:, :, ports] += coupled[:, :, 0]
-        dT = np.linalg.solve(A, rhs) if nodes else rhs
-        at_start = np.zeros((S, np_, dT.shape[2]))
+        dV = np.linalg.solve(A, rhs) if nodes else rhs
+        at_start = np.zeros((S, np_, dV.shape[2]))
         at_start[:, np.arange(np_), ports] = 1.0
-        dT = np.concatenate([at_start, dT], axis=1).reshape(S, DEGREE + 1, np_, dT.shape[2])
-        dq = (G[..., :np_] @ dT).reshape(S, (DEGREE + 1) * self.by.nq, dT.shape[-1])
+        dV = np.concatenate([at_start, dV], axis=1).reshape(S, DEGREE + 1, np_, dV.shape[2])
+        dq = (G[..., :np_] @ dV).reshape(S, (DEGREE + 1) * self.by.nq, dV.shape[-1])
         end = step.M[nodes:nodes + n] @ dq
         return step.K[nodes:nodes + n, :n] + end[:, :, :n], direct[:, nodes:nodes + n] + end[:, :, n:]
 
-    def _port_temperatures(self, step: Step, z: Array, u: Array) -> tuple[Array, Array]:
-        """Nodal port temperatures of a batch of steps, by the same fixed point as the integrator's."""
-        by, nodes = self.by, DEGREE * self.by.ports.size
-        base = z @ step.K[:nodes].T + u @ step.Ku[:nodes].T
-        T = np.empty((len(z), DEGREE + 1, by.ports.size + by.n_ambients))
-        T[..., :by.ports.size] = z[:, None, by.ports]
-        T[..., by.ports.size:] = u[:, None, u.shape[1] - by.n_ambients:]
-        current = u[:, None, by.first_current:by.first_current + by.n_modules]
+    def _at_ports(self, step: Step, z: Array, w: Array) -> Array:
+        """Nodal port states and drives of a batch of steps, by the same fixed point as the integrator's."""
+        by, nodes, np_ = self.by, DEGREE * self.by.ports.size, self.by.ports.size
+        base = z @ step.K[:nodes].T + w @ step.Ku[:nodes].T
+        V = np.empty((len(z), DEGREE + 1, np_ + w.shape[1]))
+        V[..., :np_] = z[:, None, by.ports]
+        V[..., np_:] = w[:, None]
         for _ in range(30):
-            q = by.port_heat(T, current).reshape(len(z), (DEGREE + 1) * by.nq)
-            new = (base + q @ step.M[:nodes].T).reshape(len(z), DEGREE, by.ports.size)
-            change = np.abs(new - T[:, 1:, :by.ports.size]).max(initial=0.0)
-            T[:, 1:, :by.ports.size] = new
+            q = by.port_heat(V).reshape(len(z), (DEGREE + 1) * by.nq)
+            new = (base + q @ step.M[:nodes].T).reshape(len(z), DEGREE, np_)
+            change = np.abs(new - V[:, 1:, :np_]).max(initial=0.0)
+            V[:, 1:, :np_] = new
             if change < 1e-10:
                 break
-        return T, current
+        return V
 
-    def _direct(self, step: Step, level: int, z: Array, u: Array, T: Array, current: Array, q: Array,
+    def _direct(self, kind: int, level: int, z: Array, w: Array, held: Mapping[str, Array], V: Array, q: Array,
                 G: Array) -> Array:
-        """Derivative of all rows with respect to the parameters at fixed port temperatures."""
+        """Derivative of all rows with respect to the parameters at fixed port states."""
+        step = self.by.step(kind, level)
         out = np.zeros((len(z), step.K.shape[0], len(self.names)))
         flat = q.reshape(len(z), (DEGREE + 1) * self.by.nq)
-        ambient = slice(u.shape[1] - self.by.n_ambients, u.shape[1])
         for column, name in enumerate(self.names):
             if name in self._linear:
-                d = self._step_slope(name, level)
-                out[..., column] = z @ d.K.T + u @ d.Ku.T + flat @ d.M.T
-            heat = self._parameter_heat(name, T, current)
-            if np.any(self.held[:, column]):
-                out[..., column] += step.Ku @ self.held[:, column]
-                heat = heat + G[..., self.by.ports.size:] @ self.held[ambient, column]
-            if np.any(heat):
+                d = self._step_slope(name, kind, level)
+                out[..., column] = z @ d.K.T + w @ d.Ku.T + flat @ d.M.T
+            heat = self.by.port_heat.parameter(name, V)
+            if name in held:
+                out[..., column] += held[name] @ step.Ku.T
+                through_drive = np.einsum("sjqw,sw->sjq", G[..., self.by.ports.size:], held[name])
+                heat = through_drive if heat is None else heat + through_drive
+            if heat is not None:
                 out[..., column] += heat.reshape(len(z), (DEGREE + 1) * self.by.nq) @ step.M.T
-        return out
-
-    def _parameter_heat(self, name: str, T: Array, current: Array) -> Array:
-        """Derivative (S, p + 1, n_q) of the nodal heats with respect to a parameter of a nonlinear term."""
-        system, out = self.by.eq.system, np.zeros((*T.shape[:-1], self.by.nq))
-        table, part, field = locate(system, name)
-        if table == "modules" and field != "conductance.value":
-            kind: type = ModuleTerm
-            pair = system.module_names.index(part)
-        elif table == "links" and field.startswith("natural"):
-            kind, pair = NaturalTerm, [li.name for li in system.links if li.natural is not None].index(part)
-        elif table == "links" and field == "radiation":
-            kind = RadiationTerm
-            pair = [li.name for li in system.links if li.radiation is not None].index(part)
-        else:
-            return out
-        column = 0
-        for term, (a, b) in zip(self.by.port_heat.terms, self.by.port_heat.columns, strict=True):
-            if isinstance(term, kind):
-                through = current if kind is ModuleTerm else T[..., :0]
-                flows = term.parameter_slopes(field, T[..., a], T[..., b], through)
-                for side, flow in enumerate(flows):
-                    out[..., column + side * len(a) + pair] = np.broadcast_to(flow, T[..., a].shape)[..., pair]
-            column += 2 * len(a)
         return out

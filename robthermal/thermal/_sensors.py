@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from ._augmented import lagged
 from ._equations import Equations
+from ._layout import Layout
 from ._terms import Array
 
 Rates = tuple[Array, Array] | None
@@ -16,10 +16,8 @@ Rates = tuple[Array, Array] | None
 
 def source_states(eq: Equations) -> list[int]:
     """State that every sensor reads: its lag state if it has one, else its lump."""
-    lags = lagged(eq)
-    n = len(eq.system.lumps)
-    return [n + lags.index(name) if name in lags else eq.system.lump_names.index(sensor.lump)
-            for name, sensor in eq.system.sensors.items()]
+    lags = Layout(eq).sensors
+    return [lags.get(name, eq.index[sensor.lump]) for name, sensor in eq.system.sensors.items()]
 
 
 def reference(eq: Equations) -> float:

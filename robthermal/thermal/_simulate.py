@@ -10,11 +10,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..signals import Record
-from ._augmented import lagged
-from ._drive import Initial, held_inputs, held_slope, start_slope, start_state
+from ._drive import Initial, held_inputs, held_slopes, start_lumps, start_slope, start_state
 from ._equations import Equations
 from ._exponential import Integrator
-from ._implicit import run_implicit
+from ._implicit import refuse_memory, run_implicit
+from ._jumps import jump_slopes, rates
+from ._layout import Layout
+from ._schedule import Schedule, schedule
 from ._sensitivity import Sensitivity
 from ._sensors import read_sampled, read_sensors, reading_slopes
 from ._system import System, equations
@@ -40,7 +42,9 @@ class Trajectory:
         Noise-free sensor readings [K].
     stored, ambient_heat, heater_heat, electrical_energy : ndarray
         Cumulative energies [J]: heat stored in all lumps (n,), received from every ambient (n, n_ambients), from every
-        heater (n, n_inputs), electrical energy taken up by every module (n, n_modules).
+        heater (n, n_inputs), electrical energy taken up by every module with its leads (n, n_modules).
+    source_heat : ndarray, shape (n,)
+        Cumulative heat of all other sources: constant and periodic ones, sensors, condensation, hysteresis [J].
     parameters : tuple of str
         Names of the sensitivities.
     sensitivity : ndarray, shape (n, n_sensors, n_parameters)
@@ -57,6 +61,7 @@ class Trajectory:
     ambient_heat: Array
     heater_heat: Array
     electrical_energy: Array
+    source_heat: Array
     parameters: tuple[str, ...]
     sensitivity: Array
     method: str
@@ -64,7 +69,7 @@ class Trajectory:
     @property
     def energy_residual(self) -> Array:
         """Stored minus received energy [J], (n,): zero to rounding."""
-        received = self.ambient_heat.sum(1) + self.heater_heat.sum(1) + self.electrical_energy.sum(1)
+        received = self.ambient_heat.sum(1) + self.heater_heat.sum(1) + self.electrical_energy.sum(1) + self.source_heat
         return self.stored - received
 
     def __getitem__(self, name: str) -> Array:
@@ -133,7 +138,8 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     else:  # keep only what the sensors read
         measured = [system.lump_names.index(s.lump) for s in system.sensors.values()] or range(len(system.lumps))
         u = held_inputs(eq, record)
-        kept = run_implicit(eq, start_state(eq, record, initial, len(system.lumps)), u, record.sample_time, tolerance,
+        refuse_memory(eq)
+        kept = run_implicit(eq, start_lumps(eq, record, initial), u, record.sample_time, tolerance,
                             np.array(measured, np.intp)).lumps
         readings = read_sampled(eq, kept, record.sample_time) if system.sensors else kept
     return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
@@ -190,85 +196,66 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
                          expected=f"at most {_DENSE_STATES} states",
                          remedy="Reduce the model first (rt.thermal.reduce), or difference two simulations.")
     everything = np.arange(len(system.lumps))
-    start = start_state(eq, record, initial, everything.size)
+    refuse_memory(eq)
+    start = start_lumps(eq, record, initial)
     run = run_implicit(eq, start, u, record.sample_time, tolerance, everything)
     measured = run.lumps[:, [system.lump_names.index(s.lump) for s in system.sensors.values()]]
     readings = read_sampled(eq, measured, record.sample_time)
     return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
-                      _heater_heat(eq, record, u), run.electrical_energy, (),
+                      run.heater_heat, run.electrical_energy, run.source_heat, (),
                       np.zeros((len(u), readings.shape[1], 0)), "implicit")
 
 
 def is_small(eq: Equations) -> bool:
     """Whether the dense exponential method is the faster one."""
     heats = sum(2 * len(term.a) for term in eq.terms)
-    states = len(eq.system.lumps) + len(lagged(eq)) + len(eq.system.ambients) + len(eq.system.modules)
-    return states <= _DENSE_STATES and heats <= _DENSE_HEATS
+    return Layout(eq).size <= _DENSE_STATES and heats <= _DENSE_HEATS
 
 
 def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tolerance: float,
                  names: list[str]) -> Trajectory:
-    integrator = Integrator(eq, record.sample_time, tolerance)
-    path = integrator.run(start_state(eq, record, initial, integrator.nz), u)
-    n, na, lags = len(eq.system.lumps), len(eq.system.ambients), len(lagged(eq))
-    slopes = None
-    if names:
-        along = Sensitivity(integrator, names, held_slope(eq, record, names))
-        slopes = along.along(path, u, start_slope(eq, record, initial, names, integrator.nz))
-    meters = path.z[:, n + lags:]
-    states, h = path.z[:, :n + lags], record.sample_time
+    h, n = record.sample_time, len(eq.system.lumps)
+    plan = schedule(eq, u, h, record.start_time)
+    by = Integrator(eq, plan.lengths, tolerance)
+    layout, at = by.layout, plan.samples
+    path = by.run(start_state(eq, record, initial, plan), plan)
+    states = path.z[at, :layout.n_free]
     delayed = any(s.delay for s in eq.system.sensors.values())
-    by_rate = delayed or any(n.endswith((".delay", ".time_constant")) for n in names)
-    rates = _rates(eq, states, u) if by_rate else None
-    readings = read_sensors(eq, states, rates, h)
+    by_rate = delayed or any(name.endswith((".delay", ".time_constant")) for name in names)
+    around = _rates(by, states, plan) if by_rate else None
+    readings = read_sensors(eq, states, around, h)
     sensitivity: Array = np.zeros((len(u), readings.shape[1], 0))
-    if slopes is not None:
-        held = held_slope(eq, record, names)
-        rate_slopes = rates and _rate_slopes(eq, states, u, slopes, names, held)
-        sensitivity = reading_slopes(eq, states, rates, slopes, rate_slopes, names, h)
-    lumps = states[:, :n]
-    return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity, meters[:, :na],
-                      _heater_heat(eq, record, u), meters[:, na:], tuple(names), sensitivity, "exponential")
+    if names:
+        held = held_slopes(eq, record, names, plan)
+        along = Sensitivity(by, names, held, jump_slopes(by, names, path.z, plan))
+        slopes = along.along(path, plan, start_slope(eq, record, initial, names, held))[at]
+        rate_slopes = around and _rate_slopes(along, states, plan, slopes)
+        sensitivity = reading_slopes(eq, states, around, slopes, rate_slopes, names, h)
+    lumps, meters = states[:, :n], path.z[at]
+    return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
+                      meters[:, layout.ambient_meters], meters[:, layout.heater_meters],
+                      meters[:, layout.module_meters], meters[:, layout.source_meter], tuple(names), sensitivity,
+                      "exponential")
 
 
-def _heater_heat(eq: Equations, record: Record, u: Array) -> Array:
-    """Cumulative heat of every heater [J]."""
-    heat = np.array([h.gain for h in eq.system.inputs.values()]) * u[:, :len(eq.system.inputs)] * record.sample_time
-    return np.concatenate([np.zeros((1, heat.shape[1])), np.cumsum(heat[:-1], axis=0)])
+def _around(plan: Schedule) -> tuple[Array, Array]:
+    """Drives just after and just before every sample (they jump there)."""
+    return plan.w[plan.samples], plan.w[np.maximum(plan.samples - 1, 0)]
 
 
-def _rates(eq: Equations, states: Array, u: Array) -> tuple[Array, Array]:
-    """Rates of all states just after and just before every sample (inputs jump there) [K/s]."""
-    return _rate(eq, states, u), _rate(eq, states, np.concatenate([u[:1], u[:-1]]))
+def _rates(by: Integrator, states: Array, plan: Schedule) -> tuple[Array, Array]:
+    """Rates of all states just after and just before every sample [K/s]."""
+    after, before = _around(plan)
+    return rates(by, states, after), rates(by, states, before)
 
 
-def _rate(eq: Equations, states: Array, u: Array) -> Array:
-    n = len(eq.system.lumps)
-    lumps = states[:, :n]
-    columns: list[Array] = [eq.rate(lumps, u)]
-    for row, name in enumerate(lagged(eq), start=n):
-        sensor = eq.system.sensors[name]
-        source = lumps[:, eq.system.lump_names.index(sensor.lump)]
-        columns.append(((source - states[:, row]) / sensor.time_constant)[:, None])
-    return np.concatenate(columns, axis=1)
-
-
-def _rate_slopes(eq: Equations, states: Array, u: Array, slopes: Array, names: list[str],
-                 held: Array) -> tuple[Array, Array]:
+def _rate_slopes(along: Sensitivity, states: Array, plan: Schedule, slopes: Array) -> tuple[Array, Array]:
     """Derivative of `_rates` along the sensitivities (n, n_states, n_parameters), by complex steps."""
-    before = np.concatenate([u[:1], u[:-1]])
-    after_slopes, before_slopes = np.zeros_like(slopes), np.zeros_like(slopes)
-    for column, name in enumerate(names):
-        for out, inputs in ((after_slopes, u), (before_slopes, before)):
-            moved = _rate(eq, states + 1e-40j * slopes[..., column], inputs + 1e-40j * held[:, column])
-            out[..., column] = moved.imag / 1e-40
-            for i, heat in eq.parameter_heat(name, states[:, :len(eq.capacity)], inputs):
-                if not name.startswith("ambients."):  # an ambient acts through the held inputs
-                    out[:, i, column] += heat / eq.capacity[i]
-        sensor = name.removeprefix("sensors.").removesuffix(".time_constant")
-        if sensor in lagged(eq) and name == f"sensors.{sensor}.time_constant":
-            row = len(eq.capacity) + lagged(eq).index(sensor)
-            own = _rate(eq, states, u)[:, row] / eq.system.sensors[sensor].time_constant
-            after_slopes[:, row, column] -= own
-            before_slopes[:, row, column] -= own
-    return after_slopes, before_slopes
+    after, before = np.zeros_like(slopes), np.zeros_like(slopes)
+    segments = plan.samples, np.maximum(plan.samples - 1, 0)
+    for out, w, segment in zip((after, before), _around(plan), segments, strict=True):
+        for column, name in enumerate(along.names):
+            dw = along.held[name][segment] if name in along.held else np.zeros_like(w)
+            moved = rates(along.by, states + 1e-40j * slopes[..., column], w + 1e-40j * dw)
+            out[..., column] = moved.imag / 1e-40 + along.rate_slope(name, states, w)
+    return after, before

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import Diverged, InputError
-from ._augmented import lagged
 from ._checks import by_lump, kelvin, positive
+from ._drive import settle
 from ._equations import Equations
 from ._exponential import Integrator
 from ._parts import Input
+from ._schedule import schedule
 from ._sensors import reference, source_states
 from ._simulate import is_small
 from ._steady import exogenous_point
@@ -71,12 +72,16 @@ class Stepper:
             raise InputError(f"a network of {len(system.lumps)} lumps", where="argument system",
                              expected="a few hundred at most", remedy="Reduce the model first (rt.thermal.reduce).")
         self.sample_time = positive(sample_time, "argument sample_time", "s")
-        self._integrator = Integrator(self._eq, self.sample_time, tolerance)
+        for name in system.effects:
+            if name.endswith(("drive.delay", "step.relative")):
+                raise InputError(f"{name} when stepping", where="argument system",
+                                 expected="no delayed input and no conductance step",
+                                 remedy="Simulate a whole record (rt.thermal.simulate), or leave the effect out.")
+        self._integrator = Integrator(self._eq, (self.sample_time,), tolerance)
         start = _start(self._eq, initial)
         self.state = np.zeros(self._integrator.nz)
         self.state[:len(start)] = start
-        for row, name in enumerate(lagged(self._eq), start=len(start)):
-            self.state[row] = start[system.lump_names.index(system.sensors[name].lump)]
+        settle(self._eq, self._integrator.layout, self.state, self._eq.drives(self._eq.nominal()), 0.0)
         self.time = 0.0
 
     @property
@@ -125,7 +130,7 @@ class Stepper:
         named = {f"load on {lump}": heat for lump, heat in (load or {}).items()}
         u = exogenous_point(self._eq, {**(inputs or {}), **named})
         try:
-            self.state = self._integrator.run(self.state, np.array([u, u])).z[-1]
+            self.state = self._integrator.run(self.state, schedule(self._eq, np.array([u, u]), self.sample_time)).z[-1]
         except Diverged as error:  # its clock starts anew at every step
             why = str(error).partition(": ")[2]
             raise Diverged(f"the simulation runs away at {self.time:.6g} s: {why}", time=self.time) from None

@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import dijkstra
 from ..errors import InputError
 from ._equations import Equations
 from ._network import check_network
-from ._parameters import parameter_names, read_parameter, replace_parameters
-from ._parts import Ambient, FitRange, Input, Link, Lump, Module, Name, Part, Sensor
+from ._parameters import parameter_names, present_effects, read_parameter, replace_parameters
+from ._parts import Ambient, FitRange, Input, Lead, Link, Lump, Module, Name, Part, Sensor
 from ._refusals import refusal
 
 
@@ -33,6 +33,8 @@ class System(Part):
         Name to part; plain dictionaries are accepted.
     links : sequence of Link
         Heat paths.
+    leads : sequence of Lead
+        Heat of the modules' leads and contacts.
     fit : mapping
         Parameter name to `FitRange`.
     temperature_unit : {"K", "degC"}
@@ -59,6 +61,7 @@ class System(Part):
     links: tuple[Link, ...] = ()
     inputs: dict[Name, Input] = {}
     modules: dict[Name, Module] = {}
+    leads: tuple[Lead, ...] = ()
     sensors: dict[Name, Sensor] = {}
     fit: dict[str, FitRange] = {}
 
@@ -70,7 +73,7 @@ class System(Part):
         check_network(self)
 
     def __repr__(self) -> str:
-        counts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "inputs", "sensors")}
+        counts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "leads", "inputs", "sensors")}
         return f"<System {self.name!r}: {', '.join(f'{n} {table}' for table, n in counts.items() if n)}>"
 
     __str__ = __repr__
@@ -119,6 +122,11 @@ class System(Part):
     def parameter_names(self) -> tuple[str, ...]:
         """Every number of the system that has a name, for example ``modules.m1.seebeck.slope``."""
         return tuple(parameter_names(self))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the numbers, not zero, of effects beyond the plain network, for example ``modules.m1.thomson``."""
+        return tuple(present_effects(self))
 
     def parameter(self, name: str) -> float:
         """Value of one named parameter, temperatures in kelvin.

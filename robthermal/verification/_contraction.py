@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from ._numbers import name_of, round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
 from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 
-_NORMS = {
+NORMS = {
     "sum": "the weighted sum of absolute differences",
     "max": "the weighted largest difference",
     "energy": "the capacity-weighted sum of squared differences",
@@ -46,8 +47,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
     network = worst_system(nominal, system, parameters)
     table = mapping(evidence, "evidence")
     method = text(get(table, "method", "evidence"), "evidence.method")
-    if method not in _NORMS:
-        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(_NORMS)}")
+    if method not in NORMS:
+        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(NORMS)}")
     rate = not_negative(get(table, "rate", "evidence"), "evidence.rate")
     n = len(network.lumps)
     weights: list[fmpq] = []
@@ -69,7 +70,7 @@ def claim(problem: Contraction) -> str:
              else "decays strictly")
     return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}"
             f"{say_parameters(problem.parameters)}: "
-            f"between any two trajectories in this box under the same inputs, {_NORMS[problem.method]} "
+            f"between any two trajectories in this box under the same inputs, {NORMS[problem.method]} "
             f"(method {problem.method}) {speed}.")
 
 
@@ -87,7 +88,8 @@ def find_margin(problem: Contraction) -> dict[str, float]:
         if problem.method in ("sum", "max"):
             extra = round_down(_weighted.largest_margin(problem))
         else:
-            extra = _search(problem)
+            extra = search(lambda value: _prove_rate(problem, problem.rate + fmpq(*value.as_integer_ratio())).valid,
+                           round_down(problem.rate))
     return {"rate": shorten(extra)}
 
 
@@ -110,12 +112,9 @@ def _prove_rate(problem: Contraction, rate: fmpq) -> Proof:
     return (_energy if problem.method == "energy" else _lyapunov).prove(problem, rate)
 
 
-def _search(problem: Contraction) -> float:
-    """Bisect the proof itself: the largest additional rate that is still proven, to two per mille."""
-    def proven(extra: float) -> bool:
-        return _prove_rate(problem, problem.rate + fmpq(*extra.as_integer_ratio())).valid
-
-    low, high = 0.0, max(round_down(problem.rate), 1e-6)
+def search(proven: Callable[[float], bool], rate: float) -> float:
+    """Bisect a proof itself: the largest additional rate that is still proven, to two per mille."""
+    low, high = 0.0, max(rate, 1e-6)
     for _ in range(40):
         if not proven(high):
             break

@@ -11,8 +11,6 @@ from typing import Any
 
 from flint import fmpq
 
-from robthermal.errors import InputError
-
 from ._fields import Interval, get, interval, intervals, kelvin_interval, mapping, margin_of
 from ._kind import Kind, Proof, working_precision
 from ._numbers import name_of, round_down, show
@@ -30,6 +28,7 @@ from ._system import (
     say_region,
     say_system,
 )
+from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 
 _PIECES = 16
 
@@ -43,14 +42,14 @@ class Invariance:
     ambient: dict[str, Interval]
     heat: dict[int, Interval]
     margin: fmpq
+    parameters: Parameters = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     """Return the exact problem, or raise InputError."""
-    network = read_system(system)
-    table = mapping(region, "region")
-    if "parameters" in table:
-        raise InputError("uncertain parameters are not part of this kind of claim", where="region.parameters")
+    nominal, table = read_system(system), mapping(region, "region")
+    parameters = read_parameters(table)
+    network = worst_system(nominal, system, parameters)
     mapping(evidence, "evidence")
     given = get(table, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")
@@ -60,7 +59,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
               network.lumps, "region.heat")
     heat = {k: interval(loads[name], f"region.heat[{name_of(name)}]")
             for k, name in enumerate(network.lumps) if name in loads}
-    return Invariance(network, read_region(table, network), ambient, heat, margin_of(margin, "heat"))
+    return Invariance(network, read_region(table, network), ambient, heat, margin_of(margin, "heat"), parameters)
 
 
 def claim(problem: Invariance) -> str:
@@ -68,7 +67,7 @@ def claim(problem: Invariance) -> str:
     lumps = problem.system.lumps
     inputs = [f"ambient {name_of(name)} in {say_interval(value)} K" for name, value in problem.ambient.items()]
     inputs += [f"heat load on {name_of(lumps[k])} in {say_interval(value)} W" for k, value in problem.heat.items()]
-    words = f", for all {', '.join(inputs)}" if inputs else ""
+    words = (f", for all {', '.join(inputs)}" if inputs else "") + say_parameters(problem.parameters)
     return (f"The {say_system(problem.system)} never leaves the box of {say_region(problem.system, problem.region)}, "
             f"once its temperatures are in it{words}.")
 
@@ -111,7 +110,7 @@ def _largest(problem: Invariance, lump: int, sign: int) -> fmpq:
         if lump in (module.hot, module.cold):
             partner = module.cold if module.hot == lump else module.hot
             modules.setdefault(partner, []).append(k)
-    conductance = dict.fromkeys(modules, fmpq(0))
+    conductance = dict.fromkeys(modules, (fmpq(0), fmpq(0)))
     for link in problem.system.links:
         if lump not in link.nodes:
             continue
@@ -119,10 +118,11 @@ def _largest(problem: Invariance, lump: int, sign: int) -> fmpq:
         far = problem.region.temperature[other] if isinstance(other, int) else problem.ambient[other]
         # Heat through a link grows with the other end's temperature: its extreme is at that end's extreme.
         total += _bent_heat(link, own, far[upper], sign)
-        if isinstance(other, int) and other in modules:
-            conductance[other] += link.conductance  # shares its temperature with the module: bounded together
+        low, high = link.conductance, link.conductance + link.spread
+        if isinstance(other, int) and other in modules:  # shares its temperature with the module: bounded together
+            conductance[other] = (conductance[other][0] + low, conductance[other][1] + high)
         else:
-            total += sign * link.conductance * (far[upper] - own)
+            total += max(sign * g * (far[upper] - own) for g in (low, high))
     for partner, members in modules.items():
         total += _partner(problem, lump, partner, members, conductance[partner], own, sign)
     return total
@@ -138,21 +138,29 @@ def _bent_heat(link: Link, own: fmpq, far: fmpq, sign: int) -> fmpq:
     return value + max(sign * link.gain * difference * bound for bound in (low, high))
 
 
-def _partner(problem: Invariance, lump: int, partner: int, members: list[int], conductance: fmpq, own: fmpq,
+def _partner(problem: Invariance, lump: int, partner: int, members: list[int], conductance: Interval, own: fmpq,
              sign: int) -> fmpq:
-    """Return the largest sign times heat through all modules and linear links to one partner."""
-    modules = [problem.system.modules[k] for k in members]
-    bend = sign * sum((module.conductance[1] for module in modules), fmpq(0))
+    """Return the largest sign times heat through all modules and linear links to one partner.
+
+    Affine in every uncertain number for given temperatures and currents: the ends of their ranges suffice.
+    """
+    forms = [problem.system.forms(k) for k in members]
+    bend = sum((min(sign * module.conductance[1] for module in own_forms) for own_forms in forms), fmpq(0))
     best: fmpq | None = None
     for far, square in _candidates(problem.region.temperature[partner], bend):
-        value = sign * conductance * (far - own)
-        for k, module in zip(members, modules, strict=True):
-            a, b, c = _heat(module, lump, own, far, square)
-            value += peak((sign * a, sign * b, sign * c), problem.region.current[k])[0]
+        value = max(sign * g * (far - own) for g in conductance)
+        for k, own_forms in zip(members, forms, strict=True):
+            value += max(_peak_heat(module, lump, own, far, square, sign, problem.region.current[k])
+                         for module in own_forms)
         best = value if best is None or value > best else best
     if best is None:
         raise ValueError("an interval has at least one end")
     return best
+
+
+def _peak_heat(module: Module, lump: int, own: fmpq, far: fmpq, square: fmpq, sign: int, current: Interval) -> fmpq:
+    a, b, c = _heat(module, lump, own, far, square)
+    return peak((sign * a, sign * b, sign * c), current)[0]
 
 
 def _candidates(box: Interval, bend: fmpq) -> list[tuple[fmpq, fmpq]]:

@@ -47,10 +47,10 @@ class Kind:
 
 
 @contextmanager
-def working_precision() -> Iterator[None]:
+def working_precision(bits: int = PRECISION) -> Iterator[None]:
     """Set the precision of ball arithmetic for one proof and restore the caller's."""
     before = ctx.prec
-    ctx.prec = PRECISION
+    ctx.prec = bits
     try:
         yield
     finally:

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from ._contraction import CONTRACTION
+from ._frequency import FREQUENCY
 from ._gain import GAIN
+from ._hinf import HINF
 from ._invariance import INVARIANCE
 from ._kind import Kind
+from ._loop import LOOP
 from ._network import NETWORK
 from ._observer import OBSERVER
+from ._peak import PEAK
+from ._regulated import REGULATED
 from ._runaway import RUNAWAY
+from ._stability import STABILITY
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN)}
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
+                                                       REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP)}

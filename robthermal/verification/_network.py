@@ -50,12 +50,13 @@ class Network:
     rate: fmpq
     weights: Numbers
     margin: fmpq
+    uncertainty: fmpq
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     """Return the problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
-    mapping(region, "region")
+    uncertainty = not_negative(mapping(region, "region").get("uncertainty", 0), "region.uncertainty")
     capacity = _numbers(get(table, "capacity", "system"), "system.capacity")
     n = len(capacity.nearest)
     if n == 0 or not bool(np.all(capacity.nearest > 0)):
@@ -71,11 +72,14 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     method = text(found.get("method", "max"), "evidence.method")
     if method not in ("max", "sum"):
         raise InputError(f"method {name_of(method)}", where="evidence.method", expected="'max' or 'sum'")
+    if uncertainty >= 1 or (uncertainty > 0 and method != "max"):
+        raise InputError(f"uncertainty {show(uncertainty)} with method {method}", where="region.uncertainty",
+                         expected="below 1, with method 'max'")
     weights = _numbers(get(found, "weights", "evidence"), "evidence.weights")
     if len(weights.nearest) != n:
         raise InputError(f"{len(weights.nearest)} weights", where="evidence.weights", expected=f"{n}, one per lump")
     rate = not_negative(get(found, "rate", "evidence"), "evidence.rate")
-    return Network(capacity, rows, cols, values, method, rate, weights, margin_of(margin, "rate"))
+    return Network(capacity, rows, cols, values, method, rate, weights, margin_of(margin, "rate"), uncertainty)
 
 
 def claim(problem: Network) -> str:
@@ -83,7 +87,10 @@ def claim(problem: Network) -> str:
     norm = "largest" if problem.method == "max" else "summed"
     speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
              else "decays strictly")
-    return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries is stable: "
+    spread = (f" for all conductances within {show(100 * problem.uncertainty)} % of the given ones, those between two "
+              "lumps and the row sums each on their own" if problem.uncertainty > 0 else "")
+    return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries is stable"
+            f"{spread}: "
             f"the weighted {norm} absolute temperature difference (method {problem.method}) between any two of its "
             f"trajectories under the same inputs {speed}.")
 
@@ -158,12 +165,16 @@ def _sums(problem: Network, rate: float) -> tuple[Floats, Floats, Floats]:
     """
     lines, others = _lines(problem)
     n = len(problem.capacity.nearest)
+    uncertainty = _above(problem.uncertainty)
     with np.errstate(all="ignore"):
         terms = problem.values.nearest * problem.weights.nearest[others]
         scale = problem.capacity.nearest * problem.weights.nearest
         decay = rate * scale
         sums = np.bincount(lines, terms, n) + decay
         total = np.bincount(lines, np.abs(terms), n) + decay
+        if uncertainty > 0:
+            spread, size = _spread(problem)
+            sums, total = sums + uncertainty * spread, total + uncertainty * size
         bounds = total * (np.bincount(lines, minlength=n) + 16.0) * _UNIT
     extreme = ~_moderate(problem.weights.nearest) | ~_moderate(problem.capacity.nearest)
     odd = (~_moderate(problem.values.nearest) & (problem.values.nearest != 0)) | extreme[others]
@@ -174,6 +185,26 @@ def _sums(problem: Network, rate: float) -> tuple[Floats, Floats, Floats]:
     return sums, bounds, scale
 
 
+def _spread(problem: Network) -> tuple[Floats, Floats]:
+    """Return sum_j A_ij |w_j - w_i| + |sum_j A_ij| w_i in floats, and the same sums of absolute values.
+
+    What a row gains per unit of uncertainty. A difference errs by three roundings of its parts at most, so the bound of
+    ``_sums`` covers these terms too: k more sums of terms with at most six roundings, relative to the larger ``size``.
+    """
+    n = len(problem.capacity.nearest)
+    here, there = problem.weights.nearest[problem.rows], problem.weights.nearest[problem.cols]
+    off = np.where(problem.rows == problem.cols, 0.0, problem.values.nearest)
+    sums = np.bincount(problem.rows, problem.values.nearest, n)
+    sizes = np.bincount(problem.rows, np.abs(problem.values.nearest), n)
+    spread = np.bincount(problem.rows, off * np.abs(there - here), n) + np.abs(sums) * problem.weights.nearest
+    return spread, np.bincount(problem.rows, off * (there + here), n) + sizes * problem.weights.nearest
+
+
+def _above(value: fmpq) -> float:
+    """Return a double that is not below a number."""
+    return -round_down(-value)
+
+
 def _moderate(values: Floats) -> NDArray[np.bool_]:
     size = np.abs(values)
     return (size >= _MODERATE[0]) & (size <= _MODERATE[1])
@@ -182,9 +213,14 @@ def _moderate(values: Floats) -> NDArray[np.bool_]:
 def _exact_line(problem: Network, lump: int, entries: Indices) -> fmpq:
     """Return (sum_j A_ij w_j)/(E_i w_i) exactly [1/s]."""
     _, others = _lines(problem)
-    total = fmpq(0)
+    total, loss, own = fmpq(0), fmpq(0), problem.weights.at(lump)
     for k in entries.tolist():
-        total += problem.values.at(k) * problem.weights.at(int(others[k]))
+        value, weight = problem.values.at(k), problem.weights.at(int(others[k]))
+        total += value * weight
+        loss += value
+        if others[k] != lump:
+            total += problem.uncertainty * value * abs(weight - own)
+    total += problem.uncertainty * abs(loss) * own
     return total / (problem.capacity.at(lump) * problem.weights.at(lump))
 
 

@@ -29,6 +29,7 @@ from ._lyapunov import (
 )
 from ._numbers import exact, name_of, round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
+from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 from ._vertices import Entries
 
 _LONGEST = 100_000  # |E^-1 A| T_s beyond which the exponential is not enclosed
@@ -48,7 +49,9 @@ class Observer:
     """The exact problem of one observer certificate."""
 
     system: ThermalSystem
+    nominal: ThermalSystem
     region: Region
+    parameters: Parameters
     sensors: tuple[Sensor, ...]
     gain: tuple[tuple[fmpq, ...], ...]
     sample_time: fmpq
@@ -59,17 +62,22 @@ class Observer:
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Observer:
     """Return the exact problem, or raise InputError."""
-    network = read_system(system)
-    box, table, found = read_region(region, network), mapping(region, "region"), mapping(evidence, "evidence")
-    if "parameters" in table:
-        raise InputError("uncertain parameters are not part of this kind of claim", where="region.parameters")
+    nominal, table, found = read_system(system), mapping(region, "region"), mapping(evidence, "evidence")
+    box, parameters = read_region(region, nominal), read_parameters(table)
+    for name, _ in parameters:
+        if name.startswith("lumps."):
+            raise InputError(f"an uncertain capacity, {name_of(name)}", where="region.parameters",
+                             expected="conductances of links, values and slopes of modules",
+                             remedy="Certify the observer for each capacity of interest.")
+    network = worst_system(nominal, system, parameters)
     sensors = tuple(_sensor(item, network, f"system.sensors[{k}]")
                     for k, item in enumerate(sequence(get(system, "sensors", "system"), "system.sensors")))
     contraction = positive(found.get("contraction", 1), "evidence.contraction")
     if contraction > 1:
         raise InputError(f"contraction {show(contraction)}", where="evidence.contraction", expected="at most 1")
     n = len(network.lumps)
-    return Observer(network, box, sensors, _matrix(get(system, "gain", "system"), n, len(sensors), "system.gain"),
+    return Observer(network, nominal, box, parameters, sensors,
+                    _matrix(get(system, "gain", "system"), n, len(sensors), "system.gain"),
                     positive(get(table, "sample_time", "region"), "region.sample_time"), contraction,
                     margin_of(margin, "contraction"),
                     _matrix(get(found, "matrix", "evidence"), n, n, "evidence.matrix"))
@@ -81,10 +89,12 @@ def claim(problem: Observer) -> str:
     reads = ", ".join(f"{name_of(s.name)} ({show(s.gain)} times {name_of(lumps[s.lump])})" for s in problem.sensors)
     speed = (f"shrinks at least by {show(problem.contraction)}² per sample" if problem.contraction < 1
              else "shrinks strictly with every sample")
+    known = (f"{say_parameters(problem.parameters)}, the same in plant and observer, A_d and Γ those of the nominal "
+             "numbers and f all other heat" if problem.parameters else "")
     return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the {say_system(problem.system)} with sensors "
             f"{reads or 'none'}, sampled every {show(problem.sample_time)} s, f held in between, converges for all "
-            f"{say_region(problem.system, problem.region)}, temperatures and estimates both in this box: e'Pe of the "
-            f"error {speed}.")
+            f"{say_region(problem.system, problem.region)}, temperatures and estimates both in this box{known}: "
+            f"e'Pe of the error {speed}.")
 
 
 def prove(problem: Observer) -> Proof:
@@ -126,12 +136,12 @@ def _prove(problem: Observer, contraction: fmpq) -> Proof:
     P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])
     if not is_positive(make_part(P, "", True)):
         return Proof(False, "P > 0 fails or cannot be proven")
-    sampled = _sampled(problem, base)
+    sampled = _sampled(problem)
     if isinstance(sampled, str):
         return Proof(False, sampled)
     A_d, hold = sampled
     left = P * hold
-    passive = P * (A_d - _injection(problem)) + left * dense(_reference(problem.system), n)
+    passive = P * (A_d - _injection(problem)) + left * dense(_beyond_passive(problem, base), n)
     start = make_part(_schur(passive, P * arb(contraction)), "", True)
     links = [[_part(left, item, n) for item in items] for items in bent]
     words = f"M'PM < {show(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
@@ -150,12 +160,10 @@ def _prove(problem: Observer, contraction: fmpq) -> Proof:
     return proof
 
 
-def _sampled(problem: Observer, links: Entries) -> tuple[arb_mat, arb_mat] | str:
-    """Return balls around A_d and Γ, or why there are none."""
+def _sampled(problem: Observer) -> tuple[arb_mat, arb_mat] | str:
+    """Return balls around A_d and Γ of the nominal network, or why there are none."""
     n = len(problem.matrix)
-    entries = dict(links)
-    for place, value in _reference(problem.system).items():
-        entries[place] = entries.get(place, fmpq(0)) - value
+    entries = _passive(problem)
     scaled = {(i, j): value / problem.system.capacity[i] for (i, j), value in entries.items()}
     size = sum((abs(value) for value in scaled.values()), fmpq(0)) * problem.sample_time
     if size > _LONGEST:
@@ -169,13 +177,21 @@ def _sampled(problem: Observer, links: Entries) -> tuple[arb_mat, arb_mat] | str
         return "the passive network has no inverse, or none can be proven: some lump has no path to an ambient"
 
 
-def _reference(system: ThermalSystem) -> Entries:
-    """Return what leaves f because A holds it: minus the conductance of the modules at their reference."""
-    entries: Entries = {}
-    for module in system.modules:
+def _passive(problem: Observer) -> Entries:
+    """Return A: linear links and the conductance of the modules at their reference, nominal."""
+    entries = dict(link_slopes(problem.nominal, problem.region)[0])
+    for module in problem.nominal.modules:
         h, c, K = module.hot, module.cold, module.conductance[0]
-        for place, value in (((h, h), K), ((c, c), K), ((h, c), -K), ((c, h), -K)):
+        for place, value in (((h, h), -K), ((c, c), -K), ((h, c), K), ((c, h), K)):
             entries[place] = entries.get(place, fmpq(0)) + value
+    return entries
+
+
+def _beyond_passive(problem: Observer, links: Entries) -> Entries:
+    """Return what the linear links add to f beyond A: at their least conductance, minus A."""
+    entries = dict(links)
+    for place, value in _passive(problem).items():
+        entries[place] = entries.get(place, fmpq(0)) - value
     return entries
 
 

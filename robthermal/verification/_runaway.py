@@ -2,7 +2,7 @@
 
 Hot side with conductance g to a sink at w, cold face held at x_c. The load is q(I) = N(I)/(g + K - S I), and q'(I)
 has the sign of a cubic (errata of Evers (2021), "Thermal runaway"). Everything is a polynomial with rational
-coefficients: signs are decided exactly by Bernstein coefficients (proof note, 6).
+coefficients in the current and the constants: signs are decided exactly by Bernstein coefficients (proof note, 6).
 """
 
 from __future__ import annotations
@@ -10,28 +10,30 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from flint import fmpq
+from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from robthermal.errors import InputError
+
+from ._box_sign import Terms, positive_on
 from ._fields import Interval, get, interval, mapping, no_other, positive, text
 from ._kind import Kind, Proof
 from ._numbers import as_float, name_of, show
 from ._system import say_interval
+from ._uncertain import Parameters, read_parameters, say_parameters
 
-_DEEPEST = 200
-Polynomial = list[fmpq]  # coefficients, constant first
+_CONSTANTS = {"seebeck": "S", "resistance": "R", "conductance": "K", "sink_conductance": "g", "sink_temperature": "w",
+              "setpoint": "x_c"}
+Polynomial = Any  # in (S, R, K, g, w, x_c, I), flint's
 
 
 @dataclass(frozen=True)
 class Runaway:
-    """The exact problem of one runaway certificate."""
+    """The exact problem of one runaway certificate: constants, their ranges, and where the fold is claimed to be."""
 
     name: str
-    S: fmpq
-    R: fmpq
-    K: fmpq
-    g: fmpq
-    w: fmpq
-    cold: fmpq
+    constants: tuple[fmpq, ...]
+    ranges: tuple[Interval, ...]
+    parameters: Parameters
     current: Interval
     load: Interval
 
@@ -39,43 +41,51 @@ class Runaway:
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Runaway:
     """Return the exact problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
-    mapping(region, "region")
     no_other(mapping(margin, "margin"), [], "margin")
-    S, R, K, g, w, cold = (positive(get(table, key, "system"), f"system.{key}") for key in (
-        "seebeck", "resistance", "conductance", "sink_conductance", "sink_temperature", "setpoint"))
+    constants = {key: positive(get(table, key, "system"), f"system.{key}") for key in _CONSTANTS}
+    parameters = read_parameters(mapping(region, "region"))
+    given = dict(parameters)
+    no_other(given, list(_CONSTANTS), "region.parameters")
+    for key, (low, _) in parameters:
+        if low <= 0:
+            raise InputError(f"{key} may be {show(low)}", where=f"region.parameters[{name_of(key)}]",
+                             expected="numbers above zero")
+    ranges = tuple(given.get(key, (value, value)) for key, value in constants.items())
     name = text(table["name"], "system.name") if "name" in table else ""
-    return Runaway(name, S, R, K, g, w, cold, interval(get(found, "current", "evidence"), "evidence.current"),
+    return Runaway(name, tuple(constants.values()), ranges, parameters,
+                   interval(get(found, "current", "evidence"), "evidence.current"),
                    interval(get(found, "load", "evidence"), "evidence.load"))
 
 
 def claim(problem: Runaway) -> str:
     """Return the one sentence the data give."""
     title = f" {name_of(problem.name)}" if problem.name else ""
-    return (f"The module{title} (S = {show(problem.S)} V/K, R = {show(problem.R)} Ohm, K = {show(problem.K)} W/K), hot "
-            f"side at {show(problem.g)} W/K to a sink of {show(problem.w)} K, cold face at {show(problem.cold)} K, "
+    S, R, K, g, w, cold = problem.constants
+    return (f"The module{title} (S = {show(S)} V/K, R = {show(R)} Ohm, K = {show(K)} W/K), hot "
+            f"side at {show(g)} W/K to a sink of {show(w)} K, cold face at {show(cold)} K"
+            f"{',' + say_parameters(problem.parameters) + ' instead' if problem.parameters else ''}, "
             f"carries more load with more current up to a current in {say_interval(problem.current)} A, where the load "
             f"is in {say_interval(problem.load)} W and stops growing.")
 
 
 def prove(problem: Runaway) -> Proof:
-    """Prove sign pattern of the cubic and enclosure of the load at its smallest positive root."""
+    """Prove sign pattern of the cubic and enclosure of the load at its smallest positive root, for all constants."""
     low, high = problem.current
-    cubic = slope_cubic(problem)
+    cubic, numerator, denominator = _polynomials()
     if low < 0:
         return Proof(False, f"the current interval starts at {show(low)} A, below 0")
-    if problem.g + problem.K - problem.S * high <= 0:
+    if not _holds(problem, denominator, (high, high)):
         return Proof(False, f"g + K - S I is not positive up to {show(high)} A: no equilibrium of the hot side there")
-    if not _positive_on(cubic, fmpq(0), low):
+    if not _holds(problem, cubic, (fmpq(0), low)):
         return Proof(False, f"dq/dI > 0 fails or cannot be proven on [0, {show(low)}] A: the fold lies lower")
-    if not _value(cubic, high) < 0:
+    if not _holds(problem, -cubic, (high, high)):
         return Proof(False, f"dq/dI is not negative at {show(high)} A: the fold lies higher")
-    least = _load(problem, low)  # q grows from low to the root
-    if not problem.load[0] <= least:
-        return Proof(False, f"the load at {show(low)} A is {show(least)} W, below {show(problem.load[0])} W")
-    if not _positive_on(_load_gap(problem, problem.load[1]), low, high):
-        return Proof(False, f"q(I) < {show(problem.load[1])} W fails or cannot be proven over "
-                            f"{say_interval(problem.current)} A")
-    margins = {"current_width": as_float(high - low), "load_width": as_float(problem.load[1] - least)}
+    least, most = problem.load  # q grows from low to the root
+    if not _holds(problem, numerator - least * denominator, (low, low), strict=False):
+        return Proof(False, f"the load at {show(low)} A is below {show(least)} W, or not proven to be above")
+    if not _holds(problem, most * denominator - numerator, (low, high)):
+        return Proof(False, f"q(I) < {show(most)} W fails or cannot be proven over {say_interval(problem.current)} A")
+    margins = {"current_width": as_float(high - low), "load_width": as_float(most - least)}
     return Proof(True, "dq/dI > 0 below the interval and < 0 at its end, exactly", margins)
 
 
@@ -84,58 +94,20 @@ def find_margin(problem: Runaway) -> dict[str, float]:
     return {}
 
 
-def slope_cubic(problem: Runaway) -> Polynomial:
-    """Return the cubic with the sign of dq/dI (errata; equal to 2 (g + K - S I)² dq/dI)."""
-    S, R, K, g, w, cold = problem.S, problem.R, problem.K, problem.g, problem.w, problem.cold
-    return [2 * g * S * ((g + 2 * K) * cold - K * w), -2 * (K + g) * (2 * K * R + g * R + 2 * S * S * cold),
-            S * (5 * K * R + 4 * g * R + 2 * S * S * cold), -2 * R * S * S]
+def _polynomials() -> tuple[Polynomial, Polynomial, Polynomial]:
+    """Return the cubic with the sign of dq/dI (errata; 2 (g + K - S I)² dq/dI), and numerator, denominator of q(I)."""
+    S, R, K, g, w, x, I = fmpq_mpoly_ctx.get([*_CONSTANTS.values(), "I"], Ordering.lex).gens()  # noqa: E741 - current
+    half = fmpq(1, 2)
+    cubic = (2 * g * S * ((g + 2 * K) * x - K * w) - 2 * (K + g) * (2 * K * R + g * R + 2 * S * S * x) * I
+             + S * (5 * K * R + 4 * g * R + 2 * S * S * x) * I**2 - 2 * R * S * S * I**3)
+    numerator = (g * K * (x - w) + g * S * x * I - (half * g * R + K * R + S * S * x) * I**2 + half * S * R * I**3)
+    return cubic, numerator, g + K - S * I
 
 
-def _numerator(problem: Runaway) -> Polynomial:
-    S, R, K, g, w, cold = problem.S, problem.R, problem.K, problem.g, problem.w, problem.cold
-    return [g * K * (cold - w), g * S * cold, -(g * R / 2 + K * R + S * S * cold), S * R / 2]
-
-
-def _load(problem: Runaway, current: fmpq) -> fmpq:
-    return _value(_numerator(problem), current) / (problem.g + problem.K - problem.S * current)
-
-
-def _load_gap(problem: Runaway, load: fmpq) -> Polynomial:
-    """Return load (g + K - S I) - N(I): positive where q(I) is below the load, as long as g + K - S I > 0."""
-    a, b, c, d = _numerator(problem)
-    return [load * (problem.g + problem.K) - a, -load * problem.S - b, -c, -d]
-
-
-def _value(polynomial: Polynomial, x: fmpq) -> fmpq:
-    total = fmpq(0)
-    for coefficient in reversed(polynomial):
-        total = total * x + coefficient
-    return total
-
-
-def _positive_on(polynomial: Polynomial, low: fmpq, high: fmpq) -> bool:
-    """Prove a cubic positive on an interval: its Bernstein coefficients are, on a fine enough subdivision."""
-    stack = [(low, high, 0)]
-    while stack:
-        a, b, depth = stack.pop()
-        if min(_bernstein(polynomial, a, b)) > 0:
-            continue
-        middle = (a + b) / 2
-        if depth == _DEEPEST or min(_value(polynomial, x) for x in (a, middle, b)) <= 0:
-            return False
-        stack += [(a, middle, depth + 1), (middle, b, depth + 1)]
-    return True
-
-
-def _bernstein(polynomial: Polynomial, low: fmpq, high: fmpq) -> list[fmpq]:
-    """Return the Bernstein coefficients of a cubic on an interval: the cubic lies between the least and largest."""
-    a, b, c, d = polynomial
-    h = high - low
-    p0 = _value(polynomial, low)
-    p1 = (b + 2 * c * low + 3 * d * low * low) * h
-    p2 = (c + 3 * d * low) * h * h
-    p3 = d * h * h * h
-    return [p0, p0 + p1 / 3, p0 + 2 * p1 / 3 + p2 / 3, p0 + p1 + p2 + p3]
+def _holds(problem: Runaway, polynomial: Polynomial, current: Interval, *, strict: bool = True) -> bool:
+    """Prove a polynomial positive for all constants of their ranges and all currents of an interval."""
+    terms: Terms = polynomial.to_dict()
+    return positive_on(terms, [*problem.ranges, current], strict=strict)
 
 
 RUNAWAY = Kind("runaway", read, claim, prove, find_margin)

@@ -154,3 +154,71 @@ def test_malformed(change, words):
     with pytest.raises(InputError) as caught:
         establish("network", system=system, region={}, evidence={"rate": 0.1, "weights": [1, 1]}, made_by={})
     assert words in str(caught.value)
+
+
+def chain(n, loss=0.5):
+    """A rod of n lumps that loses heat at one end."""
+    A = np.diag(np.full(n - 1, 2.0), 1) + np.diag(np.full(n - 1, 2.0), -1)
+    A -= np.diag(A.sum(axis=1))
+    A[0, 0] -= loss
+    return np.full(n, 3.0), A
+
+
+def test_two_lumps_with_uncertain_conductances():
+    """Rows 2 f (d_j - d_i) and -loss f d_0 with every f at its worst: exact by hand."""
+    E, A = chain(2)
+    d, u = np.array([1.0, 1.5]), 0.1
+    rows = [2.2 * 0.5 - 0.45 * 1.0, -1.8 * 0.5]
+    system = {"capacity": E, **dict(zip(("rows", "cols"), np.nonzero(A), strict=True)), "values": A[np.nonzero(A)]}
+
+    def holds(rate, weights):
+        return establish("network", system=system, region={"uncertainty": u}, made_by={}, margin={},
+                         evidence={"rate": rate, "weights": weights}).holds
+
+    assert not holds(0.0, d) and rows[0] > 0
+    d = np.array([1.0, 1.15])
+    rate = min(-(2.2 * 0.15 - 0.45), 1.8 * 0.15 / 1.15) / 3.0
+    assert holds(rate * (1 - 1e-12), d) and not holds(rate * (1 + 1e-12), d)
+
+
+def test_sampled_conductances_never_violate_an_uncertain_network():
+    """Row inequalities with random factors, most at their ends, in floats."""
+    rng = np.random.default_rng(0)
+    accepted = violated = 0
+    for _ in range(150):
+        E, A = grid(3, int(rng.integers(1000)))
+        A = A.toarray() - 0.5 * np.diag(E)
+        u = float(rng.choice([0.01, 0.05, 0.2]))
+        weights = np.round(np.linalg.solve(-A, E) * rng.uniform(1 - u / 4, 1 + u / 4, len(E)), 3)
+        nominal = float(np.max(A @ weights / E / weights))
+        rate = max(-nominal * float(rng.uniform(0, 1)), 0.0)
+        made = establish("network", system={"capacity": E, **dict(zip(("rows", "cols"), np.nonzero(A), strict=True)),
+                                            "values": A[np.nonzero(A)]}, region={"uncertainty": u}, made_by={},
+                         evidence={"rate": rate, "weights": weights}, margin={})
+        worst = -np.inf
+        for _ in range(40):
+            f = 1 + u * np.sign(rng.standard_normal(A.shape))
+            off = (A - np.diag(np.diag(A))) * f
+            other = off - np.diag(off.sum(axis=1)) + np.diag(A.sum(axis=1) * np.diag(f))
+            worst = max(worst, float(np.max((other @ weights + rate * E * weights) / (np.abs(other) @ weights))))
+        assert not (made.holds and worst > 1e-12)
+        accepted += made.holds
+        violated += worst > 0
+    assert accepted > 10 and violated > 10
+
+
+def test_uncertain_networks_say_so_and_refuse_what_they_cannot():
+    E, A = chain(3)
+    system = {"capacity": E, **dict(zip(("rows", "cols"), np.nonzero(A), strict=True)), "values": A[np.nonzero(A)]}
+
+    def made(uncertainty, method="max"):
+        return establish("network", system=system, region={"uncertainty": uncertainty}, made_by={},
+                         evidence={"method": method, "rate": 0.0, "weights": [1.0, 1.1, 1.15]})
+
+    certificate = made(0.01)
+    assert certificate.holds and "within 1 % of the given ones" in certificate.claim
+    wider = Certificate(**{**vars(certificate), "region": {"uncertainty": 0.02}})
+    assert "claim is not the one" in verify(wider).reason
+    for uncertainty, method in ((1.0, "max"), (-0.1, "max"), (0.1, "sum"), ("NaN", "max")):
+        with pytest.raises(InputError):
+            made(uncertainty, method)

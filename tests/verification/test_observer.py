@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from flint import arb, arb_mat
 from scipy.linalg import expm
+from test_uncertain import machines, names_of, spans
 
 from robthermal.errors import InputError
 from robthermal.verification import Certificate, establish, verify
@@ -55,12 +56,12 @@ def machine(rng):
     return {"system": {**system, "gain": gain.tolist(), "sensors": [lump]}, "region": region}
 
 
-def error_matrix(document, x, currents):
-    """M in floats, from the heat flows by complex step."""
+def error_matrix(document, x, currents, nominal=None):
+    """M in floats, from the heat flows by complex step; ``nominal`` gives A_d and Γ."""
     system, Ts = document["system"], truth.number(document["region"]["sample_time"])
     E = np.array([truth.number(lump["capacity"]) for lump in system["lumps"].values()])
     n, names = len(E), list(system["lumps"])
-    flat = copy.deepcopy(system)
+    flat = copy.deepcopy(nominal or system)
     for module in flat["modules"].values():
         for key in ("seebeck", "resistance", "conductance"):
             module[key] = {"value": module[key]["value"], "slope": 0.0}
@@ -73,12 +74,12 @@ def error_matrix(document, x, currents):
     return full[:n, :n] - L @ C + full[:n, n:] @ (truth.jacobian(system, x, currents) - passive)
 
 
-def violation(document, rng, count=40):
+def violation(document, rng, count=40, nominal=None):
     P = np.array([[truth.number(value) for value in row] for row in document["evidence"]["matrix"]])
     c = truth.number(document["evidence"]["contraction"])
     worst = -float(np.linalg.eigvalsh((P + P.T) / 2)[0])
     for x, currents in truth.points(document["system"], document["region"], rng, count):
-        M = error_matrix(document, x, currents)
+        M = error_matrix(document, x, currents, nominal)
         worst = max(worst, float(np.linalg.eigvalsh(M.T @ P @ M - c**2 * P)[-1] / np.linalg.norm(P, 2)))
     return worst
 
@@ -129,6 +130,35 @@ def test_hopeless_observers_are_not_proven():
     floating = rod(0.2, 0.9)
     floating["system"] = {**floating["system"], "links": []}
     assert "no path to an ambient" in made(floating).reason
+
+
+def test_an_uncertain_conductance_that_plant_and_observer_share():
+    """M = exp(-g T/E) - l + Γ (g - g_p), Γ = (1 - exp(-g T/E))/g, largest at the least g_p."""
+    decay = math.exp(-0.5 * 2.0 / 10.0)
+    M = decay - 0.2 + (1 - decay) / 0.5 * (0.5 - 0.3)
+    for factor, holds in ((1 + 1e-9, True), (1 - 1e-9, False)):
+        document = rod(0.2, M * factor)
+        document["region"] = {**document["region"], "parameters": {"links.rod-room.conductance": [0.3, 0.6]}}
+        certificate = made(document)
+        assert certificate.holds is holds
+    assert "'links.rod-room.conductance' in [0.3, 0.6], the same in plant and observer" in certificate.claim
+
+
+def test_no_machine_of_the_ranges_violates_an_accepted_observer():
+    rng = np.random.default_rng(9)
+    accepted = violated = 0
+    for _ in range(40):
+        document = machine(rng)
+        E = [lump["capacity"] for lump in document["system"]["lumps"].values()]
+        document["evidence"] = {"matrix": np.diag(E).tolist(), "contraction": 1.0}
+        ranges = spans(document["system"], names_of(document["system"]), rng, 3)
+        cert = made({**document, "region": {**document["region"], "parameters": ranges}}, margin={})
+        worst = max(violation({**document, "system": other}, rng, 8, document["system"])
+                    for other in machines(document["system"], ranges, rng, 6))
+        assert not (cert.holds and worst > 1e-9), cert.claim
+        accepted += cert.holds
+        violated += worst > 0
+    assert accepted > 4 and violated > 4
 
 
 def gain_document(value, rate=0.01):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
+from flint import fmpq
 from scipy.optimize import minimize_scalar
 
 from robthermal.errors import InputError
 from robthermal.verification import establish
+from robthermal.verification._box_sign import positive_on
 
 MODULE = {"seebeck": 0.053743, "resistance": 4.6298, "conductance": 0.2968, "sink_conductance": 0.689,
           "sink_temperature": 298.15, "setpoint": 278.15}
@@ -95,3 +99,59 @@ def test_malformed(key):
             make({**MODULE, key: value}, [1, 2], [1, 2])
     with pytest.raises(InputError, match=key):
         make({name: value for name, value in MODULE.items() if name != key}, [1, 2], [1, 2])
+
+
+def family(ranges, current, heat):
+    return establish("runaway", system=MODULE, region={"parameters": ranges}, made_by={},
+                     evidence={"current": current, "load": heat})
+
+
+def test_a_family_of_modules_holds_exactly_the_folds_of_its_members():
+    rng = np.random.default_rng(4)
+    for names in (["seebeck"], ["resistance", "sink_conductance"], ["sink_temperature", "conductance", "setpoint"]):
+        ranges = {name: [0.97 * MODULE[name], 1.02 * MODULE[name]] if "temp" not in name and name != "setpoint" else
+                  [MODULE[name] - 2, MODULE[name] + 1] for name in names}
+        corners = [dict(zip(names, chosen, strict=True)) for chosen in itertools.product(*ranges.values())]
+        folds = np.array([fold({**MODULE, **corner}) for corner in corners])
+        inside = [fold({**MODULE, **{name: float(rng.uniform(*ranges[name])) for name in names}}) for _ in range(20)]
+        low, high = folds.min(axis=0), folds.max(axis=0)
+        for slack, holds in ((2e-3, True), (-2e-3, False)):
+            currents, heats = [low[0] - slack, high[0] + slack], [low[1] - 10 * abs(slack), high[1] + 10 * abs(slack)]
+            certificate = family(ranges, currents, heats)
+            assert certificate.holds is holds, (names, slack, certificate.reason)
+            if holds:
+                assert all(currents[0] <= i <= currents[1] and heats[0] <= q <= heats[1] for i, q in inside)
+                assert f"'{names[0]}' in" in certificate.claim
+        assert not family(ranges, currents, [low[1] + 0.05, high[1] + 0.1]).holds
+        assert not family(ranges, currents, [low[1] - 0.1, high[1] - 0.05]).holds
+
+
+@pytest.mark.parametrize(("ranges", "message"), [
+    ({"modules.m1.seebeck.value": [1, 2]}, "unknown key"), ({"seebeck": [0, 0.1]}, "above zero"),
+    ({"seebeck": [0.2, 0.1]}, "is empty"), ([], "not an object")])
+def test_malformed_families(ranges, message):
+    with pytest.raises(InputError, match=message):
+        family(ranges, [1.5, 1.6], [3, 4])
+
+
+def test_polynomials_on_boxes_are_never_wrongly_called_positive():
+    """Random polynomials in three variables against a fine grid."""
+    rng = np.random.default_rng(1)
+    yes = no = 0
+    for _ in range(60):
+        terms = {tuple(rng.integers(0, 3, 3).tolist()): fmpq(int(rng.integers(-9, 10))) for _ in range(5)}
+        terms[0, 0, 0] = fmpq(int(rng.integers(0, 12)))
+        box = [(fmpq(-1), fmpq(1)), (fmpq(0), fmpq(2)), (fmpq(1, 2), fmpq(1, 2))]
+        x, y, z = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(0, 2, 41), [0.5])
+        least = sum(float(c.p) / float(c.q) * x**i * y**j * z**k for (i, j, k), c in terms.items()).min()
+        proven = positive_on(terms, box)
+        assert not (proven and least <= 0)
+        assert proven or least < 0.5
+        yes, no = yes + proven, no + (not proven)
+    assert yes > 5 and no > 5
+
+
+def test_zero_is_not_negative_and_not_positive():
+    square = {(2,): fmpq(1)}
+    assert positive_on(square, [(fmpq(0), fmpq(1))], strict=False)
+    assert not positive_on(square, [(fmpq(0), fmpq(1))])

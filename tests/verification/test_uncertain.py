@@ -61,14 +61,7 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
         method = list(METHODS)[k % 4]
         system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.4))
         names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
-        links = ["-".join(link["between"]) for link in system["links"]]
-        names += [f"links.{name}.conductance" for name in links if links.count(name) == 1]
-        names += [f"modules.m0.{prop}.{key}" for prop in ("seebeck", "resistance", "conductance")
-                  for key in ("value", "slope")]
-        ranges = {}
-        for name in rng.choice(names, 4, replace=False):
-            value = value_of(system, str(name))
-            ranges[str(name)] = sorted((value * float(rng.uniform(0.4, 1)), value * float(rng.uniform(1, 1.8))))
+        ranges = spans(system, names + names_of(system), rng, 4)
         region = truth.box(system, float(rng.uniform(0.5, 6)))
         evidence = truth.evidence_for(method, system, region, float(10 ** rng.uniform(-2.5, -1.3)), rng)
         cert = establish("contraction", system=system, region={**region, "parameters": ranges}, evidence=evidence,
@@ -79,6 +72,22 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
         accepted += cert.holds
         violated += worst > 0
     assert accepted > 20 and violated > 20
+
+
+def names_of(system):
+    """Links and module properties that can be uncertain."""
+    links = ["-".join(link["between"]) for link in system["links"]]
+    return [f"links.{name}.conductance" for name in links if links.count(name) == 1] + [
+        f"modules.m0.{prop}.{key}" for prop in ("seebeck", "resistance", "conductance") for key in ("value", "slope")]
+
+
+def spans(system, names, rng, count, least=0.4, most=1.8):
+    """Random ranges around some of the values."""
+    found = {}
+    for name in rng.choice(names, count, replace=False):
+        value = value_of(system, str(name))
+        found[str(name)] = sorted((value * float(rng.uniform(least, 1)), value * float(rng.uniform(1, most))))
+    return found
 
 
 def value_of(system, name):
@@ -110,8 +119,41 @@ def test_two_links_of_one_name_cannot_be_meant():
         establish("contraction", system=system, region=region, made_by={}, evidence={"method": "energy", "rate": 0.0})
 
 
-def test_kinds_that_do_not_cover_ranges_say_so():
-    region = {"temperature": [280.0, 350.0], "current": {}, "ambient": {"room": [290.0, 300.0]},
-              "parameters": {"links.rod-room.conductance": [0.4, 0.6]}}
-    with pytest.raises(InputError, match="not part of this kind"):
-        establish("invariance", system=ROD, region=region, made_by={}, evidence={})
+def test_a_box_is_never_left_whatever_the_conductance():
+    """A heater of 10 W holds the rod 10/g K above the room: at most 25 K for g >= 0.4 W/K."""
+    region = {"temperature": [290.0, 325.0], "current": {}, "ambient": {"room": [290.0, 300.0]},
+              "heat": {"rod": [0.0, 10.0]}, "parameters": {"links.rod-room.conductance": [0.4, 0.6],
+                                                          "lumps.rod.capacity": [5.0, 20.0]}}
+    assert establish("invariance", system=ROD, region=region, made_by={}, evidence={}).holds
+    region["parameters"] = {"links.rod-room.conductance": [0.3999, 0.6]}
+    refused = establish("invariance", system=ROD, region=region, made_by={}, evidence={})
+    assert not refused.holds and "upper face" in refused.reason
+
+
+def test_no_machine_of_the_ranges_leaves_an_accepted_box():
+    """Sampled heat flows on the faces of the box."""
+    rng = np.random.default_rng(3)
+    accepted = violated = 0
+    for k in range(60):
+        system = truth.random_system(rng, modules=1, bent=k % 3 == 0, wild=k % 2 == 0)
+        ranges = spans(system, names_of(system), rng, 4)
+        region = {**truth.box(system, float(rng.uniform(0.05, 1.5)), 265.0, 340.0), "ambient": {"room": [290.0, 300.0]}}
+        cert = establish("invariance", system=system, region={**region, "parameters": ranges}, evidence={}, made_by={},
+                         margin={})
+        worst = min(least_inward(other, region, rng) for other in machines(system, ranges, rng, 5))
+        assert not (cert.holds and worst < -1e-9), cert.claim
+        accepted += cert.holds
+        violated += worst < 0
+    assert accepted > 8 and violated > 8
+
+
+def least_inward(system, region, rng):
+    """Least sampled heat into the box on its faces [W]."""
+    least, n = np.inf, len(system["lumps"])
+    for x, currents in truth.points(system, region, rng, 10):
+        for k, (face, sign) in ((k, side) for k in range(n) for side in ((340.0, -1), (265.0, 1))):
+            y = x.copy()
+            y[k] = face
+            flow = truth.heat(system, y, currents, {"room": 300.0 if sign < 0 else 290.0})
+            least = min(least, sign * flow[k])
+    return least

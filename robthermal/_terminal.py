@@ -1,0 +1,98 @@
+"""What the command line says, and where: tables, JSON, progress; options that several commands share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
+Box = Annotated[tuple[float, float] | None, typer.Option(
+    "--temperature", help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")]
+AmbientRange = Annotated[list[str] | None, typer.Option(
+    "--ambient", help="Range of one ambient, in the unit of the file.", metavar="NAME=LO:HI")]
+
+
+def place(file: Path | None) -> Path | None:
+    """An output file whose folder exists: said before the work, not after it."""
+    if file is not None and not file.parent.is_dir():
+        raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
+    return file
+
+
+def drawing(file: Path | None) -> Path | None:
+    """An output file that matplotlib can write."""
+    if file is not None and file.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise typer.BadParameter(f"the file name ends in {file.suffix!r}, not in .svg, .png or .pdf")
+    return place(file)
+
+
+def show_report(report: Any, out: Path, as_json: bool, **more: Any) -> None:
+    """Claims of a report as a table or JSON; exit status 1 unless all hold and are verified."""
+    def show() -> None:
+        table = Table("claim", "answer", "box", "margin")
+        for claim in report.claims:
+            good = claim.holds and claim.verified
+            table.add_row(claim.title, "certified, verified" if good else f"NOT CERTIFIED: {claim.reason}", claim.box,
+                          claim.margin)
+        Console().print(table)
+        say(*(f"{name}: {value}" for name, value in more.items()), f"report: {out / 'report.html'}")
+
+    summary = {"holds": report.holds, "out": str(out), "report": str(out / "report.html"), **more,
+               "claims": [{"title": c.title, "holds": c.holds, "verified": c.verified, "reason": c.reason}
+                          for c in report.claims]}
+    answer(summary, as_json, show)
+    exit_unless(report.holds)
+
+
+def answer(summary: Any, as_json: bool, show: Callable[[], None]) -> None:
+    """Print a result for scripts or for people."""
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1, allow_nan=False, default=str))
+    else:
+        show()
+
+
+def say(*lines: str) -> None:
+    """Print lines."""
+    for line in lines:
+        typer.echo(line)
+
+
+def exit_unless(good: bool) -> None:
+    """Exit status 1 where the honest answer is no."""
+    if not good:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """A spinner with the stage on a terminal; nothing in a pipe."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda stage: None
+        return
+    with console.status("starting") as status:
+        yield lambda stage: status.update(stage)
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar of what is done on a terminal; nothing in a pipe."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda done, total: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

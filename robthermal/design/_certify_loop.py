@@ -1,0 +1,204 @@
+"""A designed loop as a certificate: its controller's matrices, the box its currents cannot leave, its observer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..certify import invariance as certify_invariance
+from ..certify import loop as certify_plain_loop
+from ..certify import observer as certify_observer
+from ..certify import runaway_free
+from ..errors import InputError, Outcome
+from ..thermal import System
+from ..verification import Certificate
+from ._linearization import FeedbackLinearization
+from ._lti import LinearController
+from ._modules import Array
+from ._numbers import expect
+from ._observer import GainObserver
+from ._pid import PID
+from ._plant import cold_side
+from ._state_feedback import StateFeedback
+
+Interval = tuple[float, float]
+Matrices = dict[str, Array]
+
+
+@dataclass(frozen=True)
+class CertifiedLoop:
+    """What is proven of a closed loop.
+
+    Parameters
+    ----------
+    loop : Certificate
+        In the box the loop contracts, limits active or not.
+    invariance : Certificate
+        Currents within the limits never drive a temperature out of the box.
+    observer : Certificate or None
+        In the box the estimation error shrinks; none where the temperatures are measured.
+    outcome : Outcome
+        "certified", or what is missing and why.
+    """
+
+    loop: Certificate
+    invariance: Certificate
+    observer: Certificate | None
+    outcome: Outcome
+
+    @property
+    def holds(self) -> bool:
+        """Whether all parts are proven."""
+        parts = (self.loop, self.invariance, self.observer)
+        return all(part.holds for part in parts if part is not None)
+
+    def __str__(self) -> str:
+        return self.outcome.text
+
+
+def certify_loop(system: System, controller: PID | StateFeedback | LinearController, law: FeedbackLinearization, *,
+                 temperature: Interval | Mapping[str, Interval] | None = None,
+                 ambient: Mapping[str, Interval] | None = None, heat: Mapping[str, Interval] | None = None,
+                 observer: GainObserver | None = None, drift: float | None = None) -> CertifiedLoop:
+    """Certify that a closed loop forgets its start, and stays in its box.
+
+    Parameters
+    ----------
+    system : System
+        The plant, which the law must have been built for: every module driven.
+    controller : PID, StateFeedback or LinearController
+        Outer loop.
+    law : FeedbackLinearization
+        With current limits, without voltage or slew limits.
+    temperature : tuple or mapping, optional
+        Box of temperatures [K]; default the box of `rt.certify.runaway_free`, which currents within the limits cannot
+        leave.
+    ambient, heat : mapping, optional
+        {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, none.
+    observer : GainObserver, optional
+        Where the law and the controller use estimates. The claim is then about the sampled model of the observer, the
+        heat of the modules held over a sample; without one it is about the plant in continuous time.
+    drift : float, optional
+        As in `rt.certify.loop`.
+
+    Returns
+    -------
+    CertifiedLoop
+        If it holds there is, for constant set-points, ambients and loads, one steady state, reached from everywhere in
+        the box.
+
+    Raises
+    ------
+    InputError
+        Voltage or slew limits, no current limits, a module the law does not drive, another kind of controller, sample
+        times that differ.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> system = rt.System(ambients={"room": {"temperature": 298.15}},
+    ...     lumps={"hot": {"capacity": 50.0}, "cold": {"capacity": 20.0}},
+    ...     links=[{"between": ("hot", "room"), "conductance": 2.0}, {"between": ("cold", "room"), "conductance": 0.1}],
+    ...     modules={"m": {"hot": "hot", "cold": "cold", "seebeck": {"value": 0.05}, "resistance": {"value": 4.0},
+    ...                    "conductance": {"value": 0.3}, "reference_temperature": 298.15}})
+    >>> law = rt.design.feedback_linearization(system, current_limits=(-0.2, 0.5))
+    >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.05, sample_time=1.0)
+    >>> print(rt.design.certify_loop(system, pi, law))
+    Certified: whatever its start in the box, 4.7 to 36.7 °C, the loop forgets it, with limits active or not.
+    """
+    expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
+    limits = _limits(system, law)
+    matrices = _matrices(controller, law)
+    if observer is not None:
+        expect(observer, GainObserver, "observer", "rt.design.observer")
+        if observer.sample_time != controller.sample_time:
+            raise InputError(f"the observer's sample time is {observer.sample_time:g} s", where="argument observer",
+                             expected=f"the controller's, {controller.sample_time:g} s")
+    if temperature is None:
+        free = runaway_free(system, current=limits, ambient=ambient, heat=heat)
+        stays, box = free.invariance, free.temperature
+        if not box:
+            return CertifiedLoop(stays, stays, None, Outcome(False, "not_certified", "Not certified: no box was found "
+                                 f"that the currents cannot leave. {stays.reason}"))
+    else:
+        box = dict(temperature) if isinstance(temperature, Mapping) else dict.fromkeys(system.lumps, temperature)
+        stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat)
+    loop = certify_plain_loop(system, current=limits, temperature=box, sample_time=controller.sample_time,
+                              controller=matrices, plant="continuous" if observer is None else "held",
+                              drift=drift if observer is None else None)
+    estimate = None if observer is None else certify_observer(
+        system, gain=observer.gain, sensors=observer.sensors, sample_time=observer.sample_time, current=limits,
+        temperature=box)
+    return CertifiedLoop(loop, stays, estimate, _outcome(loop, stays, estimate, box, drift))
+
+
+def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None, box: Mapping[str, Interval],
+             drift: float | None) -> Outcome:
+    named = {"the loop contracts in the box": loop, "the box is never left": stays,
+             "the estimation error shrinks in the box": estimate}
+    for what, part in named.items():
+        if part is not None and not part.holds:
+            return Outcome(False, "not_certified", f"Not certified: it is not shown that {what}: {part.reason}")
+    low, high = min(pair[0] for pair in box.values()) - 273.15, max(pair[1] for pair in box.values()) - 273.15
+    where = "" if estimate is None else " of temperatures and estimates, as long as the estimates stay in it"
+    moves = "" if drift is None or estimate is not None else (
+        f", as long as no face of a module moves by more than {drift:g} K within a sample")
+    return Outcome(True, "certified", f"Certified: whatever its start in the box{where}, {low:.1f} to {high:.1f} °C, "
+                   f"the loop forgets it, with limits active or not{moves}.")
+
+
+def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:
+    if law.system != system:
+        raise InputError("the law was built for another system", where="argument law", expected="the plant's own",
+                         remedy="Build it with rt.design.feedback_linearization(system).")
+    if set(law.names) != set(system.module_names):
+        raise InputError(f"the law drives {', '.join(law.names)}", where="argument law",
+                         expected="every module: " + ", ".join(system.module_names))
+    if np.isfinite([law.voltage_low, law.voltage_high]).any() or np.isfinite(law.slew).any():
+        raise InputError("the law has a voltage or slew limit", where="argument law", expected="current limits only")
+    if not np.isfinite([law.current_low, law.current_high]).all():
+        raise InputError("the law has no current limits", where="argument law", expected="a range for every module",
+                         remedy="Give current_limits=(lower, upper).")
+    return {name: (float(low), float(high)) for name, low, high in
+            zip(law.names, law.current_low, law.current_high, strict=True)}
+
+
+def _matrices(controller: object, law: FeedbackLinearization) -> Matrices:
+    """A, B, C, D, windup of a controller, modules in the order of the system; what never changes is no state."""
+    plant = cold_side(law)
+    n = len(law.system.lumps)
+    faces = np.eye(n)[law.modules.cold]
+    if isinstance(controller, PID):
+        found = _of_pid(controller, faces)
+    elif isinstance(controller, StateFeedback):
+        lumps = np.eye(n)[controller.plant.indices]
+        m = len(faces)
+        found = {"A": np.eye(m), "B": -controller.sample_time * controller.integral @ faces, "C": np.eye(m),
+                 "D": -controller.K @ lumps,
+                 "windup": -np.expm1(-controller.sample_time / controller.tracking_time) * np.eye(m)}
+    elif isinstance(controller, LinearController):
+        found = {"A": controller.A, "B": -controller.B @ faces, "C": controller.C, "D": -controller.D @ faces,
+                 "windup": controller.L}
+    else:
+        raise InputError(f"controller is a {type(controller).__name__}", where="argument controller",
+                         expected="a PID, StateFeedback or LinearController",
+                         remedy="Make one with rt.design.pid, state_feedback or linear_controller.")
+    own = [law.names.index(name) for name in plant.law.system.module_names]
+    return {"A": found["A"], "B": found["B"], "C": found["C"][own], "D": found["D"][own],
+            "windup": found["windup"][:, own]}
+
+
+def _of_pid(controller: PID, faces: Array) -> Matrices:
+    h, m = controller.sample_time, len(faces)
+    slope = controller.derivative / controller.filter_time
+    keep = np.exp(-h / controller.filter_time)
+    give = -np.expm1(-h / controller.tracking_time)
+    A = np.diag(np.concatenate([np.ones(m), np.full(m, keep)]))
+    B = np.vstack([-(h * controller.integral)[:, None] * faces, (1 - keep) * faces])
+    C = np.hstack([np.eye(m), np.diag(slope)])
+    D = -(controller.proportional + slope)[:, None] * faces
+    windup = np.vstack([np.diag(give), np.zeros((m, m))])
+    used = np.concatenate([(controller.integral != 0) | (give != 0), controller.derivative != 0])
+    return {"A": A[np.ix_(used, used)], "B": B[used], "C": C[:, used], "D": D, "windup": windup[used]}

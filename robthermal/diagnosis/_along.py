@@ -1,0 +1,187 @@
+"""A system linearised along a simulated record: how readings answer to a small extra heat, sample by sample.
+
+dδ/dt = E⁻¹(∂f/∂x δ + q): with ∂f/∂x frozen at the middle of each sample and the extra heat q linear within it, the step
+is exact, δ(k+1) = A δ(k) + h φ₁(Mh) q₀ + h φ₂(Mh)(q₁ - q₀). All candidates go through the recursion together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from ..calibration._data import Data
+from ..errors import InputError
+from ..thermal import Equations, System, trajectory
+
+Array = NDArray[np.float64]
+_IMAGINARY = 1e-40
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a unit of an effect does: extra heat, extra input, or a changed reading; what is None is zero.
+
+    Parameters
+    ----------
+    heat : tuple of ndarray, optional
+        Heat into the lumps at the start and at the end of every sample, both (n, n_lumps) [W].
+    drive : tuple of ndarray, optional
+        Change of the held inputs at the start and at the end of every sample, both (n, n_u), as in
+        `System.exogenous_names`.
+    reading : ndarray, optional
+        Change of all sensors of the system (n, n_sensors) [K].
+    """
+
+    heat: tuple[Array, Array] | None = None
+    drive: tuple[Array, Array] | None = None
+    reading: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A simulated record and the system linearised along it.
+
+    Parameters
+    ----------
+    system : System
+        With the record's initial temperatures.
+    one : Data
+        The record and its sensors.
+    x : ndarray, shape (n, n_lumps)
+        Simulated lump temperatures [K].
+    readings : ndarray, shape (n, n_sensors)
+        Simulated readings of all sensors of the system [K].
+    u : ndarray, shape (n, n_u)
+        Held inputs, in the order of `System.exogenous_names`.
+    """
+
+    system: System
+    one: Data
+    x: Array
+    readings: Array
+    u: Array
+
+    @property
+    def h(self) -> float:
+        """Sample time [s]."""
+        return self.one.record.sample_time
+
+    @property
+    def time(self) -> Array:
+        """Time of every sample [s]."""
+        return self.one.record.time
+
+    @property
+    def reference(self) -> float:
+        """Temperature about which sensor gains act [K]."""
+        return next(iter(self.system.ambients.values())).temperature
+
+    @cached_property
+    def equations(self) -> Equations:
+        """Equations of the system."""
+        return Equations(self.system)
+
+    @cached_property
+    def end(self) -> Array:
+        """Lump temperatures at the end of every sample (n, n_lumps) [K]."""
+        return np.concatenate([self.x[1:], self.x[-1:]])
+
+    @cached_property
+    def lags(self) -> list[str]:
+        """Sensors with a state of their own."""
+        return [name for name, sensor in self.system.sensors.items() if sensor.time_constant > 0]
+
+    @cached_property
+    def M(self) -> Array:
+        """Rate of the deviations of lumps and lagged sensors, (n, n_z, n_z) [1/s]."""
+        n, nl = self.x.shape
+        nz = nl + len(self.lags)
+        M = np.zeros((n, nz, nz))
+        middle = 0.5 * (self.x + self.end)
+        for j in range(nl):
+            moved = middle.astype(complex)
+            moved[:, j] += 1j * _IMAGINARY
+            M[:, :nl, j] = self.equations.rate(moved, self.u).imag / _IMAGINARY
+        for row, name in enumerate(self.lags, start=nl):
+            sensor = self.system.sensors[name]
+            M[:, row, row] = -1.0 / sensor.time_constant
+            M[:, row, self.system.lump_names.index(sensor.lump)] = 1.0 / sensor.time_constant
+        return M
+
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array]:
+        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end."""
+        Mh = self.M * self.h
+        A = expm(Mh)
+        one = np.eye(A.shape[1])
+        phi1 = np.linalg.solve(Mh, A - one)
+        phi2 = np.linalg.solve(Mh, phi1 - one)
+        nl = self.x.shape[1]
+        per_watt = self.h / self.equations.capacity
+        return A, (phi1 - phi2)[..., :nl] * per_watt, phi2[..., :nl] * per_watt
+
+    @cached_property
+    def C(self) -> Array:
+        """What the sensors in the record read of the states, (n_sensors, n_z)."""
+        C = np.zeros((len(self.one.sensors), self.M.shape[1]))
+        for i, name in enumerate(self.one.sensors):
+            sensor = self.system.sensors[name]
+            state = (self.x.shape[1] + self.lags.index(name) if name in self.lags
+                     else self.system.lump_names.index(sensor.lump))
+            C[i, state] = sensor.gain
+        return C
+
+    def input_heat(self, column: int) -> tuple[Array, Array]:
+        """Heat into the lumps per unit of one input, at the start and end of every sample, (n, n_lumps) [W/unit]."""
+        moved = self.u.astype(complex)
+        moved[:, column] += 1j * _IMAGINARY
+        return (self.equations.heat(self.x, moved).imag / _IMAGINARY,
+                self.equations.heat(self.end, moved).imag / _IMAGINARY)
+
+    def heat_of(self, system: System) -> tuple[Array, Array]:
+        """Extra heat of a changed system with the same lumps, at the start and end of every sample, (n, n_lumps) [W]."""
+        other = Equations(system)
+        return (other.heat(self.x, self.u) - self.equations.heat(self.x, self.u),
+                other.heat(self.end, self.u) - self.equations.heat(self.end, self.u))
+
+    def readings_of(self, responses: list[Response]) -> Array:
+        """Change of the record's sensors (n, n_sensors, m) that each response causes [K]."""
+        n, nl = self.x.shape
+        start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
+        out = np.zeros((n, len(self.one.sensors), len(responses)))
+        for j, response in enumerate(responses):
+            if response.heat is not None:
+                start[..., j], end[..., j] = start[..., j] + response.heat[0], end[..., j] + response.heat[1]
+            if response.drive is not None:
+                for column in np.flatnonzero(np.any(response.drive[0], axis=0) | np.any(response.drive[1], axis=0)):
+                    first, last = self.input_heat(int(column))
+                    start[..., j] += first * response.drive[0][:, [column]]
+                    end[..., j] += last * response.drive[1][:, [column]]
+            if response.reading is not None:
+                out[..., j] += response.reading[:, self.one.columns]
+        return out + self.answer(start, end)
+
+    def answer(self, start: Array, end: Array) -> Array:
+        """Readings (n, n_sensors, m) to heats at the start and end of every sample, both (n, n_lumps, m) [K]."""
+        A, by_start, by_end = self.steps
+        push = by_start @ start + by_end @ end
+        state = np.zeros((len(push), *push.shape[1:]))
+        now = np.zeros(push.shape[1:])
+        for k in range(len(push) - 1):
+            now = A[k] @ now + push[k]
+            state[k + 1] = now
+        return np.einsum("sz,kzm->ksm", self.C, state, optimize=True)
+
+
+def along(system: System, one: Data) -> Along:
+    """Simulate a record and prepare its linearisation."""
+    run = trajectory(system, one.record)
+    columns = [one.record[name] if name in one.record.input_names
+               else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
+    if not np.isfinite(run.lumps).all():
+        raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
+    return Along(system, one, run.lumps, run.readings, np.column_stack(columns))

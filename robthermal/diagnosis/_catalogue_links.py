@@ -1,0 +1,72 @@
+"""Heat paths and masses that a model may lack."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, product
+
+import numpy as np
+
+from ..thermal import System
+from . import _adding as adding
+from ._effect import Effect, Quantity, Where
+from ._signatures import Array, Values, exchanged, hidden_mass
+
+TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0)  # s, what the record resolves of them
+
+
+def _joined(system: System) -> set[frozenset[str]]:
+    """Pairs that conduct already."""
+    pairs = {frozenset(link.between) for link in system.links if link.conductance > 0}
+    return pairs | {frozenset((m.hot, m.cold)) for m in system.modules.values()}
+
+
+def _lump_pairs(system: System) -> Iterator[Where]:
+    joined = _joined(system)
+    return (pair for pair in combinations(system.lumps, 2) if frozenset(pair) not in joined)
+
+
+def _ambient_pairs(system: System) -> Iterator[Where]:
+    joined = _joined(system)
+    return (pair for pair in product(system.lumps, system.ambients) if frozenset(pair) not in joined)
+
+
+def _without(system: System, what: str) -> Iterator[Where]:
+    """Lumps and ambients between which there is no such term yet."""
+    there = {frozenset(link.between) for link in system.links if getattr(link, what) is not None}
+    return (pair for pair in product(system.lumps, system.ambients) if frozenset(pair) not in there)
+
+
+def _difference(Ta: Array, Tb: Array, values: Values) -> Array:
+    return Tb - Ta
+
+
+def _natural(Ta: Array, Tb: Array, values: Values) -> Array:
+    return np.abs(Tb - Ta) ** values["exponent"] * (Tb - Ta)
+
+
+def _fourth(Ta: Array, Tb: Array, values: Values) -> Array:
+    return Tb**4 - Ta**4
+
+
+LINK_EFFECTS = (
+    Effect("missing_link", _lump_pairs, (Quantity("conductance", "W/K", 0.0, 1e3),), adding.missing_link,
+           exchanged(_difference), ("missing_link", "missing_ambient_link", "hidden_mass"),
+           "a large temperature difference between the two lumps without moving the others"),
+    Effect("missing_ambient_link", _ambient_pairs, (Quantity("conductance", "W/K", 0.0, 1e3),), adding.missing_link,
+           exchanged(_difference), ("natural_convection", "radiation", "missing_ambient_link"),
+           "a step of the ambient temperature"),
+    Effect("natural_convection", lambda system: _without(system, "natural"),
+           (Quantity("gain", "W/K^1.25", 0.0, 1e2), Quantity("exponent", "-", 0.25, 0.25, grid=(0.25,))),
+           adding.natural_convection, exchanged(_natural), ("radiation", "missing_ambient_link"),
+           "small and large differences to the ambient, of both signs"),
+    Effect("radiation", lambda system: _without(system, "radiation"),
+           (Quantity("coefficient", "W/K^4", 0.0, 5.67e-7, typical=1e-10),),
+           adding.radiation, exchanged(_fourth), ("natural_convection", "missing_ambient_link"),
+           "another absolute level at equal differences"),
+    Effect("hidden_mass", lambda system: [(name,) for name in system.lumps],
+           (Quantity("capacity", "J/K", 0.0, 1e5),
+            Quantity("time_constant", "s", 1e-3, 1e6, grid=TIMES)),
+           adding.hidden_mass, hidden_mass, ("sensor_lag", "missing_link"),
+           "frequencies a decade around 1/time_constant"),
+)

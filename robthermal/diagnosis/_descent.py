@@ -1,0 +1,101 @@
+"""Gauss-Newton with bounds and step halving."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Diverged, InputError
+
+Array = NDArray[np.float64]
+_FLAT = 1e-10  # relative singular value that is rounding
+_HALVINGS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where a minimisation ended.
+
+    Parameters
+    ----------
+    v : ndarray, shape (p,)
+        Unknowns.
+    z : ndarray, shape (m,)
+        Weighted residuals there.
+    J : ndarray, shape (m, p)
+        Derivative of the model, - ∂z/∂v.
+    converged : bool
+        Whether a further step would change the sum of squares by less than `enough`.
+    iterations : int
+        Evaluations.
+    """
+
+    v: Array
+    z: Array
+    J: Array
+    converged: bool
+    iterations: int
+
+
+def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: tuple[Array, Array],
+            limit: int, enough: float) -> Descent:
+    """Minimise |z(v)|² from v.
+
+    Parameters
+    ----------
+    evaluate : callable
+        v to (z, J).
+    v : ndarray
+        Start; moved inside the bounds.
+    bounds : tuple of ndarray
+        Lower and upper.
+    limit : int
+        Evaluations.
+    enough : float
+        Predicted decrease of the sum of squares, relative to it, at which to stop.
+    """
+    v = np.clip(v, *bounds)
+    z, J = evaluate(v)
+    count = 1
+    while True:
+        step = _step(z, J, v, bounds)
+        decrease = float(z @ z - (z - J @ step) @ (z - J @ step))
+        if decrease <= enough * float(z @ z):
+            return Descent(v, z, J, True, count)
+        for _ in range(_HALVINGS):
+            if count >= limit:
+                return Descent(v, z, J, False, count)
+            count += 1
+            try:
+                new_z, new_J = evaluate(v + step)
+            except (Diverged, InputError):  # beyond what the system accepts or survives
+                step = step / 2
+                continue
+            if new_z @ new_z < z @ z - 1e-4 * decrease:
+                break
+            step = step / 2
+        else:
+            return Descent(v, z, J, False, count)
+        v, z, J = v + step, new_z, new_J
+
+
+def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Array:
+    """Least-squares step within the bounds; unknowns that would leave are put on their bound, the rest solved again."""
+    step, free = np.zeros(v.size), np.ones(v.size, bool)
+    for _ in range(v.size + 1):
+        step[free] = _solve(J[:, free], z - J[:, ~free] @ step[~free])
+        out = free & ((v + step < bounds[0]) | (v + step > bounds[1]))
+        if not out.any():
+            break
+        step[out] = np.clip(v + step, *bounds)[out] - v[out]
+        free &= ~out
+    return step
+
+
+def _solve(J: Array, z: Array) -> Array:
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(J / scale, z, rcond=_FLAT)[0] / scale, np.float64)

@@ -1,0 +1,177 @@
+"""`diagnose`: all stages in a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..calibration._data import as_data, refuse_same
+from ..calibration._ranges import Choice
+from ..errors import Outcome
+from ..signals import Record
+from ..thermal import System
+from ._adequacy import Adequacy, adequacy
+from ._decide import Decision, decide
+from ._diagnosis import Diagnosis, Found, Verdict
+from ._hold_out import Gap, HoldOut, expected_rms, hold_out
+from ._locate import locate
+from ._next_experiment import NextExperiment, next_experiment
+from ._noise_floor import noise_floor
+from ._refit import Refit, refit, whitened
+from ._revise import revised
+from ._score import ALPHA, BIC_GAP, Scores, score
+from ._short_list import Entry, quantities_of, refit_short_list
+
+MOST_EFFECTS = 3
+
+
+def diagnose(system: System, records: Record | Sequence[Record], *, validation: Record | Sequence[Record] | None = None,
+             parameters: Choice = None, effects: Iterable[str] | None = None,
+             noise: Mapping[str, float] | float | None = None) -> Diagnosis:
+    """Find where records and simulation part, name the missing effect, add it, and test it on unseen records.
+
+    Parameters
+    ----------
+    system : System
+        Nominal: `noise` of its sensors, `disturbance` of its lumps, `sigma` of its fit table say what is known.
+    records : Record or list of Record
+        Measured.
+    validation : Record or list of Record, optional
+        Not seen by any fit.
+    parameters : iterable or mapping, optional
+        Nominal parameters to refit, as in `rt.calibrate`. Default: the fit table; without one they are taken as known.
+    effects : iterable of str, optional
+        Names of the catalogue to try; default all, your own registered ones included.
+    noise : mapping or float, optional
+        Overrides the declared noise of the sensors [K].
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    InputError
+        Records too short, validation on the training data, no noise declared and none visible, a nominal model that runs
+        away, an unknown effect.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> late = bar.with_parameters({"sensors.T.time_constant": 30.0})
+    >>> def measured(seed):
+    ...     rng = np.random.default_rng(seed)
+    ...     drive = rt.Record(sample_time=10.0, inputs=np.repeat(rng.uniform(0.0, 6.0, 12), 25),
+    ...                       outputs=np.zeros((300, 0)), input_names=["heater"], output_names=[])
+    ...     run = rt.thermal.simulate(late, drive)
+    ...     return run.with_outputs(run.outputs + 0.05 * rng.standard_normal((300, 1)))
+    >>> found = rt.diagnose(bar, measured(1), validation=measured(2), effects=["sensor_lag", "sensor_offset"])
+    >>> found.verdict, found.effects[0].label
+    ('named', 'sensor_lag(T)')
+    """
+    effects = None if effects is None else list(effects)
+    if validation is not None:
+        refuse_same(as_data(system, records, "records"), as_data(system, validation, "validation"))
+    floor = noise_floor(system, records, noise=noise)
+    nominal = refit(system, records, floor, parameters=parameters)
+    scores = score(nominal, effects)
+    rounds, fit = _accepted(nominal, scores, effects)
+    checks = adequacy(fit)
+    unseen = None if validation is None else hold_out(nominal, fit, validation)
+    verdict, outcome = _verdict(rounds, fit, checks, unseen)
+    found = tuple(_found(fit, i, round_) for i, round_ in enumerate(rounds))
+    named = verdict in ("named", "ambiguous")
+    return Diagnosis(
+        verdict=verdict, effects=found if named else (), alternatives=tuple(map(_others, rounds)) if named else (),
+        system=fit.system if named else nominal.system,
+        gap={"train": Gap(nominal.rms, fit.rms, expected_rms(fit))} | ({} if unseen is None else {"validation": unseen.gap}),
+        located=locate(nominal), not_testable=scores.not_testable, next_experiment=_plan(rounds) if named else None,
+        outcome=outcome, provisional=() if named else found, noise_floor=floor, nominal=nominal, fit=fit, scores=scores,
+        rounds=rounds, adequacy=checks, hold_out=unseen)
+
+
+def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None) -> tuple[tuple[Decision, ...], Refit]:
+    """Add effects one by one while any is beyond doubt, then revise those added before others were known."""
+    rounds: tuple[Decision, ...] = ()
+    fit = nominal
+    while len(rounds) < MOST_EFFECTS:
+        if rounds:
+            scores = score(fit, effects)
+        if not _promising(fit, scores):
+            break
+        decision = decide(refit_short_list(fit, scores))
+        if decision.best is None:
+            break
+        rounds, fit = (*rounds, decision), decision.best.fit
+    return revised(rounds, nominal, effects) if len(rounds) > 1 else (rounds, fit)
+
+
+def _promising(fit: Refit, scores: Scores) -> bool:
+    """Whether any score could pass: refits are not started for nothing."""
+    least = 0.5 * (BIC_GAP + np.log(fit.n_readings))  # half: a refit may gain over its linearisation
+    return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
+
+
+def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None
+             ) -> tuple[Verdict, Outcome]:
+    faults = [] if checks.outcome.ok else [checks.outcome.text]
+    if unseen is not None and not unseen.outcome.ok:
+        faults.append(unseen.outcome.text)
+    if rounds and not _still(fit):
+        faults.append("An effect moves when the integration is refined: it may be the solver's own error.")
+    if rounds and not fit.outcome.ok:
+        faults.append(fit.outcome.text)
+    if faults:
+        helped = "; ".join(str(round_) for round_ in rounds)
+        text = "None of the known effects explains the records. " + " ".join(faults)
+        text += f" Provisional, no name: {helped}." if helped else ""
+        return "unexplained", Outcome(False, "unexplained", text + " Look at `located`: lump, sensor and conditions.")
+    if not rounds:
+        return "consistent", Outcome(True, "consistent", "Nothing is missing that these records could show: see "
+                                     "not_testable and the detection limits in scores.")
+    if any(_others(round_) for round_ in rounds):
+        return "ambiguous", Outcome(False, "ambiguous", "The records cannot tell some effects apart: see alternatives, "
+                                    "and next_experiment for what separates them.")
+    return "named", Outcome(True, "named", "One set of effects explains the records.")
+
+
+def _still(fit: Refit) -> bool:
+    """Whether the sizes stay within a standard deviation when the simulation is ten times finer."""
+    structure = replace(fit.structure, tolerance=fit.structure.tolerance / 10.0)
+    z, J = whitened(structure, fit.v, fit.whiteners)
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    step = np.linalg.lstsq(J / scale, z, rcond=1e-10)[0] / scale
+    place = slice(structure.n_parameters, structure.n_parameters + structure.n_effects)
+    return bool(np.all(np.abs(step[place]) <= 1e-12 + np.sqrt(np.diag(fit.covariance)[place])))
+
+
+def _others(round_: Decision) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Everything the records cannot tell from the accepted effect."""
+    assert round_.best is not None
+    listed = [*round_.best.aliases]
+    for entry in round_.contenders:
+        listed += [entry.candidate, *entry.aliases]
+    return tuple(dict.fromkeys(c.key for c in listed if c.key != round_.best.candidate.key))
+
+
+def _found(fit: Refit, place: int, round_: Decision) -> Found:
+    best = round_.best
+    assert best is not None
+    units = {q.name: q.unit for q in best.candidate.effect.quantities}
+    values = {name: (value, std, units[name]) for name, (value, std) in quantities_of(fit, place).items()}
+    return Found(best.candidate.effect.name, best.candidate.where, values, best.p_value, best.delta_bic)
+
+
+def _plan(rounds: tuple[Decision, ...]) -> NextExperiment | None:
+    """Experiment for the first effect that has contenders."""
+    for round_ in rounds:
+        if round_.best is not None and round_.contenders:
+            entries: list[Entry] = [round_.best, *round_.contenders]
+            return next_experiment(entries)
+    return None

@@ -1,0 +1,170 @@
+"""Diagnosis: what was found, how sure it is, and what to do next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import Outcome
+from ..thermal import System
+from ._adequacy import Adequacy
+from ._decide import Decision
+from ._file import write_json
+from ._hold_out import Gap, HoldOut
+from ._locate import Location
+from ._next_experiment import NextExperiment
+from ._noise_floor import NoiseFloor
+from ._refit import Refit
+from ._score import Scores
+
+Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
+Name = tuple[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect.
+
+    Parameters
+    ----------
+    effect : str
+        Its name.
+    where : tuple of str
+        Parts of the system.
+    values : dict
+        Quantity to (value, standard deviation, unit).
+    p_value : float
+        Family-wise.
+    delta_bic : float
+        Against the model without it; above 10 is very strong.
+    """
+
+    effect: str
+    where: tuple[str, ...]
+    values: dict[str, tuple[float, float, str]]
+    p_value: float
+    delta_bic: float
+
+    @property
+    def label(self) -> str:
+        """For tables: ``sensor_lag(T6)``."""
+        return f"{self.effect}({', '.join(self.where)})"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Diagnosis:
+    """Result of `diagnose`.
+
+    Parameters
+    ----------
+    verdict : {"named", "ambiguous", "consistent", "unexplained"}
+        One set of effects explains the records; several do; nothing is missing; nothing known explains them.
+    effects : tuple of Found
+        In order of acceptance; empty unless named or ambiguous.
+    alternatives : tuple of tuple
+        For every effect, the (effect, where) the records cannot exclude.
+    system : System
+        Nominal parameters refitted, with the effects added.
+    gap : dict
+        `Gap` of "train" and, if given, "validation".
+    located : Location
+        Where the nominal system's misfit sits.
+    not_testable : dict
+        What these records could not have shown, by (effect, where), with the reason.
+    next_experiment : NextExperiment or None
+        What separates the alternatives; None if there are none.
+    outcome : Outcome
+        Code as the verdict; not ok if ambiguous or unexplained.
+    provisional : tuple of Found
+        Effects that helped but do not explain everything: no names.
+    noise_floor, nominal, fit, scores, rounds, adequacy, hold_out
+        Results of the stages.
+    """
+
+    verdict: Verdict
+    effects: tuple[Found, ...]
+    alternatives: tuple[tuple[Name, ...], ...]
+    system: System
+    gap: dict[str, Gap]
+    located: Location
+    not_testable: dict[Name, str]
+    next_experiment: NextExperiment | None
+    outcome: Outcome
+    provisional: tuple[Found, ...]
+    noise_floor: NoiseFloor
+    nominal: Refit
+    fit: Refit
+    scores: Scores
+    rounds: tuple[Decision, ...]
+    adequacy: Adequacy
+    hold_out: HoldOut | None
+
+    def __str__(self) -> str:
+        lines = [f"verdict: {self.verdict}"]
+        for found, others in zip(self.effects, self.alternatives, strict=True):
+            lines.append(f"  {found.label}: " + ", ".join(
+                f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
+                + f"   ΔBIC {found.delta_bic:.1f}, p {found.p_value:.1g}")
+            lines += [f"    or {effect}({', '.join(where)})" for effect, where in others]
+        for name, gap in self.gap.items():
+            lines.append(f"{name}: rms {gap.before:.4g} K before, {gap.after:.4g} K after, {gap.noise:.4g} K noise")
+        lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
+        return "\n".join([*lines, str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Free-run residuals of the first training record before and after [K]; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(2, 1, sharex=True, sharey=True, layout="constrained")
+        for ax, fit, what in zip(axes, (self.nominal, self.fit), ("before", "after"), strict=True):
+            ax.plot(fit.paths[0].time, fit.residuals[0], linewidth=0.7, label=fit.paths[0].one.sensors)
+            ax.set(ylabel="measured − model [K]", title=f"{what}: rms {fit.rms:.3g} K")
+        axes[0].legend(fontsize="small")
+        axes[1].set(xlabel="time [s]")
+        return np.asarray(axes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds.
+
+        Returns
+        -------
+        dict
+        """
+        plan = self.next_experiment
+        return {
+            "format": "robthermal-diagnosis/1",
+            "verdict": self.verdict,
+            "effects": [_plain(found) for found in self.effects],
+            "alternatives": [[{"effect": effect, "where": list(where)} for effect, where in others]
+                             for others in self.alternatives],
+            "located": {"lumps": self.located.lumps, "sensors": self.located.sensors,
+                        "conditions": "; ".join(self.located.conditions)},
+            "gap": {name: vars(gap) for name, gap in self.gap.items()},
+            "not_testable": [{"effect": effect, "where": list(where), "why": why}
+                             for (effect, where), why in self.not_testable.items()],
+            "next_experiment": {} if plan is None else {
+                "advice": plan.advice, "expected_delta_bic": plan.expected, "present_delta_bic": plan.present,
+                "sample_time": plan.record.sample_time,
+                "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
+            "provisional": [_plain(found) for found in self.provisional],
+            "outcome": vars(self.outcome),
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write ``diagnosis.json``.
+
+        Parameters
+        ----------
+        path : str or Path
+            File.
+        """
+        write_json(path, self.to_dict())
+
+
+def _plain(found: Found) -> dict[str, Any]:
+    return {"effect": found.effect, "where": list(found.where), "p_value": found.p_value, "delta_bic": found.delta_bic,
+            "parameters": {name: {"value": value, "std": std, "unit": unit}
+                           for name, (value, std, unit) in found.values.items()}}

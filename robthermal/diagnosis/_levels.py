@@ -1,0 +1,86 @@
+"""Noise levels as nuisance parameters: re-estimated by likelihood, within limits, never free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from ._along import Along
+from ._noise_floor import NoiseFloor
+from ._whitening import settled_cost
+
+Array = NDArray[np.float64]
+LIMIT = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
+_CLOSE = 0.03
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Factors on the noise levels.
+
+    Parameters
+    ----------
+    disturbance : float
+        On the random heat of all lumps.
+    noise : dict
+        On the noise of every sensor.
+    """
+
+    disturbance: float
+    noise: dict[str, float]
+
+    def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
+        """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none."""
+        noise = np.array([floor.noise[name] * self.noise.get(name, 1.0) for name in path.one.sensors])
+        return noise, self.disturbance * np.array([floor.disturbance.get(name, 0.0) for name in path.system.lumps])
+
+    def close_to(self, other: Levels) -> bool:
+        """Whether all factors agree within three per cent."""
+        pairs = [(self.disturbance, other.disturbance)]
+        pairs += [(value, other.noise.get(name, 1.0)) for name, value in self.noise.items()]
+        return all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
+
+    def __str__(self) -> str:
+        sensors = ", ".join(f"{name} {factor:.2f}" for name, factor in self.noise.items())
+        return f"noise levels times: {sensors}; random heat {self.disturbance:.2f}"
+
+
+def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels:
+    """Most likely factors within the limits, one after the other, once round."""
+    residuals = [path.one.readings - path.readings[:, path.one.columns] for path in paths]
+
+    def cost(trial: Levels) -> float:
+        total = 0.0
+        for path, r in zip(paths, residuals, strict=True):
+            total += settled_cost(path, r, *trial.of(path, floor))
+        return total
+
+    if not any(floor.disturbance.values()):
+        return Levels(levels.disturbance, _by_spread(paths, residuals, floor))
+    for name in floor.noise:
+        def along_noise(t: float, name: str = name) -> float:
+            return cost(Levels(levels.disturbance, {**levels.noise, name: float(np.exp(t))}))
+        levels = Levels(levels.disturbance, {**levels.noise, name: _best(along_noise)})
+    noise = levels.noise
+    return Levels(_best(lambda t: cost(Levels(float(np.exp(t)), noise))), noise)
+
+
+def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor) -> dict[str, float]:
+    """Without random heat the most likely level is the root mean square of the residual."""
+    out = {}
+    for name, level in floor.noise.items():
+        own = [r[:, path.one.sensors.index(name)] for path, r in zip(paths, residuals, strict=True)
+               if name in path.one.sensors]
+        ratio = float(np.sqrt(np.mean(np.concatenate(own) ** 2))) / level
+        out[name] = float(np.clip(ratio, 1.0 / LIMIT, LIMIT))
+    return out
+
+
+def _best(cost: object) -> float:
+    edge = float(np.log(LIMIT))
+    found = minimize_scalar(cost, bounds=(-edge, edge), method="bounded", options={"xatol": 0.03})
+    return float(np.exp(found.x))

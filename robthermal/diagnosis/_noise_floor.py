@@ -1,0 +1,137 @@
+"""Stage 1: what sensor noise and random heat alone would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration._data import Data, as_data
+from ..calibration._noise import SMALLEST, declared_noise, quantum
+from ..errors import InputError, Outcome
+from ..signals import Record
+from ..thermal import System
+
+Array = NDArray[np.float64]
+_SHORTEST = 50  # samples
+_DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])  # kills parabolas: what is left of a slow signal is its noise
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Noise of the sensors and random heat of the lumps, before any model has been fitted.
+
+    Parameters
+    ----------
+    noise : dict
+        Standard deviation of every sensor in the records [K].
+    estimated : tuple of str
+        Sensors whose noise was not declared, and was read off third differences of the record.
+    disturbance : dict
+        Declared random heat of every lump [W/√Hz].
+    rough : dict
+        Noise read off third differences, of every sensor [K]; for comparison.
+    outcome : Outcome
+        Code "declared", "estimated" or "doubtful" (a declared noise far from what the record shows).
+    """
+
+    noise: dict[str, float]
+    estimated: tuple[str, ...]
+    disturbance: dict[str, float]
+    rough: dict[str, float]
+    outcome: Outcome
+
+    def __str__(self) -> str:
+        lines = [f"{'sensor':<12} {'noise [K]':>10} {'differences [K]':>16}"]
+        lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>16.4g}" for name, level in self.noise.items()]
+        return "\n".join([*lines, str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Bars of both noise levels; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, ax = plt.subplots(layout="constrained")
+        place = np.arange(len(self.noise))
+        ax.bar(place - 0.2, list(self.noise.values()), 0.4, label="used")
+        ax.bar(place + 0.2, list(self.rough.values()), 0.4, label="third differences")
+        ax.set(xticks=place, xticklabels=list(self.noise), ylabel="noise [K]", yscale="log")
+        ax.legend()
+        return ax
+
+
+def noise_floor(system: System, records: Record | Sequence[Record], *,
+                noise: Mapping[str, float] | float | None = None) -> NoiseFloor:
+    """Find the noise of every sensor: declared, or else read off the record.
+
+    Parameters
+    ----------
+    system : System
+        With the declared `noise` of its sensors and `disturbance` of its lumps.
+    records : Record or list of Record
+        Measured.
+    noise : mapping or float, optional
+        Overrides the declared noise [K].
+
+    Returns
+    -------
+    NoiseFloor
+
+    Raises
+    ------
+    InputError
+        Fewer than 50 samples; a noise that is neither declared nor visible.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], sensors={"T": {"lump": "bar"}})
+    >>> y = 295.0 + 0.02 * np.random.default_rng(0).standard_normal((400, 1))
+    >>> record = rt.Record(sample_time=1.0, inputs=np.full(400, 295.0), outputs=y, input_names=["room"],
+    ...                    output_names=["T"])
+    >>> floor = rt.diagnosis.noise_floor(bar, record)
+    >>> floor.outcome.code, round(floor.noise["T"], 3)
+    ('estimated', 0.02)
+    """
+    data = as_data(system, records, "records")
+    for one in data:
+        if len(one.record) < _SHORTEST:
+            raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
+                             expected=f"at least {_SHORTEST}", remedy="Measure longer, or sample faster.")
+    levels = declared_noise(system, data, noise)
+    rough = {name: _rough(data, name) for name in levels}
+    unknown = tuple(name for name, level in levels.items() if not level)
+    for name in unknown:
+        if rough[name] < SMALLEST:
+            raise InputError(f"the noise of sensor {name!r} is not declared, and none is visible in the record",
+                             where=f"[sensors.{name}] noise", expected="a positive standard deviation [K]",
+                             remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
+    noise_of = {name: level or rough[name] for name, level in levels.items()}
+    disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
+    return NoiseFloor(noise_of, unknown, disturbance, rough, _outcome(noise_of, rough, unknown))
+
+
+def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...]) -> Outcome:
+    far = [name for name in noise if rough[name] and not 1 / 3 < noise[name] / rough[name] < 3]
+    if far:
+        listed = ", ".join(f"{name} (declared {noise[name]:.3g} K, record {rough[name]:.3g} K)" for name in far)
+        return Outcome(False, "doubtful", f"The declared noise is far from what the record shows: {listed}. Correct it: "
+                       "every test below rests on it.")
+    if unknown:
+        return Outcome(True, "estimated", f"Noise of {', '.join(unknown)} estimated from third differences.")
+    return Outcome(True, "declared", "Noise as declared.")
+
+
+def _rough(data: list[Data], name: str) -> float:
+    """Noise from third differences, robustly; a quantised reading has at least step/√12."""
+    pieces, step = [], 0.0
+    for one in data:
+        if name in one.sensors:
+            y = one.readings[:, one.sensors.index(name)]
+            pieces.append(np.convolve(y, _DIFFERENCE, "valid"))
+            step = max(step, quantum(y))
+    d = np.abs(np.concatenate(pieces))
+    return max(1.4826 * float(np.median(d)) / float(np.linalg.norm(_DIFFERENCE)), step / 12**0.5)

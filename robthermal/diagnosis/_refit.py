@@ -1,0 +1,265 @@
+"""Stage 2: refit a structure with its priors; the whitened residual and what is left after the nominal parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration._data import as_data
+from ..calibration._ranges import NONE, Choice, chosen_ranges
+from ..calibration._start import initial_of
+from ..errors import Diverged, InputError, Outcome
+from ..signals import Record
+from ..thermal import System
+from ._along import Along, along
+from ._descent import Descent, descend
+from ._levels import Levels, refined
+from ._noise_floor import NoiseFloor, noise_floor
+from ._structure import Structure, structure_of
+from ._whitening import Whitener, whitener
+
+Array = NDArray[np.float64]
+LIMIT = 40  # evaluations of a refit
+_ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
+_FLAT = 1e-9  # relative size of a direction of J that counts as none
+_ROUNDS = 3  # of filter and noise levels
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A structure fitted to the records, with everything the tests need.
+
+    Parameters
+    ----------
+    structure : Structure
+        Unknowns.
+    v : ndarray
+        Their values.
+    floor : NoiseFloor
+        Where the noise levels came from.
+    levels : Levels
+        Factors on them, re-estimated within limits.
+    paths : tuple of Along
+        Linearisation along every record.
+    whiteners : tuple of Whitener
+        One per record.
+    z : ndarray, shape (m,)
+        Whitened residuals of all readings, then of the priors.
+    J : ndarray, shape (m, p)
+        Whitened derivatives.
+    outcome : Outcome
+        Codes "converged", "not_converged" (not ok).
+    """
+
+    structure: Structure
+    v: Array
+    floor: NoiseFloor
+    levels: Levels
+    paths: tuple[Along, ...]
+    whiteners: tuple[Whitener, ...]
+    z: Array
+    J: Array
+    outcome: Outcome
+
+    @cached_property
+    def system(self) -> System:
+        """Refitted system."""
+        return self.structure.system(self.v)
+
+    @property
+    def n_readings(self) -> int:
+        """Readings in all records."""
+        return self.structure.n_readings
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis (m, r) of what the unknowns can explain."""
+        scale = np.linalg.norm(self.J, axis=0)
+        U, s, _ = np.linalg.svd(self.J / np.where(scale > 0, scale, 1.0), full_matrices=False)
+        return U[:, s > _FLAT * s[0]]
+
+    @cached_property
+    def rest(self) -> Array:
+        """Whitened residual that the unknowns cannot explain, (m,)."""
+        return self.project(self.z)
+
+    def project(self, columns: Array) -> Array:
+        """Remove from columns (m, ...) what the unknowns can explain."""
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    @property
+    def rss(self) -> float:
+        """Sum of squares of the whitened residuals, priors included."""
+        return float(self.z @ self.z)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Rows less directions fitted."""
+        return self.z.size - self.basis.shape[1]
+
+    @property
+    def variance(self) -> float:
+        """Whitened variance [-]: 1 if the model and its noise are right."""
+        return self.rss / self.degrees_of_freedom
+
+    def whiten(self, per_record: Sequence[Array]) -> Array:
+        """Whitened columns (m, k) of changes of the readings (n, n_sensors, k) of every record; 0 at the priors."""
+        k = per_record[0].shape[2]
+        rows = [w(r).reshape(-1, k) for w, r in zip(self.whiteners, per_record, strict=True)]
+        return np.concatenate([*rows, np.zeros((self.z.size - self.n_readings, k))])
+
+    def innovations(self) -> list[Array]:
+        """Whitened residuals of every record, (n, n_sensors)."""
+        out, row = [], 0
+        for one in self.structure.data:
+            out.append(self.z[row:row + one.readings.size].reshape(one.readings.shape))
+            row += one.readings.size
+        return out
+
+    @cached_property
+    def residuals(self) -> tuple[Array, ...]:
+        """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]."""
+        return tuple(path.one.readings - path.readings[:, path.one.columns] for path in self.paths)
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the free-run residual over all sensors [K]."""
+        return float(np.sqrt(np.mean(np.concatenate([r.ravel() for r in self.residuals]) ** 2)))
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the unknowns, (p, p), in the optimiser's coordinates, scaled by the whitened variance."""
+        scale = np.linalg.norm(self.J, axis=0)
+        scale[scale == 0] = 1.0
+        J = self.J / scale
+        return np.linalg.pinv(J.T @ J, rcond=_FLAT**2, hermitian=True) / np.outer(scale, scale) * max(self.variance, 1.0)
+
+    def __str__(self) -> str:
+        lines = [f"{name} = {value:.6g}" for name, value in zip(
+            self.structure.ranges.names, self.structure.ranges.values(self.v[:self.structure.n_parameters]), strict=True)]
+        lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), free-run rms {self.rms:.4g} K")
+        return "\n".join([*lines, str(self.levels), str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Free-run residuals [K] of every sensor against time; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(len(self.paths), 1, squeeze=False, layout="constrained")
+        for ax, path, r in zip(axes[:, 0], self.paths, self.residuals, strict=True):
+            ax.plot(path.time, r, linewidth=0.7, label=path.one.sensors)
+            ax.set(ylabel="measured − model [K]", title=path.one.label)
+            ax.legend(fontsize="small")
+        axes[-1, 0].set(xlabel="time [s]")
+        return axes[:, 0]
+
+
+def refit(system: System, records: Record | Sequence[Record], floor: NoiseFloor | None = None, *,
+          parameters: Choice = None) -> Refit:
+    """Refit the nominal parameters and the initial temperatures to the records, with their priors.
+
+    Parameters
+    ----------
+    system : System
+        Nominal. `sigma` in its fit table are the priors.
+    records : Record or list of Record
+        Measured.
+    floor : NoiseFloor, optional
+        From `noise_floor`.
+    parameters : iterable or mapping, optional
+        As in `rt.calibrate`. Default: the fit table; without one, all parameters are taken as known.
+
+    Returns
+    -------
+    Refit
+
+    Raises
+    ------
+    InputError
+        As `noise_floor`; a nominal model that runs away; priors that contradict the bounds.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
+    >>> drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
+    ...                   output_names=[])
+    >>> run = rt.thermal.simulate(bar, drive)
+    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> fit = rt.diagnosis.refit(bar, noisy, parameters={"lumps.bar.capacity": (10.0, 500.0)})
+    >>> 0.8 < fit.variance < 1.2
+    True
+    """
+    floor = noise_floor(system, records) if floor is None else floor
+    data = as_data(system, records, "records")
+    ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
+    starts = [initial_of(system, one, "free") for one in data]
+    structure = structure_of(system, ranges, data, starts)
+    n_unknown = structure.n_parameters + sum(start.n_free for start in starts)
+    if structure.n_readings <= 2 * n_unknown:
+        raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
+                         expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
+    try:
+        return fitted(structure, structure.start(ranges.start, []), floor, Levels(1.0, {}))
+    except Diverged as error:
+        raise InputError(f"the nominal model runs away: {error}", where="argument system",
+                         remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
+
+
+def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) -> Refit:
+    """Fit from v; filter and noise levels are renewed at the estimate, and the fit repeated."""
+    for _ in range(_ROUNDS):
+        paths, whiteners = filters(structure, v, floor, levels)
+        found = minimised(structure, v, whiteners)
+        v = found.v
+        paths = tuple(along(system, one) for system, one in zip(structure.systems(v), structure.data, strict=True))
+        new = refined(paths, floor, levels)
+        if new.close_to(levels):
+            break
+        levels = new
+    paths, whiteners = filters(structure, v, floor, levels)
+    z, J = whitened(structure, v, whiteners)
+    return Refit(structure, v, floor, levels, paths, whiteners, z, J, _outcome(found))
+
+
+def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
+    """Fit another structure with the same filters, so that sums of squares can be compared."""
+    found = minimised(structure, v, fit.whiteners, limit)
+    return replace(fit, structure=structure, v=found.v, z=found.z, J=found.J, outcome=_outcome(found))
+
+
+def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
+            ) -> tuple[tuple[Along, ...], tuple[Whitener, ...]]:
+    """Linearisation and filter of every record."""
+    paths = tuple(along(system, one) for system, one in zip(structure.systems(v), structure.data, strict=True))
+    return paths, tuple(whitener(path, *levels.of(path, floor)) for path in paths)
+
+
+def minimised(structure: Structure, v: Array, whiteners: Sequence[Whitener], limit: int = LIMIT) -> Descent:
+    """Gauss-Newton with fixed filters."""
+    return descend(lambda v: whitened(structure, v, whiteners), v, structure.bounds, limit, _ENOUGH)
+
+
+def whitened(structure: Structure, v: Array, whiteners: Sequence[Whitener]) -> tuple[Array, Array]:
+    """Whitened residuals of all readings, then of the priors, and the derivative of the model."""
+    z, J = [], []
+    for run, w in zip(structure.runs(v), whiteners, strict=True):
+        both = w(np.concatenate([run.residual[..., None], run.slopes], axis=2)).reshape(-1, 1 + v.size)
+        z.append(both[:, 0])
+        J.append(both[:, 1:])
+    prior, prior_J = structure.prior(v)
+    return np.concatenate([*z, prior]), np.concatenate([*J, prior_J])
+
+
+def _outcome(found: Descent) -> Outcome:
+    if found.converged:
+        return Outcome(True, "converged", f"Converged in {found.iterations} evaluations.")
+    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow the "
+                   "bounds, or give priors (sigma) to parameters the data do not determine.")

@@ -1,0 +1,60 @@
+"""With several effects, the first was chosen before the others were known: choose every one again, given the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ._decide import Decision, settled
+from ._effect import Candidate
+from ._refit import Refit, extended
+from ._score import BIC_GAP, score
+from ._short_list import refit_short_list
+
+_SWEEPS = 3
+
+
+def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None
+            ) -> tuple[tuple[Decision, ...], Refit]:
+    """Choose each effect again with the others in place, until none changes; drop what is not needed any more.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In order of acceptance.
+    nominal : Refit
+        Without any effect.
+    effects : iterable of str, optional
+        Catalogue.
+    """
+    names = None if effects is None else list(effects)
+    chosen = [round_.best for round_ in rounds if round_.best is not None]
+    fit = chosen[-1].fit
+    decisions = list(rounds)
+    for _ in range(_SWEEPS):
+        changed = False
+        for place in range(len(decisions) - 1, -1, -1):
+            others, values = _without(fit, place)
+            structure = nominal.structure.with_effects(others)
+            before = extended(fit, structure, structure.carried(fit.structure, fit.v, values))
+            short = refit_short_list(before, score(before, names))
+            if not short.entries or short.entries[0].delta_bic < BIC_GAP:
+                decisions.pop(place)
+                fit, changed = before, True
+                break
+            decision = settled(before, short.entries)
+            assert decision.best is not None
+            old = decisions[place].best
+            assert old is not None
+            # the effect chosen again stands last in the new structure: keep the order of the decisions the same
+            decisions.append(decision)
+            decisions.pop(place)
+            fit = decision.best.fit
+            changed = changed or decision.best.candidate.key != old.candidate.key
+        if not changed:
+            break
+    return tuple(decisions), fit
+
+
+def _without(fit: Refit, place: int) -> tuple[tuple[Candidate, ...], list[dict[str, float]]]:
+    effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
+    return effects[:place] + effects[place + 1:], values[:place] + values[place + 1:]

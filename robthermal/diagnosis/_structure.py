@@ -1,0 +1,225 @@
+"""Unknowns of a refit: nominal parameters, quantities of the added effects, initial temperatures of every record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration._data import Data
+from ..calibration._ranges import Ranges
+from ..calibration._start import Initial, initial_of, start_values
+from ..errors import InputError
+from ..thermal import System, trajectory
+from ._effect import Candidate
+
+Array = NDArray[np.float64]
+_STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One record simulated: residual measured - modelled (n, n_sensors) [K] and derivatives of the model."""
+
+    residual: Array
+    slopes: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The nominal system with some effects; what may change in it, and where the priors are.
+
+    Parameters
+    ----------
+    base : System
+        Nominal system with its starting values.
+    ranges : Ranges
+        Nominal parameters that may change.
+    data : tuple of Data
+        Records.
+    starts : tuple of Initial
+        Prior of every record's initial temperatures.
+    effects : tuple of Candidate
+        What has been added.
+    tolerance : float
+        Of the simulation [K].
+    """
+
+    base: System
+    ranges: Ranges
+    data: tuple[Data, ...]
+    starts: tuple[Initial, ...]
+    effects: tuple[Candidate, ...] = ()
+    tolerance: float = 1e-4
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of nominal parameters."""
+        return len(self.ranges.names)
+
+    @property
+    def n_effects(self) -> int:
+        """Number of quantities of all effects."""
+        return sum(len(c.effect.free) for c in self.effects)
+
+    @property
+    def n_readings(self) -> int:
+        """Readings in all records."""
+        return sum(one.readings.size for one in self.data)
+
+    def quantities(self, v: Array) -> list[dict[str, float]]:
+        """Quantities of every effect by name."""
+        out, at = [], self.n_parameters
+        for candidate in self.effects:
+            q = dict(candidate.shape)
+            for quantity in candidate.effect.free:
+                q[quantity.name] = float(np.exp(v[at]) if quantity.lower > 0 else v[at])
+                at += 1
+            out.append(q)
+        return out
+
+    def start(self, parameters: Array, quantities: Sequence[dict[str, float]]) -> Array:
+        """Unknowns from values; initial temperatures at the centre of their priors."""
+        coordinates = [np.log(q[quantity.name]) if quantity.lower > 0 else q[quantity.name]
+                       for candidate, q in zip(self.effects, quantities, strict=True)
+                       for quantity in candidate.effect.free]
+        return np.concatenate([self.ranges.coordinates(parameters), coordinates,
+                               np.zeros(sum(s.n_free for s in self.starts))])
+
+    def carried(self, other: Structure, v: Array, quantities: Sequence[dict[str, float]]) -> Array:
+        """Unknowns at the parameters and initial temperatures of another structure; a lump that it lacks starts at its
+        prior.
+        """
+        out = self.start(other.ranges.values(v[:other.n_parameters]), quantities)
+        at = self.n_parameters + self.n_effects
+        known = other.temperatures(v)
+        for start, T in zip(self.starts, known, strict=True):
+            if start.n_free:
+                n = min(start.mean.size, T.size)
+                out[at:at + n] = (T[:n] - start.mean[:n]) / start.sigma
+            at += start.n_free
+        return out
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds of the unknowns."""
+        lower, upper = [], []
+        for candidate in self.effects:
+            for quantity in candidate.effect.free:
+                log = quantity.lower > 0
+                lower.append(np.log(quantity.lower) if log else quantity.lower)
+                upper.append(np.log(quantity.upper) if log else quantity.upper)
+        reach = np.full(sum(s.n_free for s in self.starts), 20.0)
+        q = self.ranges.coordinates
+        return (np.concatenate([q(self.ranges.lower), lower, -reach]),
+                np.concatenate([q(self.ranges.upper), upper, reach]))
+
+    def system(self, v: Array) -> System:
+        """Nominal system at these parameters with the effects added."""
+        values = self.ranges.values(v[:self.n_parameters])
+        system = self.base.with_parameters(self.ranges.assigned(values)) if self.n_parameters else self.base
+        for candidate, q in zip(self.effects, self.quantities(v), strict=True):
+            system = candidate.effect.add(system, candidate.where, q)
+        return system
+
+    def temperatures(self, v: Array) -> list[Array]:
+        """Initial lump temperatures of every record [K]."""
+        out, at = [], self.n_parameters + self.n_effects
+        for start in self.starts:
+            free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0
+            out.append(start.mean + free)
+            at += start.n_free
+        return out
+
+    def systems(self, v: Array) -> list[System]:
+        """System of every record, with its initial temperatures."""
+        system = self.system(v)
+        return [system.with_parameters(start_values(system, T)) for T in self.temperatures(v)]
+
+    def runs(self, v: Array) -> list[Run]:
+        """Residuals of all records and derivatives (n, n_sensors, n_unknowns) of the modelled readings."""
+        names, chain = self._chain(v)
+        at, out = self.n_parameters + self.n_effects, []
+        for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
+            initial = [f"lumps.{lump}.initial" for lump in system.lumps] if start.n_free else []
+            run = trajectory(system, one.record, tolerance=self.tolerance, sensitivities=[*names, *initial])
+            J = run.sensitivity[:, one.columns]
+            slopes = np.zeros((*J.shape[:2], v.size))
+            slopes[..., :len(chain[0])] = J[..., :len(names)] @ chain
+            slopes[..., at:at + start.n_free] = J[..., len(names):] * start.sigma
+            out.append(Run(one.readings - run.readings[:, one.columns], slopes))
+            at += start.n_free
+        return out
+
+    def prior(self, v: Array) -> tuple[Array, Array]:
+        """Distances from the priors' centres, in standard deviations, with the sign of `Run`, and their derivatives."""
+        known = np.flatnonzero(np.isfinite(self.ranges.sigma))
+        n_free = sum(s.n_free for s in self.starts)
+        first = self.n_parameters + self.n_effects
+        values = self.ranges.values(v[:self.n_parameters])
+        J = np.zeros((known.size + n_free, v.size))
+        J[np.arange(known.size), known] = self.ranges.prior_slopes(values)[known]
+        J[known.size:, first:] = np.eye(n_free)
+        return -np.concatenate([self.ranges.prior(values), v[first:]]), J
+
+    def with_effect(self, candidate: Candidate) -> Structure:
+        """The same with one more effect; a new lump gets an initial temperature of its own."""
+        return self.with_effects((*self.effects, candidate))
+
+    def with_effects(self, effects: tuple[Candidate, ...]) -> Structure:
+        """The same base with these effects."""
+        system = self.base
+        for candidate in effects:
+            system = candidate.add(system, candidate.effect.size.typical)
+        if len(system.lumps) == self.starts[0].mean.size:
+            return replace(self, effects=effects)
+        starts = tuple(initial_of(system, one, "free" if s.n_free else "measured")
+                       for one, s in zip(self.data, self.starts, strict=True))
+        return replace(self, effects=effects, starts=starts)
+
+    def _chain(self, v: Array) -> tuple[list[str], Array]:
+        """The system's numbers that depend on parameters and quantities, and their derivatives by these coordinates."""
+        p, n = self.n_parameters, self.n_parameters + self.n_effects
+        here = self.system(v)
+        names = dict.fromkeys(self.ranges.flat)
+        columns: list[dict[str, float]] = []
+        slopes = self.ranges.slopes(self.ranges.values(v[:p]))
+        for group, slope in zip(self.ranges.members, slopes, strict=True):
+            columns.append({name: float(slope) for name in group})
+        if self.n_effects:
+            values = _numbers(here)
+            for i in range(p, n):
+                moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-6)
+                step = -step if v[i] + step > self.bounds[1][i] else step
+                moved[i] += step
+                other = _numbers(self.system(moved))
+                columns.append({name: (other[name] - values[name]) / step for name in values
+                                if other[name] != values[name]})
+            for i in range(p):  # what an effect derives from a nominal parameter moves with it
+                columns[i] = _moved_by(self, v, i, values, columns[i])
+        for column in columns:
+            names |= dict.fromkeys(column)
+        return list(names), np.array([[column.get(name, 0.0) for column in columns] for name in names]
+                                     ).reshape(len(names), n)
+
+
+def _numbers(system: System) -> dict[str, float]:
+    return {name: system.parameter(name) for name in system.parameter_names}
+
+
+def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], own: dict[str, float]
+              ) -> dict[str, float]:
+    moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-3)
+    moved[i] += step
+    other = _numbers(structure.system(moved))
+    return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
+
+
+def structure_of(system: System, ranges: Ranges, data: Sequence[Data], starts: Sequence[Initial]) -> Structure:
+    """Nominal structure, checked: the system must be small enough for derivatives."""
+    if len(system.lumps) > 100:
+        raise InputError(f"a network of {len(system.lumps)} lumps", where="argument system", expected="at most 100",
+                         remedy="Reduce the model first (rt.thermal.reduce).")
+    return Structure(system, ranges, tuple(data), tuple(starts))

@@ -1,0 +1,142 @@
+"""The coupling job: filters designed or judged, every certificate verified, numbers for the report."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from .. import coupling
+from ..coupling import Filters, Simulation, Spectra, WorstCase
+from ..errors import InputError
+from ..verification import verify
+from ._claims import Checked
+from ._couple_file import CouplingJob
+
+_SHOWN = 50  # exposure windows in the simulated trace
+_SAMPLES, _LONGEST = 2500, 50_000  # of the trace
+LIMITS = {"norm_XY": "XY", "norm_1_plus_Y": "improvement_1", "norm_1_plus_X": "improvement_2",
+          "norm_weighted_e12": "hinf"}  # which certificate proves which limit of the design
+_FILES = {"internal stability": "stability", "robust number": "robust", "stability of the controller": "controller"}
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """A coupling with everything that is known about it.
+
+    Parameters
+    ----------
+    job : CouplingJob
+        What was asked.
+    filters : Filters
+        What came out.
+    checked : tuple of Checked
+        Certificates with their independent check; the required ones first.
+    spectra : Spectra
+        Curves over frequency.
+    worst_case : WorstCase or None
+        On every measured plant; None without uncertainty.
+    simulation : Simulation or None
+        e12 over time; None in continuous time, and where stability is not proven.
+    """
+
+    job: CouplingJob
+    filters: Filters
+    checked: tuple[Checked, ...]
+    spectra: Spectra
+    worst_case: WorstCase | None
+    simulation: Simulation | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether all that was asked for holds, and is verified as far as it is a matter of proof."""
+        return self.filters.holds and all(c.good for c in self.checked if c.required)
+
+
+def couple_subsystems(job: CouplingJob, progress: Callable[[str], None] = lambda stage: None) -> Coupling:
+    """Design the filters of a coupling, or judge given ones, and verify every certificate.
+
+    Parameters
+    ----------
+    job : CouplingJob
+        From `read_coupling`.
+    progress : callable, optional
+        Called with a sentence before every stage.
+
+    Returns
+    -------
+    Coupling
+
+    Raises
+    ------
+    InputError
+        Loops, filters, responses or options that make no sense, named as in the file.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> loop = "plant = { num = [0.01], den = [1.0, -0.99] }\\ncontroller = 20.0\\n"
+    >>> _ = Path("SPEC.toml").write_text('[coupling]\\nname = "pair"\\nsample_time = 0.01\\n'
+    ...     f"[subsystems.1]\\n{loop}[subsystems.2]\\n{loop}[design]\\nX_hat = -0.9\\n")
+    >>> done = rt.project.couple_subsystems(rt.project.read_coupling("SPEC.toml"))
+    >>> done.holds, done.filters.verdict, done.checked[0].title
+    (True, 'nominal', 'Internal stability')
+    """
+    progress("judging the filters" if job.manual else "designing the filters")
+    filters = _filters(job)
+    progress("verifying every certificate")
+    checked = tuple(_checked(filters))
+    progress("computing spectra")
+    curves = coupling.spectra(filters)
+    worst = coupling.worst_case(filters) if filters.problem.uncertainty is not None else None
+    progress("simulating")
+    return Coupling(job, filters, checked, curves, worst, _simulation(filters))
+
+
+def _filters(job: CouplingJob) -> Filters:
+    find = coupling.evaluate if job.manual else coupling.synthesize
+    try:
+        return find(*job.plants, *job.controllers, uncertainty=list(job.measured) or None,
+                    disturbances=job.disturbances, **job.options)
+    except InputError as error:
+        raise InputError(error.what, where=f"{job.files[0]} {_place(error.where, job)}", expected=error.expected,
+                         remedy=error.remedy) from None
+
+
+def _place(where: str, job: CouplingJob) -> str:
+    """Arguments of the python functions as keys of the file."""
+    if where == "synthesize" or where.startswith("synthesize,"):
+        return "[design]"
+    if where.startswith("uncertainty"):
+        index = re.sub(r"\D", "", where) or ("0" if len(job.measured) == 1 else "")
+        return f"[uncertainty] {job.measured_files[int(index)]}" if index else "[uncertainty]"
+    named = re.sub(r"\bP([12])\b", r"[subsystems.\1] plant", where)
+    named = re.sub(r"\bC([12])\b", r"[subsystems.\1] controller", named)
+    named = re.sub(r"\bdisturbances\[([01])\]", lambda found: f"[subsystems.{int(found[1]) + 1}] disturbance", named)
+    return named if "[" in named else f"[design] {named}"
+
+
+def _checked(filters: Filters) -> Iterator[Checked]:
+    """Required: stability, robust stability where plants were measured, and the limits a certificate proves.
+
+    A bound that is proven but too large is a certificate, not a claim: then `filters.holds` is False and says why.
+    """
+    kept = {key for key, limit in LIMITS.items() if filters.norms[limit] <= filters.asked.get(limit, -1.0)}
+    required = {"stability"} | kept | ({"robust"} if filters.verdict == "robust" else set())
+    found = [(_key(what), what, certificate) for what, certificate in filters.proofs.items()]
+    found.sort(key=lambda f: (f[0] not in required, f[0] != "stability", f[1] not in _FILES))
+    for key, what, certificate in found:
+        yield Checked(key, what[0].upper() + what[1:], certificate, verify(certificate), key in required)
+
+
+def _key(what: str) -> str:
+    """File name: norm_1_plus_X for the norm of 1 + X."""
+    return _FILES.get(what) or what.replace(" of ", " ").replace("+", "plus").replace(" ", "_")
+
+
+def _simulation(filters: Filters) -> Simulation | None:
+    if not filters.problem.dt or not filters.nominally_stable:
+        return None
+    window = filters.problem.samples
+    return coupling.simulate(filters, max(window, min(max(_SHOWN * window, _SAMPLES), _LONGEST)))

@@ -1,0 +1,95 @@
+"""From the columns of a record to what really drives the network: w = [heaters, currents, ambients, 1, signs, steps].
+
+Static part of a `Drive` (gain, offset, saturation); delay and lag are the simulation's. The column of ones carries constant
+heats, a sign column the polarity that a hysteresis remembers, a step column is 0 before and 1 after its time.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._parameters import locate
+from ._parts import Drive
+from ._terms import Array
+
+if TYPE_CHECKING:
+    from ._system import System
+
+_STATIC = ("drive.gain", "drive.offset", "drive.cubic", "drive.clip")
+
+
+class Drives:
+    """Columns of w of one system, and how they follow from those of u (`System.exogenous_names`).
+
+    Parameters
+    ----------
+    system : System
+        Whose.
+    """
+
+    def __init__(self, system: System):
+        self.system = system
+        self.n_u = len(system.exogenous_names)
+        self.column = {name: i for i, name in enumerate(system.exogenous_names)}
+        parts = {**system.inputs, **system.modules}
+        self.of = {self.column[name]: part.drive for name, part in parts.items()}
+        self.ambients = slice(len(parts), self.n_u)
+        self.one = self.n_u
+        remembering = [name for name, module in system.modules.items() if module.hysteresis is not None]
+        self.signs = {name: self.one + 1 + i for i, name in enumerate(remembering)}
+        stepping = [link.name for link in system.links if link.step is not None]
+        self.steps = {name: self.one + 1 + len(remembering) + i for i, name in enumerate(stepping)}
+        self.width = self.one + 1 + len(remembering) + len(stepping)
+        self._shaped = {column: drive for column, drive in self.of.items() if _is_shaped(drive)}
+
+    def __call__(self, u: Array) -> Array:
+        """Columns w (..., width) of u (..., n_u), before any step."""
+        w = np.zeros((*u.shape[:-1], self.width), u.dtype if np.iscomplexobj(u) else float)
+        w[..., :self.n_u] = u
+        for column, drive in self._shaped.items():
+            w[..., column] = _shape(drive, u[..., column])
+        w[..., self.one] = 1.0
+        for name, column in self.signs.items():
+            w[..., column] = np.sign(w[..., self.column[name]].real)
+        return w
+
+    def slopes(self, u: Array) -> Array:
+        """Derivative of the first n_u columns of w with respect to the same columns of u (..., n_u)."""
+        out = np.ones(u.shape)
+        for column, drive in self._shaped.items():
+            linear = (1 + drive.gain) * u[..., column] + drive.offset
+            out[..., column] = (1 + drive.gain) * (1 - 3 * drive.cubic * linear**2) * ~_clipped(drive, linear)
+        return out
+
+    def parameter(self, name: str, u: Array) -> Array | None:
+        """Derivative (..., width) of w with respect to a parameter of a drive; None for any other parameter."""
+        table, part, field = locate(self.system, name)
+        if field not in _STATIC:
+            return None
+        column = self.column[part]
+        drive, linear = self.of[column], (1 + self.of[column].gain) * u[..., column] + self.of[column].offset
+        clipped, bend = _clipped(drive, linear), 1 - 3 * drive.cubic * linear**2
+        out = np.zeros((*u.shape[:-1], self.width))
+        out[..., column] = {"drive.gain": bend * u[..., column] * ~clipped, "drive.offset": bend * ~clipped,
+                            "drive.cubic": -linear**3 * ~clipped,
+                            "drive.clip": np.sign(linear - drive.cubic * linear**3) * clipped}[field]
+        return out
+
+
+def _is_shaped(drive: Drive) -> bool:
+    return bool(drive.gain or drive.offset or drive.cubic or drive.clip)
+
+
+def _shape(drive: Drive, u: Array) -> Array:
+    linear = (1 + drive.gain) * u + drive.offset
+    value = linear - drive.cubic * linear**3
+    return value if drive.clip is None else np.where(np.abs(value.real) > drive.clip, np.sign(value.real) * drive.clip,
+                                                     value)
+
+
+def _clipped(drive: Drive, linear: Array) -> Array:
+    """Where the value is held at ±clip."""
+    value = (linear - drive.cubic * linear**3).real
+    return np.abs(value) > (np.inf if drive.clip is None else drive.clip)

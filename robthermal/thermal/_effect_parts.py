@@ -1,0 +1,139 @@
+"""Optional keys of a system for effects beyond the plain network; zero or absent means that the effect is not there."""
+
+from __future__ import annotations
+
+from ._part import Finite, Kelvin, Name, NonNegative, Part, Positive, Share
+
+
+class Drive(Part):
+    """What a heater or an amplifier makes of the value u in its record column.
+
+    v = (1 + gain) u + offset, then v - cubic v³, then held within ±clip, then delayed, then lagged. Before the record
+    the column had its first value.
+
+    Parameters
+    ----------
+    gain : float
+        Relative gain error [-].
+    offset : float
+        [unit of the column].
+    cubic : float
+        Saturation [1/unit²].
+    clip : float, optional
+        Largest modulus [unit].
+    delay : float
+        Pure delay [s].
+    time_constant : float
+        First-order lag [s].
+    """
+
+    gain: Finite = 0.0
+    offset: Finite = 0.0
+    cubic: Finite = 0.0
+    clip: Positive | None = None
+    delay: NonNegative = 0.0
+    time_constant: NonNegative = 0.0
+
+
+class Hysteresis(Part):
+    """Memory of a module's polarity: heat m into the cold face, time_constant dm/dt = sign(I) - m, from m = 0.
+
+    Parameters
+    ----------
+    heat : float
+        [W].
+    time_constant : float
+        [s].
+    """
+
+    heat: Finite = 0.0
+    time_constant: Positive
+
+
+class Periodic(Part):
+    """Periodic heat into a lump: heat sin(2π t / period + phase), t the record's time.
+
+    Parameters
+    ----------
+    heat : float
+        Amplitude [W].
+    period : float
+        [s].
+    phase : float
+        [rad].
+    """
+
+    heat: Finite = 0.0
+    period: Positive
+    phase: Finite = 0.0
+
+
+class Condensation(Part):
+    """Heat released while a lump is below the dew point: conductance (dew_point - T).
+
+    Parameters
+    ----------
+    conductance : float
+        [W/K].
+    dew_point : float
+        [K].
+    """
+
+    conductance: NonNegative = 0.0
+    dew_point: Kelvin
+
+
+class Feedthrough(Part):
+    """Share of a heater's heat that goes to another lump instead.
+
+    Parameters
+    ----------
+    lump : str
+        Which.
+    share : float
+        [-].
+    """
+
+    lump: Name
+    share: Share = 0.0
+
+
+class Step(Part):
+    """Sudden change of a link: its linear conductance is multiplied by 1 + relative from `time` on.
+
+    Parameters
+    ----------
+    relative : float
+        [-], at least -1.
+    time : float
+        In the record's time [s].
+    """
+
+    relative: Finite = 0.0
+    time: Finite
+
+
+class Lead(Part):
+    """Lead or contact heating: resistance I² of a module's current, into a lump.
+
+    Parameters
+    ----------
+    module : str
+        Whose current.
+    lump : str
+        Where the heat goes.
+    resistance : float
+        [Ω].
+    name : str
+        Default "module-lump".
+    """
+
+    module: Name
+    lump: Name
+    resistance: Finite = 0.0
+    name: str = ""
+
+    def model_post_init(self, context: object) -> None:
+        """Name the lead after its ends."""
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.module}-{self.lump}")

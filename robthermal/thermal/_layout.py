@@ -1,0 +1,88 @@
+"""Where everything stands in the state of a simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from ._equations import Equations
+
+
+@dataclass(frozen=True)
+class Layout:
+    """State z = [lumps, lagged sensors, lagged drives, memories, periodic loads (sine, cosine), meters].
+
+    The meters feed nothing back. They integrate the heat received from every ambient, the electrical energy of every
+    module, the heat of every heater, and that of all other sources, so that the balance of a simulation can be checked.
+
+    Parameters
+    ----------
+    eq : Equations
+        Whose.
+    """
+
+    eq: Equations
+
+    @cached_property
+    def sensors(self) -> dict[str, int]:
+        """State of every sensor with a lag."""
+        lags = [name for name, sensor in self.eq.system.sensors.items() if sensor.time_constant > 0]
+        return {name: len(self.eq.system.lumps) + i for i, name in enumerate(lags)}
+
+    @cached_property
+    def drives(self) -> dict[int, int]:
+        """State of every column of w with a lag."""
+        first = len(self.eq.system.lumps) + len(self.sensors)
+        lags = [column for column, drive in self.eq.drives.of.items() if drive.time_constant > 0]
+        return {column: first + i for i, column in enumerate(lags)}
+
+    @cached_property
+    def memories(self) -> dict[str, int]:
+        """State of every module with a hysteresis."""
+        first = len(self.eq.system.lumps) + len(self.sensors) + len(self.drives)
+        return {name: first + i for i, name in enumerate(self.eq.drives.signs)}
+
+    @cached_property
+    def periodic(self) -> dict[str, int]:
+        """First of the two states, sine and cosine, of every lump with a periodic load."""
+        first = len(self.eq.system.lumps) + len(self.sensors) + len(self.drives) + len(self.memories)
+        loaded = [name for name, lump in self.eq.system.lumps.items() if lump.periodic is not None]
+        return {name: first + 2 * i for i, name in enumerate(loaded)}
+
+    @property
+    def n_free(self) -> int:
+        """Number of states before the meters."""
+        return (len(self.eq.system.lumps) + len(self.sensors) + len(self.drives) + len(self.memories)
+                + 2 * len(self.periodic))
+
+    @property
+    def ambient_meters(self) -> slice:
+        """Heat received from every ambient [J]."""
+        return slice(self.n_free, self.n_free + len(self.eq.system.ambients))
+
+    @property
+    def module_meters(self) -> slice:
+        """Electrical energy taken up by every module [J]."""
+        first = self.ambient_meters.stop
+        return slice(first, first + len(self.eq.system.modules))
+
+    @property
+    def heater_meters(self) -> slice:
+        """Heat of every heater [J]."""
+        first = self.module_meters.stop
+        return slice(first, first + len(self.eq.system.inputs))
+
+    @property
+    def source_meter(self) -> int:
+        """Heat of all other sources [J]."""
+        return self.heater_meters.stop
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return self.source_meter + 1
+
+
+def lagged(eq: Equations) -> list[str]:
+    """Sensors with a lag: each has a state of its own."""
+    return list(Layout(eq).sensors)

@@ -1,0 +1,86 @@
+"""When the held drives change: at the samples, and between them where an input is delayed or a link changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._equations import Equations
+from ._terms import Array, Indices
+
+_SAME = 1e-9  # of a sample
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Segments of constant drives.
+
+    Parameters
+    ----------
+    lengths : tuple of float
+        The different lengths of segments; the first is the sample time [s].
+    at : ndarray, shape (n_segments,)
+        Start of every segment [samples].
+    kind : ndarray of int, shape (n_segments,)
+        Length of every segment.
+    u : ndarray, shape (n_segments, n_u)
+        Exogenous values, delayed.
+    w : ndarray, shape (n_segments, n_w)
+        Drives.
+    samples : ndarray of int, shape (n_samples,)
+        Segment that starts at every sample; the last one is never left.
+    """
+
+    lengths: tuple[float, ...]
+    at: Array
+    kind: NDArray[np.intp]
+    u: Array
+    w: Array
+    samples: Indices
+
+
+def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
+    """Segments of a record.
+
+    Parameters
+    ----------
+    eq : Equations
+        Whose drives.
+    u : ndarray, shape (n_samples, n_u)
+        Columns of the record.
+    h, start : float
+        Sample time and time of the first sample [s].
+    """
+    n = len(u)
+    delays = {column: drive.delay / h for column, drive in eq.drives.of.items() if drive.delay}
+    steps = {column: (link.step.time - start) / h for link in eq.system.links if link.step
+             for column in [eq.drives.steps[link.name]]}
+    cuts = [np.arange(n) + (delay % 1.0) for delay in delays.values()] + [np.array(list(steps.values()))]
+    at = _distinct(np.concatenate([np.arange(n, dtype=float), *cuts]), n)
+    lengths, kind = _kinds(np.append(np.diff(at), 1.0))
+    held = u[np.floor(at + _SAME).astype(np.intp)]
+    for column, delay in delays.items():
+        source = np.floor(at - delay + _SAME).astype(np.intp)
+        held[:, column] = u[np.maximum(source, 0), column]
+    w = eq.drives(held)
+    for column, time in steps.items():
+        w[:, column] = at >= time - _SAME
+    return Schedule(tuple(length * h for length in lengths), at, kind, held, w,
+                    np.searchsorted(at, np.arange(n) - _SAME).astype(np.intp))
+
+
+def _distinct(at: Array, n: int) -> Array:
+    """Sorted times [samples] within the record, without those that coincide; whole samples stay exact."""
+    nearest = np.round(at)
+    at = np.unique(np.where(np.abs(at - nearest) < _SAME, nearest, at))
+    at = at[(at >= 0) & (at <= n - 1)]
+    return at[np.concatenate([[True], np.diff(at) > _SAME])]
+
+
+def _kinds(lengths: Array) -> tuple[list[float], NDArray[np.intp]]:
+    """Distinct lengths [samples], a whole sample first, and which one each segment has."""
+    rounded = np.round(lengths, 9)
+    different = [1.0, *(float(value) for value in np.unique(rounded) if value != 1.0)]
+    return different, np.array([different.index(float(value)) for value in rounded], np.intp)

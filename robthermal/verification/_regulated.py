@@ -1,0 +1,279 @@
+"""Kind "regulated": the rest of a network contracts while modules hold their cold lumps exactly at their set-points.
+
+The currents of these modules are whatever holds them. With the heat pumped instead of the current as the coordinate,
+the ranges of the currents are a convex set, so that two trajectories obey E e' = J e with J a mean of the reduced
+Jacobian (see ``_held``) over the box; every inequality is convex in J (proof note, 12).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+from flint import arb, fmpq
+
+from robthermal.errors import InputError
+
+from ._contraction import NORMS, search, shorten
+from ._definite import eliminate, is_positive
+from ._fields import get, kelvin_interval, mapping, margin_of, not_negative, numbers, sequence, text
+from ._held import Alternative, Groups, HeldNetwork, lost_grip, shares
+from ._kind import Kind, Proof, working_precision
+from ._lyapunov import asymmetry
+from ._numbers import name_of, round_down, show
+from ._system import ThermalSystem, read_region, read_system, say_interval, say_system
+from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._vertices import Entries
+
+_PIECES = (1, 4, 16)  # per current, refined in turn
+_MOST_WORK = 3e7  # combinations times (lumps that vary)³
+Rows = list[dict[int, arb]]
+
+
+@dataclass(frozen=True)
+class Regulated:
+    """The exact problem of one certificate; weights and P over the lumps that are not held, in order."""
+
+    network: HeldNetwork
+    method: str
+    rate: fmpq
+    margin: fmpq
+    weights: tuple[fmpq, ...]
+    matrix: tuple[tuple[fmpq, ...], ...]
+    parameters: Parameters
+
+
+def read(system: Any, region: Any, evidence: Any, margin: Any) -> Regulated:
+    """Return the exact problem, or raise InputError."""
+    nominal, table, found = read_system(system), mapping(region, "region"), mapping(evidence, "evidence")
+    parameters = read_parameters(table)
+    network = _held_network(worst_system(nominal, system, parameters), table)
+    method = text(get(found, "method", "evidence"), "evidence.method")
+    if method not in NORMS:
+        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(NORMS)}")
+    n = len(network.free)
+    weights: list[fmpq] = []
+    matrix: list[list[fmpq]] = []
+    if method in ("sum", "max"):
+        weights = numbers(get(found, "weights", "evidence"), n, "evidence.weights")
+    if method == "lyapunov":
+        rows = sequence(get(found, "matrix", "evidence"), "evidence.matrix")
+        if len(rows) != n:
+            raise InputError(f"{len(rows)} rows", where="evidence.matrix", expected=f"{n}, one per free lump")
+        matrix = [numbers(row, n, f"evidence.matrix[{k}]") for k, row in enumerate(rows)]
+    return Regulated(network, method, not_negative(get(found, "rate", "evidence"), "evidence.rate"),
+                     margin_of(margin, "rate"), tuple(weights), tuple(tuple(row) for row in matrix), parameters)
+
+
+def claim(problem: Regulated) -> str:
+    """Return the one sentence the data give."""
+    network, system = problem.network, problem.network.system
+    held = ", ".join(f"lump {name_of(system.lumps[lump])} held exactly at one set-point in "
+                     f"{say_interval(network.region.temperature[lump])} K by the current of "
+                     f"{name_of(system.modules[k].name)} in {say_interval(network.region.current[k])} A"
+                     for lump, k in network.holder.items())
+    others = "".join(f" and current of {name_of(module.name)} in {say_interval(current)} A"
+                     for k, (module, current) in enumerate(zip(system.modules, network.region.current, strict=True))
+                     if k not in network.holder.values())
+    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
+             else "decays strictly")
+    return (f"The {say_system(system)} with {held}, contracts for all {_say_temperatures(network)}{others}"
+            f"{say_parameters(problem.parameters)}: between any two trajectories that stay in these ranges under the "
+            f"same set-points, ambients, heat loads and other currents, {NORMS[problem.method]} of the lumps that are "
+            f"not held (method {problem.method}) {speed}; more current takes more heat from every held lump.")
+
+
+def prove(problem: Regulated) -> Proof:
+    """Prove that the currents hold their lumps, and the inequality of the method with the stored margin added."""
+    with working_precision():
+        lost = lost_grip(problem.network) or _malformed(problem)
+        if lost:
+            return Proof(False, lost)
+        extra = max(problem.margin, fmpq(0))
+        proof = _prove_rate(problem, problem.rate + extra)
+        if proof.valid:
+            return replace(proof, margins={"rate": round_down(extra)})
+        if extra > 0 and _prove_rate(problem, problem.rate).valid:
+            return Proof(False, f"stored margin {show(extra)} 1/s is larger than what can be proven: {proof.reason}")
+        return proof
+
+
+def find_margin(problem: Regulated) -> dict[str, float]:
+    """Return a margin that the checker proves, close to the largest [1/s]."""
+    with working_precision():
+        extra = search(lambda value: _prove_rate(problem, problem.rate + fmpq(*value.as_integer_ratio())).valid,
+                       round_down(problem.rate))
+    return {"rate": shorten(extra)}
+
+
+def _malformed(problem: Regulated) -> str:
+    """Return what is wrong with the evidence itself, empty where nothing is."""
+    names = [problem.network.system.lumps[k] for k in problem.network.free]
+    for name, weight in zip(names, problem.weights, strict=False):
+        if weight <= 0:
+            return f"weight of lump {name_of(name)} is {show(weight)}, not positive"
+    if not problem.matrix:
+        return ""
+    capacity = next((name for name, _ in problem.parameters if name.startswith("lumps.")), "")
+    if capacity:
+        return f"method lyapunov: {name_of(capacity)} is uncertain, which needs method energy, sum or max"
+    broken = asymmetry(problem.matrix)
+    if not broken and not is_positive([[arb(value) for value in row] for row in problem.matrix]):
+        broken = "P > 0 fails or cannot be proven"
+    return f"method lyapunov: {broken}" if broken else ""
+
+
+def _prove_rate(problem: Regulated, rate: fmpq) -> Proof:
+    """Prove the inequality over the box, cutting the currents finer where it fails."""
+    proof = Proof(False, "")
+    for pieces in _PIECES:
+        base, groups, missing = shares(problem.network, problem.method, pieces)
+        if missing:
+            return Proof(False, f"method {problem.method}: {missing}")
+        proof = (_prove_lines if problem.weights else _prove_form)(problem, rate, base, groups)
+        if proof.valid:
+            break
+    return proof
+
+
+def _prove_lines(problem: Regulated, rate: fmpq, base: Entries, groups: Groups) -> Proof:
+    """Weighted rows (max) or columns (sum) of J below -rate E, in exact rational arithmetic."""
+    names, free = problem.network.system.lumps, problem.network.free
+    weight = dict(zip(free, problem.weights, strict=True))
+    total = dict.fromkeys(free, fmpq(0))
+    where: dict[int, list[str]] = {line: [] for line in free}
+    for group in [[Alternative(base, "the links")], *groups]:
+        for line, (value, place) in _largest(problem.method, weight, group).items():
+            total[line] += value
+            where[line].append(place)
+    for line in free:
+        value, bound = total[line] / (weight[line] * problem.network.system.capacity[line]), -rate
+        if value > bound or (value == bound and rate == 0):
+            words = f"weighted {'column' if problem.method == 'sum' else 'row'} of lump {name_of(names[line])}"
+            return Proof(False, f"method {problem.method}: the {words} may reach {show(value)} 1/s, not "
+                                f"{'<=' if rate > 0 else '<'} {show(bound)} 1/s, at {', '.join(where[line])}")
+    return Proof(True, "every weighted line is bounded over the box")
+
+
+def _largest(method: str, weight: Mapping[int, fmpq], group: list[Alternative]) -> dict[int, tuple[fmpq, str]]:
+    """Return the largest share of one group in every line, diagonal signed, the rest by absolute value."""
+    largest: dict[int, tuple[fmpq, str]] = {}
+    touched = {line for item in group for line in _line_sums(method, weight, item)}
+    for item in group:
+        sums = _line_sums(method, weight, item)
+        for line in touched:
+            value = sums.get(line, fmpq(0))
+            if line not in largest or value > largest[line][0]:
+                largest[line] = (value, item.where)
+    return largest
+
+
+def _line_sums(method: str, weight: Mapping[int, fmpq], item: Alternative) -> dict[int, fmpq]:
+    sums: dict[int, fmpq] = {}
+    for (i, j), value in item.entries.items():
+        line, other = (j, i) if method == "sum" else (i, j)
+        sums[line] = sums.get(line, fmpq(0)) + weight[other] * (value if i == j else abs(value))
+    return sums
+
+
+def _prove_form(problem: Regulated, rate: fmpq, base: Entries, groups: Groups) -> Proof:
+    """-(P E^-1 J + J'E^-1 P) - 2 rate P > 0 (P = E for method energy), in balls, at every combination."""
+    names = problem.network.system.lumps
+    words = f"method {problem.method}: V decays at {show(rate)} 1/s"
+    P = _own(problem)
+    rows = _form(problem, P, base)
+    for i, row in P.items():
+        for j, value in row.items():
+            rows[i][j] = rows[i].get(j, arb(0)) - 2 * arb(rate) * value
+    forms = [[(_form(problem, P, item.entries), item.where) for item in group] for group in groups]
+    ports = sorted({i for group in forms for form, _ in group for i, row in enumerate(form) if row})
+    total = math.prod(map(len, groups))
+    if total * len(ports) ** 3 > _MOST_WORK:
+        return Proof(False, f"{words} is not proven: {total} combinations are too many to check one by one")
+    held = set(problem.network.holder)
+    failed = eliminate(rows, set(ports) | held)
+    if failed is not None:
+        return Proof(False, f"{words} fails or cannot be proven even without the modules, at lump "
+                            f"{name_of(names[failed])}")
+    rest = _block(rows, ports)
+    blocks = [[(_block(form, ports), where) for form, where in group] for group in forms]
+    for chosen in product(*blocks):
+        matrix = [[sum(entries, arb(0)) for entries in zip(*lines, strict=True)]
+                  for lines in zip(rest, *(block for block, _ in chosen), strict=True)]
+        if not is_positive(matrix):
+            return Proof(False, f"{words} fails or cannot be proven at {'; '.join(where for _, where in chosen)}")
+    return Proof(True, f"{words} at all {total} combinations of module and link slopes")
+
+
+def _own(problem: Regulated) -> dict[int, dict[int, arb]]:
+    """Return the rows of P: E for method energy."""
+    free, capacity = problem.network.free, problem.network.system.capacity
+    if not problem.matrix:
+        return {i: {i: arb(capacity[i])} for i in free}
+    return {i: {j: arb(value) for j, value in zip(free, row, strict=True)}
+            for i, row in zip(free, problem.matrix, strict=True)}
+
+
+def _form(problem: Regulated, P: Mapping[int, Mapping[int, arb]], entries: Entries) -> Rows:
+    """Return -(P E^-1 J + J'E^-1 P) of some entries of J as sparse rows."""
+    capacity = problem.network.system.capacity
+    rows: Rows = [{} for _ in capacity]
+    for (j, k), value in entries.items():
+        for i, factor in P[j].items():  # P is symmetric
+            share = factor * arb(value / capacity[j])
+            rows[i][k] = rows[i].get(k, arb(0)) - share
+            rows[k][i] = rows[k].get(i, arb(0)) - share
+    return rows
+
+
+def _block(rows: Rows, ports: list[int]) -> list[list[arb]]:
+    return [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
+
+
+def _held_network(system: ThermalSystem, region: Mapping[str, Any]) -> HeldNetwork:
+    where = "region.setpoint"
+    setpoint = mapping(get(region, "setpoint", "region"), where)
+    modules = {module.name: k for k, module in enumerate(system.modules)}
+    holder: dict[int, int] = {}
+    for name in setpoint:
+        if name not in modules:
+            raise InputError(f"{name_of(name)} is not a module", where=where)
+        lump = system.modules[modules[name]].cold
+        if lump in holder:
+            raise InputError(f"two modules hold lump {name_of(system.lumps[lump])}: their currents are not determined",
+                             where=where, expected="one module per cold lump")
+        holder[lump] = modules[name]
+    if not holder:
+        raise InputError("no module holds its cold lump", where=where, expected="at least one")
+    for k in holder.values():
+        if system.modules[k].hot in holder:
+            raise InputError(f"the hot lump of {name_of(system.modules[k].name)} is held by another module",
+                             where=where, expected="modules whose hot lumps are free (no cascades)")
+    return HeldNetwork(system, read_region({**region, "temperature": _temperatures(system, region, holder)}, system),
+                       holder)
+
+
+def _temperatures(system: ThermalSystem, region: Mapping[str, Any], holder: Mapping[int, int]) -> dict[str, Any]:
+    """Return the range of every lump, the set-point's for those held."""
+    held = {system.lumps[lump]: region["setpoint"][system.modules[k].name] for lump, k in holder.items()}
+    given: Any = get(region, "temperature", "region")
+    if not isinstance(given, Mapping):
+        kelvin_interval(given, "region.temperature")
+        return {name: held.get(name, given) for name in system.lumps}
+    for name in held:
+        if name in given:
+            raise InputError(f"lump {name_of(name)} is held: its range is the set-point's", where="region.temperature")
+    return {**given, **held}
+
+
+def _say_temperatures(network: HeldNetwork) -> str:
+    names, boxes, free = network.system.lumps, network.region.temperature, network.free
+    if all(boxes[k] == boxes[free[0]] for k in free):
+        return f"other lump temperatures in {say_interval(boxes[free[0]])} K"
+    return "lump temperatures " + ", ".join(f"{name_of(names[k])} in {say_interval(boxes[k])} K" for k in free)
+
+
+REGULATED = Kind("regulated", read, claim, prove, find_margin)
