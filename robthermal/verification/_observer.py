@@ -8,6 +8,7 @@ e+ = M e with M = A_d - L C + Γ F, F a mean of ∂f/∂x over the box (proof no
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -110,21 +111,21 @@ def prove(problem: Observer) -> Proof:
 
 
 def find_margin(problem: Observer) -> dict[str, float]:
-    """Return how much smaller a contraction the same matrix proves, to one per cent of what is left to 1."""
-    def proven(extra: float) -> bool:
-        return _prove(problem, problem.contraction - fmpq(*extra.as_integer_ratio())).valid
+    """Return how much smaller a contraction the same matrix proves, to one per cent.
 
+    Looked for with the refinement that proves the claim itself: a probe that fails would try all finer ones.
+    """
     with working_precision():
+        pieces = next((k for k in PIECES if _prove(problem, problem.contraction, (k,)).valid), 0)
         low, high = 0.0, round_down(problem.contraction)
-        for _ in range(24):
-            middle = (low + high) / 2 if low > 0 else high / 8
-            if high - low <= 0.01 * high or high < 1e-9:
-                break
-            low, high = (middle, high) if proven(middle) else (low, middle)
+        while pieces and high - low > max(0.01 * low, 1e-5):
+            middle = (low + high) / 2 if low > 0 else high / 4
+            proven = _prove(problem, problem.contraction - fmpq(*middle.as_integer_ratio()), (pieces,)).valid
+            low, high = (middle, high) if proven else (low, middle)
     return {"contraction": float(f"{low * 0.999:.4g}") if low > 0 else 0.0}
 
 
-def _prove(problem: Observer, contraction: fmpq) -> Proof:
+def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PIECES) -> Proof:
     """[c P, M'P; P M, c P] > 0 for all M of the box: affine in M, so that vertices suffice."""
     n = len(problem.matrix)
     if contraction <= 0:
@@ -146,7 +147,7 @@ def _prove(problem: Observer, contraction: fmpq) -> Proof:
     links = [[_part(left, item, n) for item in items] for items in bent]
     words = f"M'PM < {show(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
     proof = Proof(False, "too many vertices to check any")
-    for pieces in PIECES:
+    for pieces in refinements:
         total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
         if total * n**3 > MOST_WORK:
             return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
