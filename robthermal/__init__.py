@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import certify as certify
     from . import coupling as coupling
     from . import design as design
+    from . import diagnosis as diagnosis
     from . import errors as errors
     from . import identify as identify
     from . import project as project
@@ -33,6 +34,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import thermal as thermal
     from . import verification as verification
     from .calibration import calibrate as calibrate
+    from .diagnosis import diagnose as diagnose
     from .signals import Record as Record
     from .signals import read_record as read_record
     from .thermal import System as System
@@ -41,7 +43,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "coupling", "design", "errors", "identify", "project", "report", "signals",
+_ROOMS = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "project", "report", "signals",
           "systems", "thermal", "verification")
 
 _HOME = {  # public name: the room it lives in
@@ -50,6 +52,7 @@ _HOME = {  # public name: the room it lives in
     "System": "thermal",
     "Verdict": "verification",
     "calibrate": "calibration",
+    "diagnose": "diagnosis",
     "read_record": "signals",
     "read_system": "thermal",
     "verify": "verification",

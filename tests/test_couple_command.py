@@ -103,7 +103,6 @@ class TestYes:
         assert sorted(path.name for path in out.iterdir()) == [
             "certificates", "coupling.json", "junit.xml", "report.html", "summary.json"]
         assert run("verify", out)[0] == 0
-        assert run("couple", tmp_path / "SPEC.toml", "--out", out)[0] == 0  # an earlier result is replaced
 
     def test_coupling_json_has_the_keys_of_its_contract(self, robust: Done) -> None:
         found = json.loads((robust[0] / "coupling.json").read_text(encoding="utf-8"))
@@ -161,12 +160,14 @@ class TestYes:
         assert found.performance.ma_after == pytest.approx(expected.performance.ma_after, rel=1e-4)
         assert found.performance.ma_after < 0.95 * found.performance.ma_before
 
-    def test_continuous_time_and_a_cutoff_in_hertz(self, run: Any, tmp_path: Path) -> None:
+    def test_continuous_time_and_a_cutoff_in_hertz(self, tmp_path: Path) -> None:
         loop = "plant = { num = [1.0], den = [1.0, 1.0] }\ncontroller = 9.0\n"
         text = (f'[coupling]\nname = "slow"\nsample_time = 0\n[subsystems.1]\n{loop}[subsystems.2]\n{loop}'
                 "[design]\nX_hat = -0.5\ncutoff = 100.0\n")
-        assert run("couple", write(tmp_path, text), "--out", tmp_path / "out")[0] == 0
-        found = json.loads((tmp_path / "out" / "coupling.json").read_text(encoding="utf-8"))
+        result = rt.project.couple_subsystems(rt.project.read_coupling(write(tmp_path, text)))
+        result.filters.save(tmp_path / "coupling.json")
+        found = json.loads((tmp_path / "coupling.json").read_text(encoding="utf-8"))
+        assert result.holds and result.simulation is None
         assert found["sections"] == {} and found["verdict"] == "nominal" and found["performance"]["ma_after"] is None
         assert np.ravel(found["filters"]["Z1"]["A"]) == pytest.approx([-2 * np.pi * 100.0])
 

@@ -131,6 +131,8 @@ def sampled_response(system: System, frequencies: Array, sample_time: float, ope
     for first in range(0, omega.size, _CHUNK):
         z = np.exp(1j * omega[first:first + _CHUNK] * sample_time)
         out[first:first + _CHUNK] = C @ np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, B.astype(complex))
-    delays = np.array([system.sensors[name].delay if name in system.sensors else 0.0 for name in outputs])
-    delayed: Complex = out * np.exp(-1j * omega[:, None] * delays)[..., None]
+    read = np.array([system.sensors[name].delay if name in system.sensors else 0.0 for name in outputs])
+    drives = {name: part.drive for table in (system.inputs, system.modules) for name, part in table.items()}
+    driven = np.array([drives[name].delay if name in drives else 0.0 for name in inputs])
+    delayed: Complex = out * np.exp(-1j * omega[:, None, None] * (read[:, None] + driven))
     return delayed

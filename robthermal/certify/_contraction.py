@@ -77,7 +77,7 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     if method not in METHODS:
         raise InputError(f"method = {method!r}", where="argument method",
                          expected='"energy", "sum", "max" or "lyapunov"')
-    system_part = system_section(system)
+    system_part = system_section(system, forcing=True)
     region = region_section(system, current, temperature, parameters)
     parts: dict[str, Any] = {"system": system_part, "region": region}
     if method == "lyapunov":

@@ -106,6 +106,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     >>> safe.holds
     True
     """
+    system_section(system)  # refuses effects before they meet the box
     currents = current_box(system, current)
     heat = heater_heat(system) if heat is None else heat
     box = invariant_box(system, currents, ambient or {}, heat)

@@ -13,7 +13,7 @@ import pandas as pd
 from ..errors import Outcome
 from ..thermal import LoadCurve, System, fold
 from ..verification import Certificate, establish
-from ._sections import Interval, made_by, parameter_box
+from ._sections import Interval, made_by, parameter_box, system_section
 
 _SLACKS = (0.01, 0.05, 0.2)  # share of the spread over the corners of the constants added to it, tried in turn
 
@@ -99,6 +99,7 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     >>> round(limit.load["m1"], 2)
     3.75
     """
+    system_section(system)  # refuses effects that the closed form leaves out
     curve = fold(system, setpoint, ambient=ambient)
     current = dict(zip(setpoint, curve.current[-1].tolist(), strict=True))
     load = dict(zip(setpoint, curve.load[-1].tolist(), strict=True))

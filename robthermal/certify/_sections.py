@@ -19,20 +19,45 @@ _UNCERTAIN = (".capacity", ".conductance", *(f".{name}.{part}" for name in ("see
                                              for part in ("value", "slope")))
 
 
-def system_section(system: System) -> dict[str, Any]:
-    """Every number of a thermal network that a claim depends on, kelvin."""
+# forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
+_FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
+            "inputs": ("drive.gain", "drive.offset", "drive.cubic", "drive.clip", "drive.delay", "drive.time_constant",
+                       "feedthrough.share")}
+
+
+def system_section(system: System, *, forcing: bool = False) -> dict[str, Any]:
+    """Every number of a thermal network that a claim depends on, kelvin.
+
+    Effects that no checker knows are refused: a certificate must not leave out a heat. With `forcing`, for claims on
+    ∂f/∂x alone, those pass that are not part of it.
+    """
     if not isinstance(system, System):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
-    if system.effects:  # a certificate without them would be about another machine
-        raise InputError(f"{', '.join(system.effects)}: effects that no certificate covers", where="argument system",
-                         expected="lumps, links and modules with S, R and K only",
-                         remedy="Certify the plain network: set them to 0 with system.with_parameters({...}).")
+    _refuse_effects(system, forcing)
     return {"name": system.name,
             "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
             "ambients": list(system.ambients),
             "links": [_link(link) for link in system.links],
             "modules": {name: _module(module) for name, module in system.modules.items()}}
+
+
+def _refuse_effects(system: System, forcing: bool) -> None:
+    for name in system.effects:
+        table, _, rest = name.partition(".")
+        passes = forcing and (any(rest.endswith("." + field) for field in _FORCING.get(table, ()))
+                              or (rest.endswith(".gradient") and not _breezy(system, rest.removesuffix(".gradient"))))
+        if not passes:
+            raise InputError(f"{name} = {system.parameter(name):g} is an effect that no certificate covers yet",
+                             where="argument system", expected="a network of links, modules and lumps only",
+                             remedy="Certify the system without it (set it to 0), and treat its heat as a load, or its "
+                                    "size as uncertainty of the parameters.")
+
+
+def _breezy(system: System, lump: str) -> bool:
+    """Whether natural convection joins a lump to an ambient: its slope depends on how warm the ambient is."""
+    return any(link.natural is not None and lump in link.between and any(end in system.ambients for end in link.between)
+               for link in system.links)
 
 
 def _link(link: Any) -> dict[str, Any]:

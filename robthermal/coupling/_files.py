@@ -51,12 +51,24 @@ def save(filters: Filters, path: str | Path, name: str) -> None:
     name : str
         Name of the design.
     """
+    write(path, json.dumps(document(filters, name), indent=1, allow_nan=False).encode())
+
+
+def write(path: str | Path, content: bytes) -> None:
+    """Write any file whole, or not at all.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write.
+    content : bytes
+        What it will hold.
+    """
     target = Path(path)
-    content = json.dumps(document(filters, name), indent=1, allow_nan=False)
     try:
         handle, part = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
         try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
+            with os.fdopen(handle, "wb") as file:
                 file.write(content)
             os.chmod(part, 0o644)
             os.replace(part, target)

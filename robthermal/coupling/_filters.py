@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import Outcome
 from ..verification import Certificate
 from . import _files
+from ._export import export
 from ._performance import Performance
 from ._problem import Problem
 from ._reduce import reduce
@@ -204,6 +205,28 @@ class Filters:
             If the file cannot be written.
         """
         _files.save(self, path, name)
+
+    def export(self, path: str | Path, name: str = "coupling") -> None:
+        """Write the filters for another program: MATLAB (.mat) or C99 (.c, .h).
+
+        MATLAB gets what coupling.json holds: A, B, C, D of every filter, sections, sample time, norms. C gets the
+        sections and a step function in double that makes e+ and what is added to the outputs of C1 and C2, with a
+        test vector; see the page on coupling.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step; its ending says which.
+        name : str
+            Name of the design; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, or when the file cannot be written. In C also in continuous time, or when a filter
+            cannot be factored accurately enough: reduce it first.
+        """
+        export(self, path, name)
 
     def plot(self) -> Any:
         """Improvement factors, e12 before and after, and the robust number over frequency [Hz].

@@ -31,7 +31,8 @@ def draw(found: Spectra, panels: Sequence[str]) -> Any:
     unknown = [name for name in panels if name not in _PANELS]
     if unknown or not panels:
         raise InputError(f"panels = {list(panels)!r}", where="plot", expected=f"some of {', '.join(_PANELS)}")
-    axes: Any = plt.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=(7, 2.6 * len(panels)))[1][:, 0]
+    axes: Any = plt.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=(7, 2.6 * len(panels)),
+                             layout="constrained")[1][:, 0]
     for ax, name in zip(axes, panels, strict=True):
         _PANELS[name](ax, found)
         ax.legend(loc="best")

@@ -64,11 +64,29 @@ def realisation(problem: Problem, X_hat: control.StateSpace, Y_hat: control.Stat
         raise InputError("1 - X(∞)Y(∞) = 0: the coupling controller is not well posed", where="X_hat, Y_hat",
                          expected="X(∞)Y(∞) other than 1", remedy="Let one of the filters roll off.")
     own = [realise(problem.one.C), realise(problem.two.C)]
-    controller, coupling = _assembled(both, own, problem.dt)
+    driver, coupling = _assembled(both, own, problem.dt)
+    controller = control.StateSpace(driver.A, driver.B, driver.C[:2], driver.D[:2], problem.dt,
+                                    remove_useless_states=False)
     plants = apart(realise(problem.one.P), realise(problem.two.P))
     return Realisation(X=_output(both[0], 0), Y=_output(both[1], 0), X_input=_output(both[0], 1),
                        Y_input=_output(both[1], 1), controller=controller, coupling_matrix=coupling,
                        loop_matrix=feedback_matrix(plants, controller))
+
+
+def drivers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace
+            ) -> tuple[control.StateSpace, control.StateSpace]:
+    """The controller with the inputs of the coupling filters connected, and cut: e to (u, e+), the same states.
+
+    Parameters
+    ----------
+    problem : Problem
+        The subsystems.
+    X_hat, Y_hat : StateSpace
+        Stable, one input and one output.
+    """
+    both = [_two_outputs(problem.one, X_hat), _two_outputs(problem.two, Y_hat)]
+    own = [realise(problem.one.C), realise(problem.two.C)]
+    return _assembled(both, own, problem.dt)[0], _assembled(both, own, problem.dt, connected=0.0)[0]
 
 
 def youla_parameter(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace) -> control.StateSpace:
@@ -130,20 +148,21 @@ def _output(both: control.StateSpace, row: int) -> control.StateSpace:
                               remove_useless_states=False)
 
 
-def _assembled(both: list[control.StateSpace], own: list[control.StateSpace], dt: float
+def _assembled(both: list[control.StateSpace], own: list[control.StateSpace], dt: float, connected: float = 1.0
                ) -> tuple[control.StateSpace, Array]:
-    """Close e+ = e + [[0, X], [Y, 0]] e+ round the filters; states: X, Y, C1, C2."""
+    """Close e+ = e + [[0, X], [Y, 0]] e+ round the filters; states: X, Y, C1, C2; outputs: u, e+."""
     x, y = both
     A = block_diag(x.A, y.A, own[0].A, own[1].A)
-    B = np.block([[np.zeros((x.nstates, 1)), x.B], [y.B, np.zeros((y.nstates, 1))],
+    B = np.block([[np.zeros((x.nstates, 1)), connected * x.B], [connected * y.B, np.zeros((y.nstates, 1))],
                   [own[0].B, np.zeros((own[0].nstates, 1))], [np.zeros((own[1].nstates, 1)), own[1].B]])
     rest = own[0].nstates + own[1].nstates
     C_e = np.hstack([block_diag(x.C[[0]], y.C[[0]]), np.zeros((2, rest))])
-    D_e = np.array([[0.0, x.D[0, 0]], [y.D[0, 0], 0.0]])
+    D_e = connected * np.array([[0.0, x.D[0, 0]], [y.D[0, 0], 0.0]])
     C_u = np.hstack([block_diag(x.C[[1]], y.C[[1]]), block_diag(own[0].C, own[1].C)])
-    D_u = np.array([[own[0].D[0, 0], x.D[1, 0]], [y.D[1, 0], own[1].D[0, 0]]])
+    D_u = np.array([[own[0].D[0, 0], connected * x.D[1, 0]], [connected * y.D[1, 0], own[1].D[0, 0]]])
     well = np.linalg.inv(np.eye(2) - D_e)
     A_k = A + B @ well @ C_e
     n = x.nstates + y.nstates
-    whole = control.StateSpace(A_k, B @ well, C_u + D_u @ well @ C_e, D_u @ well, dt, remove_useless_states=False)
+    whole = control.StateSpace(A_k, B @ well, np.vstack([C_u + D_u @ well @ C_e, well @ C_e]),
+                               np.vstack([D_u @ well, well]), dt, remove_useless_states=False)
     return whole, A_k[:n, :n]

@@ -34,16 +34,26 @@ def sections(filters: Filters) -> dict[str, Array]:
     if not filters.problem.dt:
         raise InputError("continuous-time filters have no sections", where="sections", expected="discrete time",
                          remedy="Discretise plants and controllers first.")
-    one, two = filters.problem.one, filters.problem.two
-    hats = {"X_hat": filters.X_hat, "Y_hat": filters.Y_hat}
     result = {}
-    for name, hat, fixed in (("X", "X_hat", one.Z), ("Y", "Y_hat", two.Z), ("X_input", "X_hat", one.Q),
-                             ("Y_input", "Y_hat", two.Q)):
-        free = zpk_of(hats[hat], hat, filters.problem.dt)
-        rows = np.vstack([_rows(fixed), _rows(free)]) if free.gain else _rows(free)
+    for name, (free, fixed) in paths(filters).items():
+        rows = np.vstack([fixed, free]) if np.any(free[0, :3]) else free
         _expect_accurate(rows, getattr(filters, name), name)
         result[name] = rows
     return result
+
+
+def paths(filters: Filters) -> dict[str, tuple[Array, Array]]:
+    """Sections of the free filter, and those of the Z or Q that follows it, of X, Y, X_input and Y_input.
+
+    Parameters
+    ----------
+    filters : Filters
+        Discrete time.
+    """
+    one, two = filters.problem.one, filters.problem.two
+    free = {hat: _rows(zpk_of(getattr(filters, hat), hat, filters.problem.dt)) for hat in ("X_hat", "Y_hat")}
+    fixed = {"X": ("X_hat", one.Z), "Y": ("Y_hat", two.Z), "X_input": ("X_hat", one.Q), "Y_input": ("Y_hat", two.Q)}
+    return {name: (free[hat], _rows(factor)) for name, (hat, factor) in fixed.items()}
 
 
 def _rows(system: Zpk) -> Array:

@@ -99,12 +99,14 @@ class Uncertainty:
         """
         import matplotlib.pyplot as plt
 
-        axes: Any = plt.subplots(2, 2, sharex=True, squeeze=False)[1]
+        axes: Any = plt.subplots(2, 2, sharex=True, squeeze=False, layout="constrained")[1]
         for row, column in np.ndindex(2, 2):
             ax = axes[row, column]
             if np.any(self.envelope[row, column]):
                 ax.loglog(self.omega / (2 * np.pi), np.abs(self.samples[:, row, column]).T, color="0.7", linewidth=0.8)
                 ax.loglog(self.omega / (2 * np.pi), self.envelope[row, column], color="k")
+            else:
+                ax.set_axis_off()
             ax.set_title(f"Δp {row + 1}{column + 1}")
             ax.set_xlabel("frequency [Hz]")
         return axes

@@ -304,6 +304,7 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     ['current', 'current']
     """
     chosen = ModuleSet.of(system, modules)
+    _refuse_effects(chosen)
     declared = {name: system.modules[name].current_limits for name in chosen.names}
     own = chosen.ranges({name: pair for name, pair in declared.items() if pair}, "system", "A")
     widest, source = own, "the range in the system file"
@@ -321,6 +322,15 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
         raise InputError(f"slew = {slews.min():g} A/s", where="argument slew", expected="positive numbers [A/s]")
     return FeedbackLinearization(chosen, np.maximum(low, widest[0]), np.minimum(high, widest[1]),
                                  *chosen.ranges(voltage_limits, "voltage_limits", "V"), slews)
+
+
+def _refuse_effects(modules: ModuleSet) -> None:
+    """The law inverts S, R and K; it knows no other heat of a module, and no current but the one it commands."""
+    for name in modules.system.effects:
+        if name.startswith(tuple(f"modules.{module}." for module in modules.names)):
+            raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the law",
+                             where="argument system", expected="modules with Seebeck, Joule and conducted heat only",
+                             remedy="Set it to 0 for the law; what it adds is then a disturbance of v.")
 
 
 def _certified(modules: ModuleSet, certificate: Certificate) -> tuple[Array, Array]:

@@ -23,21 +23,17 @@ _IMAGINARY = 1e-40
 
 @dataclass(frozen=True)
 class Response:
-    """What a unit of an effect does: extra heat, extra input, or a changed reading; what is None is zero.
+    """What a unit of an effect does: extra heat or a changed reading; what is None is zero.
 
     Parameters
     ----------
     heat : tuple of ndarray, optional
         Heat into the lumps at the start and at the end of every sample, both (n, n_lumps) [W].
-    drive : tuple of ndarray, optional
-        Change of the held inputs at the start and at the end of every sample, both (n, n_u), as in
-        `System.exogenous_names`.
     reading : ndarray, optional
         Change of all sensors of the system (n, n_sensors) [K].
     """
 
     heat: tuple[Array, Array] | None = None
-    drive: tuple[Array, Array] | None = None
     reading: Array | None = None
 
 
@@ -135,13 +131,6 @@ class Along:
             C[i, state] = sensor.gain
         return C
 
-    def input_heat(self, column: int) -> tuple[Array, Array]:
-        """Heat into the lumps per unit of one input, at the start and end of every sample, (n, n_lumps) [W/unit]."""
-        moved = self.u.astype(complex)
-        moved[:, column] += 1j * _IMAGINARY
-        return (self.equations.heat(self.x, moved).imag / _IMAGINARY,
-                self.equations.heat(self.end, moved).imag / _IMAGINARY)
-
     def heat_of(self, system: System) -> tuple[Array, Array]:
         """Extra heat of a changed system with the same lumps, at the start and end of every sample, (n, n_lumps) [W]."""
         other = Equations(system)
@@ -155,12 +144,7 @@ class Along:
         out = np.zeros((n, len(self.one.sensors), len(responses)))
         for j, response in enumerate(responses):
             if response.heat is not None:
-                start[..., j], end[..., j] = start[..., j] + response.heat[0], end[..., j] + response.heat[1]
-            if response.drive is not None:
-                for column in np.flatnonzero(np.any(response.drive[0], axis=0) | np.any(response.drive[1], axis=0)):
-                    first, last = self.input_heat(int(column))
-                    start[..., j] += first * response.drive[0][:, [column]]
-                    end[..., j] += last * response.drive[1][:, [column]]
+                start[..., j], end[..., j] = response.heat
             if response.reading is not None:
                 out[..., j] += response.reading[:, self.one.columns]
         return out + self.answer(start, end)

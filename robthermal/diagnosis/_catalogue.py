@@ -7,11 +7,13 @@ from collections.abc import Iterable
 from ..errors import InputError
 from ..thermal import System
 from ._catalogue_links import LINK_EFFECTS
+from ._catalogue_lumps import LUMP_EFFECTS
 from ._catalogue_modules import MODULE_EFFECTS
-from ._catalogue_sensors import SENSOR_EFFECTS
+from ._catalogue_sensors import INPUT_EFFECTS, SENSOR_EFFECTS
 from ._effect import Candidate, Effect, check_effect
 
-_BUILT_IN = {effect.name: effect for effect in (*LINK_EFFECTS, *MODULE_EFFECTS, *SENSOR_EFFECTS)}
+_BUILT_IN = {effect.name: effect for effect in
+             (*MODULE_EFFECTS, *LINK_EFFECTS, *LUMP_EFFECTS, *INPUT_EFFECTS, *SENSOR_EFFECTS)}
 _OWN: dict[str, Effect] = {}
 
 

@@ -1,4 +1,4 @@
-"""Heat paths and masses that a model may lack."""
+"""Heat paths that a model may lack, or that change."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 
 from ..thermal import System
 from . import _adding as adding
+from ._along import Along
 from ._effect import Effect, Quantity, Where
-from ._signatures import Array, Values, exchanged, hidden_mass
+from ._signatures import Array, Values, conductance_step, exchanged
 
-TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0)  # s, what the record resolves of them
+_N_TIMES = 30
 
 
 def _joined(system: System) -> set[frozenset[str]]:
@@ -37,6 +38,10 @@ def _without(system: System, what: str) -> Iterator[Where]:
     return (pair for pair in product(system.lumps, system.ambients) if frozenset(pair) not in there)
 
 
+def _steady(system: System) -> list[Where]:
+    return [(link.name,) for link in system.links if link.conductance > 0 and link.step is None]
+
+
 def _difference(Ta: Array, Tb: Array, values: Values) -> Array:
     return Tb - Ta
 
@@ -47,6 +52,11 @@ def _natural(Ta: Array, Tb: Array, values: Values) -> Array:
 
 def _fourth(Ta: Array, Tb: Array, values: Values) -> Array:
     return Tb**4 - Ta**4
+
+
+def _times(path: Along, where: Where) -> list[float]:
+    """Times of a sudden change: never in the first or last twentieth, where nothing tells it from the start."""
+    return [float(t) for t in np.linspace(path.time[0], path.time[-1], _N_TIMES + 2)[1:-1]]
 
 
 LINK_EFFECTS = (
@@ -61,12 +71,11 @@ LINK_EFFECTS = (
            adding.natural_convection, exchanged(_natural), ("radiation", "missing_ambient_link"),
            "small and large differences to the ambient, of both signs"),
     Effect("radiation", lambda system: _without(system, "radiation"),
-           (Quantity("coefficient", "W/K^4", 0.0, 5.67e-7, typical=1e-10),),
+           (Quantity("coefficient", "W/K⁴", 0.0, 5.67e-7, typical=1e-10),),
            adding.radiation, exchanged(_fourth), ("natural_convection", "missing_ambient_link"),
            "another absolute level at equal differences"),
-    Effect("hidden_mass", lambda system: [(name,) for name in system.lumps],
-           (Quantity("capacity", "J/K", 0.0, 1e5),
-            Quantity("time_constant", "s", 1e-3, 1e6, grid=TIMES)),
-           adding.hidden_mass, hidden_mass, ("sensor_lag", "missing_link"),
-           "frequencies a decade around 1/time_constant"),
+    Effect("conductance_step", _steady,
+           (Quantity("relative", "-", -1.0, 20.0), Quantity("time", "s", -1e12, 1e12, grid=_times)),
+           adding.subtable("links", "step"), conductance_step, ("missing_link", "natural_convection"),
+           "the same profile early and late"),
 )

@@ -1,37 +1,78 @@
-"""What sensors and heaters may do that the model does not say."""
+"""What sensors and inputs may do that the model does not say."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import product
+
 from ..thermal import System
 from . import _adding as adding
-from ._catalogue_links import TIMES
+from ._along import Along
+from ._catalogue_lumps import TIMES
 from ._effect import Effect, Quantity, Where
-from ._signatures import Values, by_heat, sensor_gain, sensor_lag, sensor_offset
+from ._signatures import by_heat, input_delay, input_lag, sensor_gain, sensor_lag, sensor_offset
 
 
-def _lag(system: System, where: Where, values: Values) -> System:
-    return adding.sensor(system, where, "time_constant", max(values["time_constant"], 0.0))
+def _sensors(system: System) -> list[Where]:
+    return [(name,) for name in system.sensors]
 
 
-def _offset(system: System, where: Where, values: Values) -> System:
-    return adding.sensor(system, where, "offset", values["offset"])
+def _driven(system: System) -> list[Where]:
+    return [(name,) for name in (*system.inputs, *system.modules)]
 
 
-def _gain(system: System, where: Where, values: Values) -> System:
-    return adding.sensor(system, where, "gain", 1.0 + values["gain"])
+def _prompt(key: str) -> Callable[[System], list[Where]]:
+    """Inputs and modules that are not late already."""
+    return lambda system: [(name,) for name, part in {**system.inputs, **system.modules}.items()
+                           if not getattr(part.drive, key)]
 
+
+def _leaks(system: System) -> list[Where]:
+    return [(name, lump) for (name, part), lump in product(system.inputs.items(), system.lumps)
+            if lump != part.lump and part.feedthrough is None]
+
+
+def _delays(path: Along, where: Where) -> list[float]:
+    return [path.h * n for n in (0.5, 1.5, 5.0, 15.0)]
+
+
+_lag = adding.number("sensors", {"time_constant": "time_constant"})
+_offset = adding.number("sensors", {"offset": "offset"})
+_gain = adding.number("sensors", {"gain": "gain"})
+_warm = adding.number("sensors", {"heat": "self_heating"})
+_power = adding.number("inputs", {"slope": "power_slope"})
+_share = adding.by_name("input_feedthrough")
+_drive_gain = adding.number("", {"gain": "drive.gain"})
+_drive_offset = adding.number("", {"offset": "drive.offset"})
+_drive_cubic = adding.number("", {"cubic": "drive.cubic"})
+_drive_delay = adding.number("", {"delay": "drive.delay"})
+_drive_lag = adding.number("", {"time_constant": "drive.time_constant"})
 
 SENSOR_EFFECTS = (
     Effect("sensor_lag", lambda system: [(n,) for n, s in system.sensors.items() if not s.time_constant],
            (Quantity("time_constant", "s", 0.0, 1e5, grid=TIMES, typical=0.1),), _lag, sensor_lag,
            ("hidden_mass", "input_delay"), "frequencies above 0.3/time_constant"),
-    Effect("sensor_offset", lambda system: [(n,) for n, s in system.sensors.items() if not s.offset],
-           (Quantity("offset", "K", -50.0, 50.0),), _offset, sensor_offset,
+    Effect("sensor_offset", _sensors, (Quantity("offset", "K", -50.0, 50.0),), _offset, sensor_offset,
            ("heat_source", "sensor_offset"), "an isothermal soak"),
-    Effect("sensor_gain", lambda system: [(n,) for n, s in system.sensors.items() if s.gain == 1.0],
-           (Quantity("gain", "-", -0.5, 0.5),), _gain, sensor_gain,
+    Effect("sensor_gain", _sensors, (Quantity("gain", "-", -0.5, 0.5),), _gain, sensor_gain,
            ("sensor_gain",), "isothermal soaks at two temperatures"),
-    Effect("input_gain", lambda system: [(n,) for n in system.inputs],
-           (Quantity("gain", "-", -0.9, 9.0),), adding.heater_gain, by_heat(adding.heater_gain, "gain", 1e-3),
-           ("input_gain",), "a measured heater power"),
+    Effect("sensor_self_heating", _sensors, (Quantity("heat", "W", -10.0, 10.0),), _warm, by_heat(_warm, "heat", 1.0),
+           ("heat_source", "sensor_offset"), "another excitation of the sensor"),
+)
+INPUT_EFFECTS = (
+    Effect("input_gain", _driven, (Quantity("gain", "-", -0.9, 9.0),), _drive_gain, by_heat(_drive_gain, "gain", 1e-4),
+           ("input_saturation",), "a measured current or power"),
+    Effect("input_offset", _driven, (Quantity("offset", "unit", -1e3, 1e3),), _drive_offset,
+           by_heat(_drive_offset, "offset", 1e-4), ("heat_source",), "the input at zero, and both polarities"),
+    Effect("input_saturation", _driven, (Quantity("cubic", "1/unit²", 0.0, 10.0, typical=1e-6),), _drive_cubic,
+           by_heat(_drive_cubic, "cubic", 1e-6), ("joule_split", "lead_heating"), "a sweep of the amplitude"),
+    Effect("input_delay", _prompt("delay"), (Quantity("delay", "s", 0.0, 1e4, grid=_delays, typical=0.1),),
+           _drive_delay, input_delay, ("input_lag", "sensor_lag"), "fast switching"),
+    Effect("input_lag", _prompt("time_constant"), (Quantity("time_constant", "s", 0.0, 1e5, grid=TIMES, typical=0.1),),
+           _drive_lag, input_lag, ("input_delay", "sensor_lag"), "fast switching"),
+    Effect("heater_power_slope", lambda system: [(name,) for name in system.inputs],
+           (Quantity("slope", "1/K", -0.05, 0.05),), _power, by_heat(_power, "slope", 1e-3),
+           ("radiation", "natural_convection"), "the same power at two temperatures"),
+    Effect("input_feedthrough", _leaks, (Quantity("share", "-", 0.0, 1.0),), _share, by_heat(_share, "share", 1e-2),
+           ("missing_link",), "the heater alone, in fast steps"),
 )

@@ -72,6 +72,8 @@ class Effect:
         Effects with a similar signature.
     separated_by : str
         The excitation that tells them apart.
+    paired : str
+        An angle among the quantities, with the grid (0, π/2): any other is a combination of these two.
 
     Examples
     --------
@@ -95,6 +97,7 @@ class Effect:
     signature: Signature | None = None
     confused_with: tuple[str, ...] = ()
     separated_by: str = ""
+    paired: str = ""
 
     @property
     def size(self) -> Quantity:

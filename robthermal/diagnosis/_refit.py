@@ -235,6 +235,12 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
     return replace(fit, structure=structure, v=found.v, z=found.z, J=found.J, outcome=_outcome(found))
 
 
+def relinearised(fit: Refit) -> Refit:
+    """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
+    systems = fit.structure.systems(fit.v)
+    return replace(fit, paths=tuple(along(system, one) for system, one in zip(systems, fit.structure.data, strict=True)))
+
+
 def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
             ) -> tuple[tuple[Along, ...], tuple[Whitener, ...]]:
     """Linearisation and filter of every record."""

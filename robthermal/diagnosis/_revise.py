@@ -6,11 +6,12 @@ from collections.abc import Iterable
 
 from ._decide import Decision, settled
 from ._effect import Candidate
-from ._refit import Refit, extended
+from ._refit import Refit, extended, relinearised
 from ._score import BIC_GAP, score
 from ._short_list import refit_short_list
 
 _SWEEPS = 3
+_LENGTH = 4
 
 
 def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None
@@ -35,8 +36,8 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
         for place in range(len(decisions) - 1, -1, -1):
             others, values = _without(fit, place)
             structure = nominal.structure.with_effects(others)
-            before = extended(fit, structure, structure.carried(fit.structure, fit.v, values))
-            short = refit_short_list(before, score(before, names))
+            before = relinearised(extended(fit, structure, structure.carried(fit.structure, fit.v, values)))
+            short = refit_short_list(before, score(before, names), length=_LENGTH)
             if not short.entries or short.entries[0].delta_bic < BIC_GAP:
                 decisions.pop(place)
                 fit, changed = before, True

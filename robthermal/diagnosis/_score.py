@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -176,6 +176,7 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     """Score these candidates, each at the best of its trial values."""
     trials = [(number, trial) for number, candidate in enumerate(tested) for trial in candidate.trials(fit.paths[0])]
     J = fit.whiten([columns(path, [trial for _, trial in trials]) for path in fit.paths])
+    trials, J, n_columns = turned(fit, trials, J)
     length = np.linalg.norm(J, axis=0)
     rest = fit.project(fit.project(J))
     own = np.linalg.norm(rest, axis=0)
@@ -187,7 +188,8 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     power = float(fit.rest @ fit.rest)
     variance = np.maximum(power - along**2, 1e-12 * power) / nu
     statistic = along**2 / variance
-    p_value = np.minimum(f_distribution.sf(statistic, 1, nu) * max(len(trials), 1), 1.0)
+    # the phase of a pair was chosen by the data: two degrees of freedom
+    p_value = np.minimum(f_distribution.sf(statistic / n_columns, n_columns, nu) * max(len(trials), 1), 1.0)
     size, std = along / own_safe, np.sqrt(variance) / own_safe
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
     threshold = math.sqrt(max(norm.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
@@ -196,6 +198,29 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     best = _best_of([number for number, _ in trials], statistic, possible, len(tested))
     return Scores(tuple(trials[i][1] for i in best), size[best], std[best], statistic[best], p_value[best],
                   possible[best] & visible[best], identifiability[best], limit[best], unit[:, best], len(trials))
+
+
+def turned(fit: Refit, trials: list[tuple[int, Candidate]], J: Array
+           ) -> tuple[list[tuple[int, Candidate]], Array, NDArray[np.intp]]:
+    """Join the two columns of every paired trial to the one at the best angle; also the columns each one had."""
+    kept, merged, count = [], [], []
+    i = 0
+    while i < len(trials):
+        number, trial = trials[i]
+        if not trial.effect.paired:
+            kept.append((number, trial))
+            merged.append(J[:, i])
+            count.append(1)
+            i += 1
+            continue
+        both = J[:, i:i + 2]
+        sine, cosine = np.linalg.lstsq(fit.project(both), fit.rest, rcond=None)[0]
+        angle = float(np.arctan2(cosine, sine))
+        kept.append((number, replace(trial, shape={**trial.shape, trial.effect.paired: angle})))
+        merged.append(np.cos(angle) * both[:, 0] + np.sin(angle) * both[:, 1])
+        count.append(2)
+        i += 2
+    return kept, np.column_stack(merged) if merged else J, np.array(count, np.intp)
 
 
 def _best_of(owner: list[int], statistic: Array, possible: NDArray[np.bool_], n: int) -> list[int]:

@@ -1,4 +1,4 @@
-"""Signatures: heat, input or reading per unit of an effect, along a simulated record."""
+"""Signatures: heat or changed reading per unit of an effect, along a simulated record."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def exchanged(law: Callable[[Array, Array, Values], Array]) -> Signature:
 
 
 def by_heat(add: Add, size: str, step: float) -> Signature:
-    """Difference of the equations with a small effect and without it: for effects that are linear heat."""
+    """Difference of the equations with a small effect and without it: for effects that are heat, linear in their size."""
 
     def signature(path: Along, where: Where, values: Values) -> Response:
         start, end = path.heat_of(add(path.system, where, {**values, size: step}))
@@ -65,11 +65,67 @@ def follow(T: Array, tau: float, h: float) -> Array:
     return np.concatenate([T[:1], lagged])
 
 
+def follow_held(u: Array, tau: float, h: float, start: float) -> Array:
+    """First-order lag of a held signal: its value at the start of every sample, (n,)."""
+    p = np.exp(-h / tau)
+    lagged, _ = lfilter([1.0 - p], [1.0, -p], u[:-1], zi=[p * start])
+    return np.concatenate([[start], lagged])
+
+
 def hidden_mass(path: Along, where: Where, values: Values) -> Response:
     """Heat (T_hidden - T) / τ per unit of capacity, T_hidden following T."""
     T, tau = path.x[:, path.system.lump_names.index(where[0])], values["time_constant"]
     flow = (follow(T, tau, path.h) - T) / tau
     return into(path, {where[0]: (flow, np.concatenate([flow[1:], flow[-1:]]))})
+
+
+def hysteresis(path: Along, where: Where, values: Values) -> Response:
+    """The memory of the polarity, per watt, into the cold face."""
+    current = path.u[:, path.system.exogenous_names.index(where[0])]
+    memory = follow_held(np.sign(current), values["time_constant"], path.h, 0.0)
+    cold = path.system.modules[where[0]].cold
+    return into(path, {cold: (memory, np.concatenate([memory[1:], memory[-1:]]))})
+
+
+def periodic(path: Along, where: Where, values: Values) -> Response:
+    """A sine of one watt."""
+    rate = 2.0 * np.pi / values["period"]
+    return into(path, {where[0]: (np.sin(rate * path.time + values["phase"]),
+                                  np.sin(rate * (path.time + path.h) + values["phase"]))})
+
+
+def conductance_step(path: Along, where: Where, values: Values) -> Response:
+    """The link's own linear heat from that time on; the sample in which it begins counts in part."""
+    link = next(link for link in path.system.links if link.name == where[0])
+    (a0, a1), (b0, b1) = node(path, link.between[0]), node(path, link.between[1])
+    share = link.conductance * np.clip((path.time + path.h - values["time"]) / path.h, 0.0, 1.0)
+    first, last = share * (b0 - a0), share * (b1 - a1)
+    return into(path, {link.between[0]: (first, last), link.between[1]: (-first, -last)})
+
+
+def driven(path: Along, name: str, v: Array, size: float) -> Response:
+    """Heat per unit of size when an input has the mean value v (n,) over every sample instead of its own."""
+    u = path.u.copy()
+    u[:, path.system.exogenous_names.index(name)] = v
+    heat = path.equations.heat
+    return Response(heat=((heat(path.x, u) - heat(path.x, path.u)) / size,
+                          (heat(path.end, u) - heat(path.end, path.u)) / size))
+
+
+def input_lag(path: Along, where: Where, values: Values) -> Response:
+    """The mean over every sample of the lagged input, at the trial τ."""
+    u, tau = path.u[:, path.system.exogenous_names.index(where[0])], values["time_constant"]
+    start = follow_held(u, tau, path.h, float(u[0]))
+    return driven(path, where[0], u + (start - u) * (tau / path.h) * (1.0 - np.exp(-path.h / tau)), tau)
+
+
+def input_delay(path: Along, where: Where, values: Values) -> Response:
+    """The mean over every sample of the delayed input, at the trial delay."""
+    u, delay = path.u[:, path.system.exogenous_names.index(where[0])], values["delay"]
+    whole, part = divmod(delay / path.h, 1.0)
+    k = np.arange(u.size) - int(whole)
+    late = part * u[np.maximum(k - 1, 0)] + (1.0 - part) * u[np.maximum(k, 0)]
+    return driven(path, where[0], late, delay)
 
 
 def reading(path: Along, sensor: str, change: Array) -> Response:
@@ -91,6 +147,7 @@ def sensor_offset(path: Along, where: Where, values: Values) -> Response:
 
 
 def sensor_gain(path: Along, where: Where, values: Values) -> Response:
-    """Distance of the reading from the reference."""
+    """Distance of the reading from the reference, per unit of the sensor's own gain."""
+    sensor = path.system.sensors[where[0]]
     y = path.readings[:, path.system.sensor_names.index(where[0])]
-    return reading(path, where[0], y - path.reference)
+    return reading(path, where[0], (y - sensor.offset - path.reference) / sensor.gain)

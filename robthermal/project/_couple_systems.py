@@ -17,7 +17,7 @@ _MOST_STATES = 300  # a proof about more takes minutes
 _REMEDY = "Give { A, B, C, D }, { num, den } in falling powers of z or s, or { file = \"p.json\" } that holds either."
 _MATRICES, _POLYNOMIALS = ("A", "B", "C", "D"), ("num", "den")
 Matrix = list[list[Number]]
-LTI = control.StateSpace | control.TransferFunction
+LTI = Any  # control.StateSpace or control.TransferFunction
 Polynomial = Annotated[list[Number], Field(min_length=1, max_length=_MOST_STATES + 1)]
 
 

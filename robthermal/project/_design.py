@@ -177,7 +177,7 @@ def _refusal(r: Reachable) -> InputError:
     ranges = "; ".join(f"{name} {celsius(min(r.passive[name], r.limit[name]))} to "
                        f"{celsius(max(r.passive[name], r.limit[name]))}" for name in r.setpoint)
     wanted = ", ".join(f"{name} at {celsius(value)}" for name, value in r.setpoint.items())
-    return InputError(f"{wanted} cannot be held: {reason} before", where="--setpoint",
+    return InputError(f"{wanted} cannot be held: {reason}", where="--setpoint",
                       expected=f"within the reachable range, {ranges}",
                       remedy="Move the set-points, or cool the hot side better.")
 

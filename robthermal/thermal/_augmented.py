@@ -100,8 +100,8 @@ def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
     if (table, field) in AFFINE:  # a difference is exact
         changed, step = unit_change(eq.system, name)
         other = augment(Equations(changed))
-        return Augmented(*((new - old) / step for new, old in ((other.F, parts.F), (other.B, parts.B),
-                                                               (other.N, parts.N))), parts.ports)
+        differences = ((other.F - parts.F) / step, (other.B - parts.B) / step, (other.N - parts.N) / step)
+        return Augmented(*differences, parts.ports)
     rows = _rows_of_scale(eq, table, part, field)
     return _rows_scaled(parts, rows, -1 / eq.system.parameter(name)) if rows else None
 

@@ -1,7 +1,7 @@
 """From the columns of a record to what really drives the network: w = [heaters, currents, ambients, 1, signs, steps].
 
-Static part of a `Drive` (gain, offset, saturation); delay and lag are the simulation's. The column of ones carries constant
-heats, a sign column the polarity that a hysteresis remembers, a step column is 0 before and 1 after its time.
+Static part of a `Drive` (gain, offset, saturation); delay and lag are the simulation's. The column of ones carries
+constant heats, a sign column the polarity that a hysteresis remembers, a step column is 0 before and 1 after its time.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._parameters import locate
-from ._parts import Drive
+from ._parts import Drive, Input, Module
 from ._terms import Array
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class Drives:
         self.system = system
         self.n_u = len(system.exogenous_names)
         self.column = {name: i for i, name in enumerate(system.exogenous_names)}
-        parts = {**system.inputs, **system.modules}
+        parts: dict[str, Input | Module] = {**system.inputs, **system.modules}
         self.of = {self.column[name]: part.drive for name, part in parts.items()}
         self.ambients = slice(len(parts), self.n_u)
         self.one = self.n_u
@@ -89,7 +90,8 @@ def _shape(drive: Drive, u: Array) -> Array:
                                                      value)
 
 
-def _clipped(drive: Drive, linear: Array) -> Array:
+def _clipped(drive: Drive, linear: Array) -> NDArray[np.bool_]:
     """Where the value is held at ±clip."""
     value = (linear - drive.cubic * linear**3).real
-    return np.abs(value) > (np.inf if drive.clip is None else drive.clip)
+    outside: NDArray[np.bool_] = np.abs(value) > (np.inf if drive.clip is None else drive.clip)
+    return outside

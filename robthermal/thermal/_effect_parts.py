@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import model_validator
+
 from ._part import Finite, Kelvin, Name, NonNegative, Part, Positive, Share
 
 
@@ -133,7 +135,8 @@ class Lead(Part):
     resistance: Finite = 0.0
     name: str = ""
 
-    def model_post_init(self, context: object) -> None:
-        """Name the lead after its ends."""
+    @model_validator(mode="after")
+    def _named(self) -> Lead:
         if not self.name:
             object.__setattr__(self, "name", f"{self.module}-{self.lump}")
+        return self

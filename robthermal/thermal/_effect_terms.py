@@ -162,7 +162,8 @@ class StepTerm:
 
     def slopes(self, Ta: Array, Tb: Array, drive: Array) -> Slopes:
         """The added conductance."""
-        g, by_drive = self.conductance * self.relative * drive, self.conductance * self.relative * (Tb - Ta + self.warmer)
+        added = self.conductance * self.relative
+        g, by_drive = added * drive, added * (Tb - Ta + self.warmer)
         return Slopes(aa=-g, ab=g, ba=g, bb=-g, a_drive=by_drive, b_drive=-by_drive)
 
     def parameter_slopes(self, field: str, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:

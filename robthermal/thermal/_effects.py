@@ -116,8 +116,9 @@ _NUMBERS = {
 }
 # effects that are a table of a part: its key, and defaults of what is not a size
 _SUBTABLES: dict[str, tuple[str, Values]] = {
-    "hysteresis": ("hysteresis", {"time_constant": 60.0}), "periodic_load": ("periodic", {"period": 600.0, "phase": 0.0}),
-    "conductance_step": ("step", {"time": 0.0}), "condensation": ("condensation", {"dew_point": 283.15}),
+    "hysteresis": ("hysteresis", {"time_constant": 60.0}), "conductance_step": ("step", {"time": 0.0}),
+    "periodic_load": ("periodic", {"period": 600.0, "phase": 0.0}),
+    "condensation": ("condensation", {"dew_point": 283.15}),
 }
 
 

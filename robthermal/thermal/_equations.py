@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 class Equations:
     """Equations of a thermal system.
 
-    E ẋ = A x + D w + Σ heat of the nonlinear terms. u are the heaters, module currents and ambients as in a record, in the
-    order of `System.exogenous_names`; w = drives(u) is what heaters and amplifiers make of them, and a 1 for constant
-    heats. A holds the linear links and the modules' conductance at their reference temperature.
+    E ẋ = A x + D w + Σ heat of the nonlinear terms. u are the heaters, module currents and ambients as in a record, in
+    the order of `System.exogenous_names`; w = drives(u) is what heaters and amplifiers make of them, and a 1 for
+    constant heats. A holds the linear links and the modules' conductance at their reference temperature.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """What it does to the state when the time of a jump moves: delays, steps, and lags that are still zero.
 
-A drive that jumps at time t from w⁻ to w⁺ and does so δ later adds δ (ż(w⁻) - ż(w⁺)) to the state. A lag τ → 0 replaces the
-jump by w⁺ + (w⁻ - w⁺) e^{-s/τ}; heats are at most quadratic in a drive, so that its effect over all s is
+A drive that jumps at time t from w⁻ to w⁺ and does so δ later adds δ (ż(w⁻) - ż(w⁺)) to the state. A lag τ → 0 replaces
+the jump by w⁺ + (w⁻ - w⁺) e^{-s/τ}; heats are at most quadratic in a drive, so that its effect over all s is
 2 τ (ż(½(w⁻ + w⁺)) - ż(w⁺)) exactly.
 """
 

@@ -16,8 +16,8 @@ class ModuleTerm:
     """Thermoelectric modules (a hot, b cold) without the constant part K_ref (T_b - T_a), which is a linear link.
 
     Heat into hot: S T_h I + ½ R I² + (K - K_ref)(T_c - T_h); into cold: -S T_c I + ½ R I² + (K - K_ref)(T_h - T_c),
-    S, R, K at T_avg = (T_h + T_c)/2: Evers (5.4)-(5.5), (5.13), corrected. Thomson heat takes ½ μ I (T_h - T_c) from both
-    faces; an unequal split moves d R I² of the Joule heat from the hot to the cold face.
+    S, R, K at T_avg = (T_h + T_c)/2: Evers (5.4)-(5.5), (5.13), corrected. Thomson heat takes ½ μ I (T_h - T_c) from
+    both faces; an unequal split moves d R I² of the Joule heat from the hot to the cold face.
     """
 
     table: ClassVar[str] = "modules"

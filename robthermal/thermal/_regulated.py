@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ._equations import Equations
-from ._system import System, equations
 from ._module_term import ModuleTerm
+from ._system import System, equations
 from ._terms import Array, Indices
 from ._units import LOWEST_KELVIN
 

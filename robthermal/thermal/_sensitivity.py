@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._augmented import Augmented, slope
 from ._collocation import DEGREE, Step, step_matrices

@@ -73,7 +73,8 @@ class System(Part):
         check_network(self)
 
     def __repr__(self) -> str:
-        counts = {table: len(getattr(self, table)) for table in ("lumps", "links", "modules", "leads", "inputs", "sensors")}
+        tables = ("lumps", "links", "modules", "leads", "inputs", "sensors")
+        counts = {table: len(getattr(self, table)) for table in tables}
         return f"<System {self.name!r}: {', '.join(f'{n} {table}' for table, n in counts.items() if n)}>"
 
     __str__ = __repr__

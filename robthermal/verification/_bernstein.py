@@ -77,6 +77,8 @@ def largest_ratio(above: Sequence[arb], below: Sequence[arb]) -> arb | None:
         if not q > 0:
             return None
         ratio = (p / q).upper()
+        if not ratio.is_finite():
+            return None
         if not ratio <= largest:
             largest = ratio
     return largest

@@ -13,17 +13,19 @@ from flint import arb, arb_mat, fmpq
 from numpy.typing import NDArray
 
 Rows = list[dict[int, arb]]
+_MOST_UPDATES = 50_000_000  # entries changed by an elimination, about a minute
 
 
 def eliminate(rows: Rows, keep: set[int]) -> int | None:
     """Eliminate all rows but ``keep`` from a sparse symmetric matrix, in place, fewest neighbours first.
 
     The matrix is positive definite if and only if every pivot and the Schur complement left in ``keep`` are. Returns
-    None when every pivot is proven positive, else the row whose pivot is not.
+    None when every pivot is proven positive, else the row whose pivot is not (or where it would take too long).
     """
     queue = [(len(row), k) for k, row in enumerate(rows) if k not in keep]
     heapq.heapify(queue)
     done: set[int] = set()
+    updates = 0
     while queue:
         degree, k = heapq.heappop(queue)
         if k in done or degree != len(rows[k]):
@@ -31,7 +33,8 @@ def eliminate(rows: Rows, keep: set[int]) -> int | None:
         done.add(k)
         row = rows[k]
         pivot = row.pop(k, arb(0))
-        if not pivot > 0:
+        updates += len(row) ** 2
+        if not pivot > 0 or updates > _MOST_UPDATES:
             return k
         _update(rows, k, pivot)
         for j in row:

@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 
 Block = list[list[fmpq]]
 _MOST_PER_CLUSTER = 5_000
+_MOST_ENTRIES = 2_000_000  # of all vertices of a cluster
 _MOST_PRUNED = 200
+_MOST_PRUNING = 1e7  # exact operations to find implied vertices
 _MOST_TOGETHER = 20_000
+_MOST_WORK = 3e8  # joint vertices times (lumps of modules)³
 _PIECES = 8
 
 
@@ -41,9 +44,10 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
                             f"modules, at lump {name_of(system.lumps[failed])}")
     points = [_points(problem, k) for k in range(len(system.modules))]
     for group in groups:
-        if count(system, group, problem.region, points) > _MOST_PER_CLUSTER:
-            return Proof(False, f"method energy: too many vertices ({count(system, group, problem.region, points)}) of "
-                                "uncertain modules, or of modules that share lumps, to check them one by one")
+        total = count(system, group, problem.region, points)
+        if total > _MOST_PER_CLUSTER or total * len(group.lumps) ** 2 > _MOST_ENTRIES:
+            return Proof(False, f"method energy: too many vertices ({total}) of uncertain modules, or of modules that "
+                                "share lumps, to check them one by one")
     choices = [_undominated(group, vertices(system, problem.region, group, points)) for group in groups]
     rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
     return _check(problem, rate, rest, ports, groups, choices)
@@ -86,7 +90,7 @@ def _block(group: Cluster, vertex: Vertex) -> Block:
 def _undominated(group: Cluster, found: list[Vertex]) -> list[tuple[Block, Vertex]]:
     """Drop vertices whose block is below another's in the matrix order: they are implied."""
     pairs = [(_block(group, vertex), vertex) for vertex in found]
-    if len(pairs) > _MOST_PRUNED:
+    if len(pairs) > _MOST_PRUNED or len(pairs) ** 2 * len(group.lumps) ** 3 > _MOST_PRUNING:
         return pairs
     kept: list[tuple[Block, Vertex]] = []
     for pair in pairs:
@@ -104,7 +108,10 @@ def _below(lower: Block, upper: Block) -> bool:
 
 def _check(problem: Contraction, rate: fmpq, rest: list[list[arb]], ports: list[int], groups: list[Cluster],
            choices: list[list[tuple[Block, Vertex]]]) -> Proof:
-    if math.prod(len(choice) for choice in choices) > _MOST_TOGETHER:
+    total = math.prod(len(choice) for choice in choices)
+    if len(ports) ** 3 > _MOST_WORK:
+        return Proof(False, f"method energy: modules at {len(ports)} lumps are too many to check together")
+    if total > _MOST_TOGETHER or total * len(ports) ** 3 > _MOST_WORK:
         return _check_common_bound(rate, rest, ports, groups, choices)
     balls = [[([[arb(entry) for entry in row] for row in block], vertex) for block, vertex in choice]
              for choice in choices]
@@ -144,9 +151,14 @@ def _upper_bound(blocks: list[Block]) -> Block | None:
     floats = [np.array([[as_float(entry) for entry in row] for row in block]) for block in blocks]
     bound = floats[0]
     for block in floats[1:]:
-        values, vectors = np.linalg.eigh(block - bound)
+        with np.errstate(all="ignore"):
+            difference = block - bound
+        if not bool(np.all(np.isfinite(difference))):
+            return None
+        values, vectors = np.linalg.eigh(difference)
         bound = bound + (vectors * np.maximum(values, 0.0)) @ vectors.T
-    bound = (bound + bound.T) / 2 + 1e-12 * np.max(np.abs(bound)) * np.eye(len(bound))
+    with np.errstate(all="ignore"):
+        bound = (bound + bound.T) / 2 + 1e-12 * np.max(np.abs(bound)) * np.eye(len(bound))
     if not bool(np.all(np.isfinite(bound))):
         return None
     return [[fmpq(*entry.as_integer_ratio()) for entry in row] for row in bound.tolist()]

@@ -91,7 +91,8 @@ def kelvin_interval(value: Any, where: str) -> Interval:
 def intervals(value: Any, names: Sequence[str], where: str) -> list[Interval]:
     """Return one interval per name from an object that names every one of them and nothing else."""
     table = mapping(value, where)
-    unknown = [name for name in table if name not in set(names)]
+    known = set(names)
+    unknown = [name for name in table if name not in known]
     if unknown:
         raise InputError(f"{name_of(unknown[0])} is not in the system", where=where)
     return [interval(get(table, name, where), f"{where}[{name_of(name)}]") for name in names]

@@ -22,9 +22,10 @@ from ._frequency_norm import Bound, Failed, Scaling
 from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, expect_shape, read_linear, read_matrix, say_linear
 from ._numbers import exact, name_of, show
-from ._transfer import place, transfer, unstable
+from ._transfer import place, too_large, transfer, unstable
 
 _COMMON = ["form", "edges"]
+_MOST_WORK = 5e7  # intervals times states times what one point costs, some minutes
 _FORMS = {"norm": [*_COMMON, "bounds", "left", "right", "blocks"], "radius": [*_COMMON, "envelopes", "bound"]}
 
 
@@ -87,6 +88,9 @@ def claim(problem: Frequency) -> str:
 def prove(problem: Frequency) -> Proof:
     """Prove stability, then every interval."""
     linear = problem.system
+    why = too_large(linear) or _too_many(problem)
+    if why:
+        return Proof(False, why)
     with working_precision():
         if any(place(linear, edge) is None for edge in problem.edges):
             return Proof(False, "an edge does not lie below the Nyquist frequency")
@@ -110,6 +114,16 @@ def prove(problem: Frequency) -> Proof:
         count = len(problem.edges) + 1
         return Proof(True, f"stable, and positive Bernstein coefficients on all {count} intervals")
     return Proof(False, say_failure(linear, problem.edges, failed))
+
+
+def _too_many(problem: Frequency) -> str:
+    """Return why so many intervals and channels would take too long, empty where they do not."""
+    s, count = problem.system, len(problem.edges) + 1
+    narrow = min(s.inputs, s.outputs)
+    if count * (s.states + 1) * (s.states + s.inputs * s.outputs + narrow**3) > _MOST_WORK:
+        return (f"{count} intervals of a system with {s.states} states, {s.inputs} inputs and {s.outputs} outputs are too "
+                "many to check together")
+    return ""
 
 
 def say_failure(system: LinearSystem, edges: Sequence[fmpq], failed: Failed) -> str:

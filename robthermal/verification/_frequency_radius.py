@@ -19,6 +19,7 @@ from ._transfer import Transfer, as_balls, squared
 
 _DEEPEST = 40
 _MOST_PIECES = 200_000
+_MOST_WORK = 2e8  # pieces times entries times states
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ def first_failure(system: Transfer, envelopes: Sequence[Rows], bound: fmpq, edge
 def _from(start: int, entries: list[list[_Ratio]], envelopes: Sequence[Rows], bound: fmpq,
           edges: list[arb]) -> Failed | None:
     moduli = _Moduli(entries)
+    channels = sum(entry.degree + 10 for row in entries for entry in row)
+    most = min(_MOST_PIECES, _MOST_WORK / channels)
     pieces = 0
     for k in range(start, len(envelopes)):
         R = [[arb(value) for value in row] for row in envelopes[k]]
@@ -61,7 +64,7 @@ def _from(start: int, entries: list[list[_Ratio]], envelopes: Sequence[Rows], bo
             for x in (cell[0], upper[0]):
                 if _below(moduli.at(x), R, bound) is False:
                     return Failed(k, True, x.sqrt(), "ρ(|M| R) reaches the bound")
-            if depth == _DEEPEST or pieces > _MOST_PIECES:
+            if depth == _DEEPEST or pieces > most:
                 return Failed(k, False, cell[0].sqrt(), "too many pieces")
             waiting += [(upper, depth + 1), (lower, depth + 1)]
     return None

@@ -24,6 +24,7 @@ from ._system import Link, Region, ThermalSystem, read_region, read_system, say_
 from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 
 _SOURCES = ("ambients", "heat")
+_MOST_WORK = 10_000_000  # disturbances times links, modules and lumps
 
 
 @dataclass(frozen=True)
@@ -58,17 +59,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Gain:
     given = mapping(table.get("ambient", {}), "region.ambient")
     intervals(given, [name for name in network.ambients if name in given], "region.ambient")
     ambient = {name: kelvin_interval(given[name], f"region.ambient[{name_of(name)}]") for name in given}
-    gains = mapping(get(found, "gains", "evidence"), "evidence.gains")
-    no_other(gains, _SOURCES, "evidence.gains")
-    channels = []
-    for source in _SOURCES:
-        where = f"evidence.gains.{source}"
-        listed = mapping(gains.get(source, {}), where)
-        for name in listed:
-            values = numbers(listed[name], len(network.lumps), f"{where}[{name_of(name)}]")
-            heat = (_ambient_heat(network, box, ambient, name, where) if source == "ambients"
-                    else _load_heat(network, name, where))
-            channels.append(Channel(name, source == "ambients", heat, tuple(values)))
+    with working_precision():  # bounds of heats must not depend on the caller's precision
+        channels = _channels(get(found, "gains", "evidence"), network, box, ambient)
     if not channels:
         raise InputError("no disturbance", where="evidence.gains", expected="at least one ambient or heat load")
     rate = not_negative(get(found, "rate", "evidence"), "evidence.rate")
@@ -123,6 +115,24 @@ def _check(problem: Gain, channel: Channel) -> tuple[str, fmpq]:
                     f"{where}"), slack
         least = slack if least is None or slack < least else least
     return "", zero if least is None else least
+
+
+def _channels(value: Any, system: ThermalSystem, box: Region, ambient: dict[str, Interval]) -> list[Channel]:
+    gains = mapping(value, "evidence.gains")
+    no_other(gains, _SOURCES, "evidence.gains")
+    channels = []
+    for source in _SOURCES:
+        where = f"evidence.gains.{source}"
+        listed = mapping(gains.get(source, {}), where)
+        if len(listed) * (len(system.links) + len(system.modules) + len(system.lumps)) > _MOST_WORK:
+            raise InputError(f"{len(listed)} disturbances of a network with {len(system.links)} links", where=where,
+                             expected="fewer", remedy="Give them in several certificates.")
+        for name in listed:
+            values = numbers(listed[name], len(system.lumps), f"{where}[{name_of(name)}]")
+            heat = (_ambient_heat(system, box, ambient, name, where) if source == "ambients"
+                    else _load_heat(system, name, where))
+            channels.append(Channel(name, source == "ambients", heat, tuple(values)))
+    return channels
 
 
 def _load_heat(system: ThermalSystem, name: str, where: str) -> tuple[fmpq, ...]:

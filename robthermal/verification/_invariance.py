@@ -95,25 +95,30 @@ def find_margin(problem: Invariance) -> dict[str, float]:
 
 
 def _worst(problem: Invariance) -> tuple[int, str, fmpq]:
-    flows = ((k, face, -_largest(problem, k, sign))
+    links: list[list[Link]] = [[] for _ in problem.system.lumps]
+    modules: list[list[int]] = [[] for _ in problem.system.lumps]
+    for link in problem.system.links:
+        for lump in (node for node in link.nodes if isinstance(node, int)):
+            links[lump].append(link)
+    for k, module in enumerate(problem.system.modules):
+        modules[module.hot].append(k)
+        modules[module.cold].append(k)
+    flows = ((k, face, -_largest(problem, k, sign, links[k], modules[k]))
              for k in range(len(problem.system.lumps)) for face, sign in (("upper", 1), ("lower", -1)))
     return min(flows, key=lambda item: item[2])
 
 
-def _largest(problem: Invariance, lump: int, sign: int) -> fmpq:
+def _largest(problem: Invariance, lump: int, sign: int, links: list[Link], own_modules: list[int]) -> fmpq:
     """Return the largest of sign times the heat into a lump [W], the lump at its upper (+1) or lower (-1) face."""
     upper = 1 if sign > 0 else 0
     own = problem.region.temperature[lump][upper]
     total = sign * problem.heat[lump][upper] if lump in problem.heat else fmpq(0)
     modules: dict[int, list[int]] = {}
-    for k, module in enumerate(problem.system.modules):
-        if lump in (module.hot, module.cold):
-            partner = module.cold if module.hot == lump else module.hot
-            modules.setdefault(partner, []).append(k)
+    for k in own_modules:
+        module = problem.system.modules[k]
+        modules.setdefault(module.cold if module.hot == lump else module.hot, []).append(k)
     conductance = dict.fromkeys(modules, (fmpq(0), fmpq(0)))
-    for link in problem.system.links:
-        if lump not in link.nodes:
-            continue
+    for link in links:
         other = link.nodes[1] if link.nodes[0] == lump else link.nodes[0]
         far = problem.region.temperature[other] if isinstance(other, int) else problem.ambient[other]
         # Heat through a link grows with the other end's temperature: its extreme is at that end's extreme.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ._contraction import Contraction
 
 PIECES = (1, 2, 4, 8)  # per current, the relaxation refined in turn
-MOST_WORK = 3e8  # vertices times n³
+MOST_WORK = 3e8  # vertices times n³, and what every vertex costs however small
 Described = tuple[Entries, str, bool]
 
 
@@ -52,6 +52,9 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     broken = asymmetry(problem.matrix) or _uncertain_capacity(problem)
     if broken:
         return Proof(False, f"method lyapunov: {broken}")
+    n = len(problem.matrix)
+    if too_much(1, n):
+        return Proof(False, f"method lyapunov: a dense matrix for {n} lumps is too large to check")
     form = _Form(problem)
     if not is_positive(make_part(form.P, "", True)):
         return Proof(False, "method lyapunov: P > 0 fails or cannot be proven")
@@ -64,7 +67,7 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     proof = Proof(False, "method lyapunov: too many vertices to check any")
     for pieces in PIECES:
         total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
-        if total * form.n**3 > MOST_WORK:
+        if too_much(total, n):
             return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
         modules = [[form.part(item) for item in choice]
                    for choice in module_slopes(problem.system, problem.region, pieces)]
@@ -75,6 +78,11 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
         if failed.real:
             break  # a point of the box: no refinement helps
     return proof
+
+
+def too_much(total: int, n: int) -> bool:
+    """Whether so many vertices of matrices of this size would take minutes, or gigabytes."""
+    return total * (n**3 + 2000) > MOST_WORK
 
 
 def dense(entries: Entries, n: int) -> arb_mat:

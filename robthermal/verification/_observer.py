@@ -17,15 +17,15 @@ from flint import arb, arb_mat, fmpq
 from robthermal.errors import InputError
 
 from ._corners import Part, first_failure, is_positive, make_part
-from ._fields import get, mapping, margin_of, numbers, positive, sequence, text
+from ._fields import get, mapping, margin_of, no_other, numbers, positive, sequence, text
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import (
-    MOST_WORK,
     PIECES,
     asymmetry,
     dense,
     link_slopes,
     module_slopes,
+    too_much,
     vertex_count,
 )
 from ._numbers import exact, name_of, round_down, show
@@ -130,6 +130,8 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     n = len(problem.matrix)
     if contraction <= 0:
         return Proof(False, f"contraction {show(contraction)} is not positive")
+    if too_much(1, n):
+        return Proof(False, f"a dense matrix for {n} lumps is too large to check")
     broken = asymmetry(problem.matrix)
     base, bent, missing = link_slopes(problem.system, problem.region)
     if broken or missing:
@@ -149,7 +151,7 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     proof = Proof(False, "too many vertices to check any")
     for pieces in refinements:
         total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
-        if total * n**3 > MOST_WORK:
+        if too_much(total, n):
             return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
         groups = module_slopes(problem.system, problem.region, pieces)
         failed = first_failure(start, [*links, *([_part(left, item, n) for item in items] for items in groups)])
@@ -224,6 +226,7 @@ def _sensor(value: Any, system: ThermalSystem, where: str) -> Sensor:
     if isinstance(value, str):
         value = {"name": value, "lump": value}
     table = mapping(value, where)
+    no_other(table, ("name", "lump", "gain"), where)
     lump = text(get(table, "lump", where), f"{where}.lump")
     if lump not in system.lumps:
         raise InputError(f"{name_of(lump)} is not a lump", where=f"{where}.lump")

@@ -19,7 +19,7 @@ from ._lti import LinearSystem, Rows, balls, expect_shape, read_linear, read_mat
 from ._lyapunov import asymmetry
 from ._numbers import exact, name_of, show
 from ._stability import positive as proven_positive
-from ._transfer import characteristic, unstable
+from ._transfer import characteristic, too_large, unstable
 
 _METHODS = ("ellipsoid", "positive")
 
@@ -104,7 +104,7 @@ def _prove_positive(problem: Peak) -> Proof:
                 or any(entry < 0 for matrix in (s.B, s.C, s.D) for row in matrix for entry in row))
     if negative:
         return Proof(False, "an entry that must not be negative is: the system is not positive")
-    why = unstable(characteristic(s, fmpq(0)), n)
+    why = too_large(s) or unstable(characteristic(s, fmpq(0)), n)
     if why:
         return Proof(False, f"the system is not proven stable: {why}")
     A = fmpq_mat(n, n, [entry for row in s.A for entry in row])

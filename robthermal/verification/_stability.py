@@ -20,7 +20,7 @@ from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, balls, expect_shape, read_linear, read_matrix, say_linear
 from ._lyapunov import asymmetry
 from ._numbers import name_of, show
-from ._transfer import characteristic, unstable
+from ._transfer import characteristic, too_large, unstable
 
 _METHODS = ("lyapunov", "polynomial")
 
@@ -65,7 +65,7 @@ def claim(problem: Stability) -> str:
 def prove(problem: Stability) -> Proof:
     """Prove it by the method of the evidence."""
     if problem.method == "polynomial":
-        why = unstable(characteristic(problem.system, problem.rate), problem.system.states)
+        why = too_large(problem.system) or unstable(characteristic(problem.system, problem.rate), problem.system.states)
         return Proof(not why, why or "all entries of the first column of the Routh array are positive")
     why = asymmetry(problem.matrix)
     if why:

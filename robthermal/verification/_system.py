@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,6 +87,7 @@ class Region:
 def read_system(value: Any) -> ThermalSystem:
     """Return the exact system of a certificate; InputError for anything missing, of another type or impossible."""
     table = mapping(value, "system")
+    _no_effects(table, ("leads",), "system")
     lumps = mapping(get(table, "lumps", "system"), "system.lumps")
     if not lumps:
         raise InputError("no lumps", where="system.lumps", expected="at least one")
@@ -158,7 +159,9 @@ def _temperatures(value: Any, lumps: tuple[str, ...]) -> tuple[Interval, ...]:
 
 
 def _capacity(value: Any, where: str) -> fmpq:
-    return positive(get(mapping(value, where), "capacity", where), f"{where}.capacity")
+    table = mapping(value, where)
+    _no_effects(table, ("heat", "gradient", "periodic", "condensation"), where)
+    return positive(get(table, "capacity", where), f"{where}.capacity")
 
 
 def _ambients(value: Any, lumps: Mapping[str, Any]) -> tuple[str, ...]:
@@ -175,6 +178,7 @@ def _ambients(value: Any, lumps: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     table = mapping(value, where)
+    _no_effects(table, ("step",), where)
     ends = sequence(get(table, "between", where), f"{where}.between")
     if len(ends) != 2:
         raise InputError(f"{len(ends)} names", where=f"{where}.between", expected="two")
@@ -195,6 +199,14 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     return Link((first, second), conductance, gain, exponent, radiation)
 
 
+def _no_effects(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
+    """Refuse effects of a system file that no claim takes into account: other keys are free, these change the physics."""
+    for key in keys:
+        if key in table:
+            raise InputError(f"{key!r} is an effect that no claim takes into account", where=where,
+                             remedy="Certify the network without it.")
+
+
 def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
     name = text(value, where)
     if name not in nodes:
@@ -205,6 +217,7 @@ def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
 def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
     where = f"system.modules[{name_of(name)}]"
     table = mapping(value, where)
+    _no_effects(table, ("thomson", "joule_split", "hysteresis", "drive"), where)
     faces = []
     for face in ("hot", "cold"):
         node = _node(get(table, face, where), nodes, f"{where}.{face}")

@@ -13,6 +13,7 @@ from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 from ._kind import working_precision
 from ._lti import LinearSystem, Rows
 
+_MOST_WORK = 2e12  # of an exact characteristic polynomial, some minutes
 _BITS = (256, 1024, 4096, 16384)  # of the Routh array, more until every sign is decided
 
 
@@ -23,6 +24,18 @@ class Transfer:
     degree: int
     denominator: fmpq_poly
     numerators: tuple[tuple[fmpq_poly, ...], ...]
+
+
+def too_large(system: LinearSystem) -> str:
+    """Return why exact polynomials of a system would take too long, empty where they do not: n⁴ grows with the digits."""
+    n, m, p = system.states, system.inputs, system.outputs
+    bits = 1
+    for matrix, rows, columns in ((system.A, n, n), (system.B, n, m), (system.C, p, n)):
+        entries = _integers(matrix, rows, columns)[0].entries()
+        bits = max([bits, *(entry.bit_length() for entry in entries)])
+    if n**4 * bits**1.25 > _MOST_WORK:
+        return f"{n} states with numbers of {bits} bits are too many for exact polynomials"
+    return ""
 
 
 def transfer(system: LinearSystem) -> Transfer:

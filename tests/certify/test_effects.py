@@ -1,58 +1,78 @@
-"""Physics that no certificate covers must be refused, not left out: the certificate would be about another machine."""
-
-from __future__ import annotations
-
-import itertools
+"""A certificate that leaves out a heat is wrong: every effect is refused, or is shown not to be part of the claim."""
 
 import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.errors import InputError
-from robthermal.thermal import Equations
 
-BOX = {"m1": (0.0, 1.0), "m2": (0.0, 1.0)}
-SPAN = (278.15, 358.15)
-
-
-def with_effect(**changes):
-    data = rt.systems.two_module().model_dump()
-    for table, parts in changes.items():
-        if table == "leads":
-            data[table] = parts
-        else:
-            for name, values in parts.items():
-                key = next(k for k, link in enumerate(data[table]) if link["name"] == name) if table == "links" else name
-                data[table][key] = {**data[table][key], **values}
-    return rt.System(**data)
+CURRENT, BOX = {"m1": (0.0, 0.5), "m2": (0.0, 0.5)}, (280.0, 330.0)
+PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sensor": "T6", "input": "heater",
+          "input or module": "m1"}
+OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "sensor_lag",
+       "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope"}  # plain system content
+FORCING = {"heat_source", "sensor_self_heating", "ambient_gradient", "periodic_load", "input_feedthrough"}
 
 
-EFFECTS = [{"modules": {"m1": {"thomson": 5.0}}}, {"modules": {"m1": {"joule_split": 0.3}}},
-           {"modules": {"m1": {"drive": {"gain": 0.5}}}}, {"lumps": {"x1": {"heat": 1.0}}},
-           {"lumps": {"x1": {"condensation": {"conductance": 1.0, "dew_point": 290.0}}}},
-           {"leads": [{"module": "m1", "lump": "x1", "resistance": 2.0}]}]
-CALLS = {"contraction": lambda s: rt.certify.contraction(s, current=BOX, temperature=SPAN),
-         "invariance": lambda s: rt.certify.invariance(s, current=BOX, temperature=SPAN),
-         "observer": lambda s: rt.certify.observer(s, gain=np.zeros((18, 1)), sensors=["T6"], current=BOX,
-                                                   temperature=SPAN)}
+def machine() -> rt.System:
+    system = rt.systems.two_module()
+    return rt.System(**{field: getattr(system, field) for field in type(system).model_fields}
+                     | {"inputs": {"heater": {"lump": "x1", "limits": (0.0, 1.0)}}})
 
 
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: next(iter(effect)))
-@pytest.mark.parametrize("call", CALLS)
-def test_effects_are_refused_by_name(effect, call):
-    system = with_effect(**effect)
-    assert len(system.effects) == 1
-    with pytest.raises(InputError, match=system.effects[0]):
-        CALLS[call](system)
+def with_effect(effect: str) -> rt.System:
+    kind = rt.thermal.effects()[effect]
+    where = [PLACES[what] for what in kind.where]
+    if effect == "input_feedthrough":
+        where = ["heater", "x6"]
+    return rt.thermal.add_effect(machine(), effect, where, {kind.sizes[0]: 0.05}).system
 
 
-def test_the_thomson_effect_that_was_once_left_out_makes_the_box_unstable():
-    system = with_effect(modules={"m1": {"thomson": 5.0}})
-    equations, rng, worst = Equations(system), np.random.default_rng(0), -np.inf
-    u = np.zeros(len(system.exogenous_names))
-    u[-len(system.ambients):] = 298.15
-    for k, _ in itertools.product(range(2), range(10)):
-        u[system.exogenous_names.index("m1")] = k
-        J = equations.jacobian(rng.choice(SPAN, 18), u)
-        worst = max(worst, np.linalg.eigvals(J.toarray() / equations.capacity[:, None]).real.max())
-    assert worst > 0
+@pytest.mark.parametrize("effect", sorted(set(rt.thermal.effects()) - OWN))
+def test_every_new_effect_is_refused_or_is_no_part_of_the_jacobian(effect):
+    system = with_effect(effect)
+    name, = system.effects
+    claims = [lambda: rt.certify.invariance(system, current=CURRENT, temperature=BOX),
+              lambda: rt.certify.runaway_free(system, current=CURRENT),
+              lambda: rt.certify.runaway(system, setpoint={"m1": 283.15, "m2": 283.15})]
+    for claim in claims:
+        with pytest.raises(rt.InputError, match=f"{name} = .*no certificate covers"):
+            claim()
+    if effect not in FORCING:
+        with pytest.raises(rt.InputError, match=f"{name} = .*no certificate covers"):
+            rt.certify.contraction(system, current=CURRENT, temperature=BOX)
+        return
+    cert = rt.certify.contraction(system, current=CURRENT, temperature=BOX)
+    assert cert.holds
+    rng = np.random.default_rng(1)
+    ours, plain = rt.thermal.Equations(system), rt.thermal.Equations(machine())
+    for _ in range(20):
+        x, u = rng.uniform(*BOX, len(ours.capacity)), np.array([rng.uniform(), *rng.uniform(0, 0.5, 2), 298.0])
+        assert np.abs((ours.jacobian(x, u) - plain.jacobian(x, u)).toarray()).max() == 0.0
+
+
+def test_heaters_may_be_imperfect_where_only_the_jacobian_counts_but_module_currents_may_not():
+    box = {"current": CURRENT, "temperature": BOX}
+    heater = machine().with_parameters({"inputs.heater.drive.gain": 0.1, "inputs.heater.drive.delay": 3.0})
+    assert rt.certify.contraction(heater, **box).holds
+    amplifier = machine().with_parameters({"modules.m1.drive.gain": 0.1})
+    with pytest.raises(rt.InputError, match=r"modules\.m1\.drive\.gain"):
+        rt.certify.contraction(amplifier, **box)
+
+
+def test_a_gradient_is_refused_beside_natural_convection():
+    system = machine().with_parameters({"lumps.x6.gradient": 5.0})
+    breezy = rt.thermal.add_effect(system, "natural_convection", ["x6", "room"], {"gain": 0.02}).system
+    with pytest.raises(rt.InputError, match=r"lumps\.x6\.gradient"):
+        rt.certify.contraction(breezy, current=CURRENT, temperature=BOX)
+
+
+def test_an_effect_of_size_zero_is_no_effect():
+    system = rt.thermal.add_effect(machine(), "condensation", ["x6"]).system
+    assert rt.certify.contraction(system, current=CURRENT, temperature=BOX).holds
+
+
+def test_the_law_refuses_modules_it_does_not_know():
+    system = rt.systems.two_module().with_parameters({"modules.m1.thomson": 1e-3})
+    with pytest.raises(rt.InputError, match=r"modules\.m1\.thomson"):
+        rt.design.feedback_linearization(system)
+    assert rt.design.feedback_linearization(system, ["m2"]).names == ("m2",)

@@ -83,9 +83,9 @@ def mutate(document: Document, rng: np.random.Generator) -> Document:
 def _reworded(certificate: Certificate, rng: np.random.Generator) -> Certificate:
     """Another sentence: a digit changed, or a character lost."""
     text = certificate.claim
-    places = [k for k, letter in enumerate(text) if letter.isdigit()]
+    places = [k for k, letter in enumerate(text) if letter in "0123456789"]
     k = int(rng.choice(places)) if places and rng.random() < 0.7 else int(rng.integers(len(text)))
-    other = str((int(text[k]) + 1) % 10) if text[k].isdigit() else ""
+    other = str((int(text[k]) + 1) % 10) if k in places else ""
     return Certificate(**{**vars(certificate), "claim": text[:k] + other + text[k + 1:]})
 
 

@@ -103,7 +103,7 @@ def test_mutated_loops_are_never_wrongly_accepted():
                truth.leaves(document()[section], (section,)) if not {"between", "hot", "cold", "ambients", "name",
                                                                     "plant", "pieces"} & set(path)]
     accepted = refused = 0
-    for _ in range(45):
+    for _ in range(30):
         path = numeric[int(rng.integers(len(numeric)))]
         factor = float(rng.choice([-1.0, 0.5, 0.9, 1.1, 3.0]))
         changed = truth.replaced(document(), path, lambda value, factor=factor: truth.number(value) * factor)
@@ -116,7 +116,7 @@ def test_mutated_loops_are_never_wrongly_accepted():
         refused += not certificate.holds
         if certificate.holds:
             assert growth(changed, rng, 3) < 1, path
-    assert accepted > 10 and refused > 10
+    assert accepted > 6 and refused > 6
 
 
 @pytest.mark.parametrize(("path", "value"), [

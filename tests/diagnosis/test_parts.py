@@ -1,0 +1,147 @@
+"""The parts against independent truth: dense covariance, nonlinear simulation, non-negative least squares, contract."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+import robthermal as rt
+from robthermal.calibration._data import as_data
+from robthermal.diagnosis import _score
+from robthermal.diagnosis._along import Along, along
+from robthermal.diagnosis._descent import descend
+from robthermal.diagnosis._whitening import gathered, whitener
+
+
+@pytest.fixture(scope="module")
+def cooler() -> rt.System:
+    """A module between two faces, a heater, two sensors, one of them lagged."""
+    return rt.System(
+        ambients={"room": {"temperature": 298.15}},
+        lumps={"cold": {"capacity": 20.0, "disturbance": 0.05}, "hot": {"capacity": 60.0, "disturbance": 0.02}},
+        links=[{"between": ("cold", "room"), "conductance": 0.3}, {"between": ("hot", "room"), "conductance": 2.0}],
+        inputs={"heater": {"lump": "cold"}},
+        modules={"m1": {"hot": "hot", "cold": "cold", "seebeck": 0.05, "resistance": 2.0, "conductance": 0.5}},
+        sensors={"Tc": {"lump": "cold", "noise": 0.02}, "Th": {"lump": "hot", "noise": 0.03, "time_constant": 12.0}})
+
+
+@pytest.fixture(scope="module")
+def path(cooler: rt.System) -> Along:
+    rng = np.random.default_rng(3)
+    u = np.repeat(np.column_stack([rng.choice([0.0, 3.0], 12), rng.uniform(-0.5, 1.0, 12),
+                                   298.15 + rng.normal(0.0, 1.0, 12)]), 12, axis=0)
+    record = rt.Record(sample_time=2.0, inputs=u, outputs=np.full((144, 2), 298.15),
+                       input_names=["heater", "m1", "room"], output_names=["Tc", "Th"])
+    return along(cooler, as_data(cooler, record, "records")[0])
+
+
+def test_catalogue_is_the_contract() -> None:
+    known = rt.thermal.effects()
+    assert set(known) == set(rt.diagnosis.effects())
+    for name, effect in rt.diagnosis.effects().items():
+        assert {q.name for q in effect.quantities} <= set(known[name].parameters)
+        assert effect.separated_by and effect.confused_with
+
+
+def test_whitener_inverts_the_dense_covariance(path: Along) -> None:
+    noise, disturbance = np.array([0.02, 0.03]), np.array([0.05, 0.02])
+    A, C, Q = path.steps[0], path.C, gathered(path, disturbance)
+    n, nz = 40, A.shape[1]
+    states = np.zeros((n, n, nz, nz))  # covariance of the deviations at samples j and k, from δ(0) = 0
+    for k in range(1, n):
+        for j in range(k):
+            states[k, j] = A[k - 1] @ states[k - 1, j]
+            states[j, k] = states[k, j].T
+        states[k, k] = A[k - 1] @ states[k - 1, k - 1] @ A[k - 1].T + Q[k - 1]
+    dense = np.block([[C @ states[j, k] @ C.T + (np.diag(noise**2) if j == k else 0.0) for k in range(n)]
+                      for j in range(n)])
+    w = whitener(path, noise, disturbance)
+    columns = np.zeros((len(A), 2, 2 * n))
+    columns[:n].reshape(2 * n, 2 * n)[:] = np.eye(2 * n)
+    L_inverse = w(columns)[:n].reshape(2 * n, 2 * n)
+    assert np.allclose(L_inverse @ dense @ L_inverse.T, np.eye(2 * n), atol=1e-9)
+    assert not np.allclose(dense, np.diag(np.diag(dense)), atol=1e-6)  # otherwise the test could not fail
+
+
+def test_noise_gathered_in_a_sample_of_one_lump() -> None:
+    bar = rt.System(ambients={"room": {"temperature": 300.0}}, lumps={"bar": {"capacity": 10.0}},
+                    links=[{"between": ("bar", "room"), "conductance": 2.0}], sensors={"T": {"lump": "bar"}})
+    record = rt.Record(sample_time=3.0, inputs=np.full(4, 300.0), outputs=np.full((4, 1), 300.0), input_names=["room"],
+                       output_names=["T"])
+    Q = gathered(along(bar, as_data(bar, record, "records")[0]), np.array([0.7]))
+    exact = (0.7 / 10.0) ** 2 * (1 - np.exp(-2 * 0.2 * 3.0)) / (2 * 0.2)
+    assert Q[0, 0, 0] == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(rt.thermal.effects()))
+def test_signature_is_the_derivative_of_the_simulation(path: Along, name: str) -> None:
+    # The linearised signature, written by hand or from the equations, against two nonlinear simulations.
+    for candidate in rt.diagnosis.candidates(path.system, [name])[:3]:
+        trials = candidate.trials(path)
+        trial = trials[len(trials) // 2]
+        step = trial.shape.get(trial.effect.size.name, trial.effect.size.typical)
+        linear = _score.columns(path, [trial])[..., 0]
+        added = rt.thermal.trajectory(trial.add(path.system, step), path.one.record, tolerance=1e-7).readings
+        without = rt.thermal.trajectory(path.system, path.one.record, tolerance=1e-7).readings
+        true = (added - without) / step
+        if np.linalg.norm(true) < 1e-9 * np.sqrt(true.size):
+            assert np.linalg.norm(linear) < 1e-6
+            continue
+        cosine = float(np.sum(linear * true)) / np.linalg.norm(linear) / np.linalg.norm(true)
+        assert cosine > 0.97, candidate.label
+        assert np.linalg.norm(linear) / np.linalg.norm(true) == pytest.approx(1.0, abs=0.15)
+
+
+def test_descent_with_bounds_is_non_negative_least_squares() -> None:
+    rng = np.random.default_rng(5)
+    J, z = rng.standard_normal((30, 6)), rng.standard_normal(30)
+    found = descend(lambda v: (z - J @ v, J), np.full(6, 0.5), (np.zeros(6), np.full(6, np.inf)), 50, 1e-12)
+    _, least = nnls(J, z)
+    assert np.linalg.norm(found.z) == pytest.approx(least, rel=1e-6)
+    assert np.any(found.v == 0.0)
+
+
+def test_scores_of_noise_follow_their_distribution(plant: rt.System, hide: Callable) -> None:
+    # Under H0 the projected statistic is F(1, ν): over many noises and candidates its mean is 1, and few exceed 6.6.
+    fit = rt.diagnosis.refit(plant, hide(n=300)[0])
+    rng = np.random.default_rng(11)
+    tested = rt.diagnosis.candidates(fit.system, ["missing_ambient_link", "sensor_offset", "sensor_gain", "heat_source",
+                                                  "natural_convection"])
+    J = fit.project(fit.whiten([_score.columns(path, [c.trials(path)[0] for c in tested]) for path in fit.paths]))
+    J /= np.linalg.norm(J, axis=0)
+    z = fit.project(rng.standard_normal((J.shape[0], 400)))
+    T = (J.T @ z) ** 2 / (np.sum(z**2, axis=0) / fit.degrees_of_freedom)
+    assert T.mean() == pytest.approx(1.0, abs=0.15)
+    assert np.mean(T > 6.635) < 0.03
+
+
+def test_aliases_and_limits_need_no_readings(plant: rt.System, hide: Callable) -> None:
+    # A record of inputs alone decides what can be told apart and how small an effect would be seen.
+    record = hide(n=300)[0]
+    quiet = rt.thermal.simulate(plant, record)
+    noisy = quiet.with_outputs(quiet.outputs + 0.01 * np.random.default_rng(0).standard_normal(quiet.outputs.shape))
+    scores = rt.diagnosis.score(rt.diagnosis.refit(plant, noisy), ["heat_source", "ambient_gradient",
+                                                                   "sensor_self_heating", "missing_ambient_link"])
+    labels = [candidate.label for candidate in scores.candidates]
+    alike = {labels[j] for j in scores.aliases(labels.index("heat_source(plate)"))}
+    assert alike == {"ambient_gradient(plate)", "sensor_self_heating(Tp)"}
+    assert np.all(np.isfinite(scores.limit)) and np.all(scores.limit > 0)
+
+
+def test_an_effect_at_its_declared_limit_is_mostly_detected(plant: rt.System, hide: Callable) -> None:
+    record = hide(n=300)[0]
+    clean = rt.thermal.simulate(plant, record)
+    rng = np.random.default_rng(2)
+    fit = rt.diagnosis.refit(plant, clean.with_outputs(clean.outputs + 0.01 * rng.standard_normal(clean.outputs.shape)))
+    scores = rt.diagnosis.score(fit, ["sensor_gain"])
+    limit = scores.limit[0]
+    seen = 0
+    lifted = rt.thermal.simulate(plant.with_parameters({"sensors.Tp.gain": 1.0 + 1.3 * limit}), record)
+    for _ in range(12):
+        noisy = lifted.with_outputs(lifted.outputs + 0.01 * rng.standard_normal(lifted.outputs.shape))
+        again = rt.diagnosis.score(rt.diagnosis.refit(plant, noisy), ["sensor_gain"])
+        seen += bool(again.p_value[0] < 0.01)
+    assert seen >= 10
