@@ -187,7 +187,8 @@ class TestNo:
         out = tmp_path / "out"
         spec = write(tmp_path, NOMINAL.replace("msd_limit = 1.5", "msd_limit = 0.001"))
         status, said, _ = run("couple", spec, "--out", out, "--json")
-        assert status == 1 and not json.loads(said)["holds"]
+        assert status == 1 and not json.loads(said)["holds"] and len(json.loads(said)["claims"]) == 1
+        assert json.loads((out / "coupling.json").read_text(encoding="utf-8"))["verdict"] == "none"
         assert json.loads(said)["claims"][0]["reason"].startswith("No coupling filter: msd_limit = 0.001 is below")
         suite = ElementTree.parse(out / "junit.xml").getroot()
         assert suite.get("failures") == "1"

@@ -6,6 +6,8 @@ from ._destabilising import Destabilising as Destabilising
 from ._destabilising import destabilising as destabilising
 from ._evaluate import evaluate as evaluate
 from ._filters import Filters as Filters
+from ._fixed_point import FixedPoint as FixedPoint
+from ._fixed_point import ScaledPath as ScaledPath
 from ._inner import inner_factor as inner_factor
 from ._mu import mu as mu
 from ._mu_bound import mu_bound as mu_bound
@@ -22,6 +24,6 @@ from ._uncertainty import dual_youla as dual_youla
 from ._worst_case import WorstCase as WorstCase
 from ._worst_case import worst_case as worst_case
 
-__all__ = ["CoprimeFactors", "Destabilising", "Filters", "MuBound", "Performance", "Simulation", "Spectra",
-           "Uncertainty", "WorstCase", "coprime", "destabilising", "dual_youla", "evaluate", "inner_factor", "mu",
-           "mu_bound", "overbound", "simulate", "spectra", "synthesize", "worst_case"]
+__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "MuBound", "Performance", "ScaledPath",
+           "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime", "destabilising", "dual_youla", "evaluate",
+           "inner_factor", "mu", "mu_bound", "overbound", "simulate", "spectra", "synthesize", "worst_case"]

@@ -33,7 +33,8 @@ _TEXT = """\
  * Test: cc -std=c99 -ffp-contract=off -DCOUPLING_TEST this.c && ./a.out prints the largest difference from the vector
  * at the end, relative to the largest value: 0 without fused multiply-add. Exit status 1 above 1e-9.
  */
-#pragma once
+#ifndef {p}_included
+#define {p}_included
 
 {tables}
 typedef struct {{
@@ -104,6 +105,7 @@ int main(void)
     printf("%.3g\\n", worst);
     return worst <= 1e-9 ? 0 : 1;
 }}
+#endif
 #endif
 """
 

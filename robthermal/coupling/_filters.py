@@ -15,6 +15,7 @@ from ..errors import Outcome
 from ..verification import Certificate
 from . import _files
 from ._export import export
+from ._fixed_point import FixedPoint, fixed_point
 from ._performance import Performance
 from ._problem import Problem
 from ._reduce import reduce
@@ -130,7 +131,9 @@ class Filters:
 
     @property
     def verdict(self) -> str:
-        """ "robust", "nominal" or "none"; robust only where an uncertainty was given."""
+        """ "robust", "nominal" or "none"; robust only where an uncertainty was given, none for a refused design."""
+        if not self.holds and self.norms["X"] == self.norms["Y"] == 0.0:  # refused: there is no coupling
+            return "none"
         if self.problem.uncertainty is not None and self.robustly_stable:
             return "robust"
         return "nominal" if self.nominally_stable else "none"
@@ -188,6 +191,26 @@ class Filters:
             In continuous time, or when a filter cannot be factored accurately enough: reduce it first.
         """
         return sections(self)
+
+    def fixed_point(self, largest: float) -> FixedPoint:
+        """Sections scaled by powers of two so that no state overflows, and the bits each needs; discrete time only.
+
+        Parameters
+        ----------
+        largest : float
+            Bound of e1+ and e2+ [m].
+
+        Returns
+        -------
+        FixedPoint
+
+        Raises
+        ------
+        InputError
+            As :meth:`sections`, for a bound that is not positive, or filters that ring for more than two million
+            samples.
+        """
+        return fixed_point(self, largest)
 
     def save(self, path: str | Path, name: str = "") -> None:
         """Write coupling.json: filters, sections, norms, performance and verdict.

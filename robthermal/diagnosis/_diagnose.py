@@ -25,6 +25,8 @@ from ._score import ALPHA, BIC_GAP, Scores, score
 from ._short_list import Entry, quantities_of, refit_short_list
 
 MOST_EFFECTS = 3
+_LARGE = 1.5  # whitened variance
+_MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
 
 def diagnose(system: System, records: Record | Sequence[Record], *, validation: Record | Sequence[Record] | None = None,
@@ -107,8 +109,18 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None) -> tupl
         decision = decide(refit_short_list(fit, scores))
         if decision.best is None:
             break
+        hopeless = _flails(fit, decision.best)
         rounds, fit = (*rounds, decision), decision.best.fit
+        if hopeless:
+            return rounds, fit
     return revised(rounds, nominal, effects) if len(rounds) > 1 else (rounds, fit)
+
+
+def _flails(fit: Refit, best: Entry) -> bool:
+    """Whether the best candidate leaves most of a large misfit: more of the same kind would only be curve fitting."""
+    n = fit.n_readings
+    after = fit.rss * np.exp(-best.delta_bic / n)
+    return bool(after > _LARGE * n and after - n > _MOST * (fit.rss - n))
 
 
 def _promising(fit: Refit, scores: Scores) -> bool:

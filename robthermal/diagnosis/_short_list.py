@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 LENGTH = 7
 _FIRST = 2  # evaluations before the hopeless ones are dropped
+_LAST = 15  # more evaluations, for the others
 _BEHIND = 60.0  # ΔBIC
 _WORSE = 1.001
 
@@ -140,7 +141,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
                                     _FIRST))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    return ShortList(fit, tuple(sorted(map(finished, hopeful(entries)), key=_worst)), failed)
+    return ShortList(fit, tuple(sorted(map(finished, hopeful(entries)), key=lambda e: -e.delta_bic)), failed)
 
 
 def hopeful(entries: Sequence[Entry]) -> list[Entry]:
@@ -154,12 +155,8 @@ def finished(entry: Entry) -> Entry:
     if entry.converged:
         return entry
     before_bic = entry.delta_bic + entry.fit.n_readings * math.log(entry.fit.rss)
-    fit = extended(entry.fit, entry.fit.structure, entry.fit.v)
+    fit = extended(entry.fit, entry.fit.structure, entry.fit.v, _LAST)
     return Entry(entry.candidate, fit, before_bic - fit.n_readings * math.log(fit.rss), entry.p_value, entry.aliases)
-
-
-def _worst(entry: Entry) -> float:
-    return -entry.delta_bic
 
 
 def entry_of(fit: Refit, candidate: Candidate, size: float, p_value: float,

@@ -48,6 +48,11 @@ class Coupling:
     simulation: Simulation | None
 
     @property
+    def found(self) -> bool:
+        """Whether there is a coupling to speak of: an infeasible design is X = Y = 0, the loops as they were."""
+        return self.filters.holds or self.filters.norms["X"] > 0 or self.filters.norms["Y"] > 0
+
+    @property
     def holds(self) -> bool:
         """Whether all that was asked for holds, and is verified as far as it is a matter of proof."""
         return self.filters.holds and all(c.good for c in self.checked if c.required)

@@ -32,7 +32,7 @@ def coupling_claims(result: Coupling) -> Iterator[Claim]:
                     box=_about("robust", result), margin="none", how="Every number computed again from the filters.",
                     reason=filters.outcome.text)
     for one in result.checked:
-        if one.required:
+        if one.required and result.found:
             yield _claim(one, result)
 
 

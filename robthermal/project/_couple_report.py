@@ -37,7 +37,8 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
     result : Coupling
         From `couple_subsystems`.
     out : str or Path
-        Output folder: coupling.json with the filters, report.html, junit.xml, summary.json, certificates/*.json.
+        Output folder: coupling.json with the filters, report.html, junit.xml, summary.json,
+        ``certificates/*.json``.
 
     Returns
     -------
@@ -81,6 +82,9 @@ def _subtitle(result: Coupling) -> str:
 
 def _sections(result: Coupling) -> Iterator[Section]:
     yield _performance_section(result)
+    if not result.found:
+        yield certificate_section(result.checked)
+        return
     yield _norm_section(result)
     yield Section("Over frequency", "Computed at frequencies; corners, resonances and the measured frequencies are "
                   "among them.", figures=tuple(spectrum_figures(result.spectra)), anchor="spectra")
@@ -113,7 +117,7 @@ def _performance_section(result: Coupling) -> Section:
 def _of_measured_plants(result: Coupling) -> str:
     """Limits on MA and MSD are kept by the model; what the machine does must stand beside it."""
     worst = result.worst_case
-    if worst is None or not result.filters.problem.samples:
+    if worst is None or not result.found or not result.filters.problem.samples:
         return ""
     smaller, larger = worst.ma_before[:-1] / worst.ma_after[:-1], worst.msd_after[:-1] / worst.msd_before[:-1]
     return (f" On the measured plants MA is smaller by {smaller.min():.3g} to {smaller.max():.3g}, and MSD with "

@@ -21,7 +21,8 @@ def cooler() -> rt.System:
     """A module between two faces, a heater, two sensors, one of them lagged."""
     return rt.System(
         ambients={"room": {"temperature": 298.15}},
-        lumps={"cold": {"capacity": 20.0, "disturbance": 0.05}, "hot": {"capacity": 60.0, "disturbance": 0.02}},
+        lumps={"cold": {"capacity": 20.0, "disturbance": 0.05, "initial": 298.15},
+               "hot": {"capacity": 60.0, "disturbance": 0.02, "initial": 298.15}},
         links=[{"between": ("cold", "room"), "conductance": 0.3}, {"between": ("hot", "room"), "conductance": 2.0}],
         inputs={"heater": {"lump": "cold"}},
         modules={"m1": {"hot": "hot", "cold": "cold", "seebeck": 0.05, "resistance": 2.0, "conductance": 0.5}},
