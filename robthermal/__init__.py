@@ -43,8 +43,8 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "project", "report", "signals",
-          "systems", "thermal", "verification")
+_ROOMS = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "project", "report",
+          "signals", "systems", "thermal", "verification")
 
 _HOME = {  # public name: the room it lives in
     "Certificate": "verification",

@@ -12,8 +12,8 @@ from itertools import product
 
 import numpy as np
 import pandas as pd
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError, Outcome
 from ..thermal import Equations, System
@@ -35,6 +35,7 @@ _HOTTEST = 1000.0  # K
 _COLDEST = 60.0
 _MARGIN = 1e-3  # W of inward heat left on every face of the box
 _ITERATIONS = 400
+_STEP = 0.01  # K, for the slope of a loss
 
 
 @dataclass(frozen=True)
@@ -183,42 +184,45 @@ def invariant_box(system: System, currents: Mapping[str, list[float]], ambient: 
     for name, pair in named_ranges(heat, system.lump_names, "heat", "lump").items():
         loads[:, system.lump_names.index(name)] = pair
     loads += np.array([[-_MARGIN], [_MARGIN]])  # so that heat flows strictly inwards on every face
-    lu = splu(csc_array(-eq.A))
     limits = np.array([currents[name] for name in system.modules], float).reshape(-1, 2).T
     box = np.array([np.full(len(system.lumps), around[0].min()), np.full(len(system.lumps), around[1].max())])
     for _ in range(_ITERATIONS):
-        new = np.array([_bound(eq, lu, box, side, around, loads, limits) for side in (0, 1)])
-        new = np.array([np.minimum(new[0], box[0]), np.maximum(new[1], box[1])])
-        if not np.isfinite(new).all() or new[1].max() > _HOTTEST or new[0].min() < _COLDEST:
+        outward = [_outward(eq, box, box[side], side, around, loads, limits) for side in (0, 1)]
+        if max(heat.max() for heat in outward) <= 0.5 * _MARGIN:
+            return {name: (float(a), float(b)) for name, a, b in zip(system.lumps, *np.round(box, 6), strict=True)}
+        # Newton in each lump's own face, which a loss bends: the matrix stays an M-matrix, so that no face moves in.
+        for side, sign in ((0, -1), (1, 1)):
+            moved = _outward(eq, box, box[side] + sign * _STEP, side, around, loads, limits)
+            steeper = np.maximum(0.0, (outward[side] - moved) / _STEP + eq.A.diagonal())
+            step = spsolve(csc_array(diags_array(steeper) - eq.A), np.maximum(outward[side], 0.0))
+            box[side] += sign * step
+        if not np.isfinite(box).all() or box[1].max() > _HOTTEST or box[0].min() < _COLDEST:
             return None
-        moved = np.abs(new - box).max()
-        box = new
-        if moved < 1e-7:
-            break
-    else:
-        return None
-    return {name: (float(a), float(b)) for name, a, b in zip(system.lumps, *np.round(box, 6), strict=True)}
+    return None
 
 
-def _bound(eq: Equations, lu: object, box: np.ndarray, side: int, around: np.ndarray, loads: np.ndarray,
-           limits: np.ndarray) -> np.ndarray:
-    """Steady temperatures with every nonlinear heat at its extreme over the box, each lump on its own face."""
-    n, na = len(eq.capacity), around.shape[1]
-    extreme, sign = loads[side] + eq.B[:, eq.B.shape[1] - na:] @ around[side], (-1, 1)[side]
-    nodes = np.concatenate([box, around], axis=1)
+def _outward(eq: Equations, box: np.ndarray, face: np.ndarray, side: int, around: np.ndarray, loads: np.ndarray,
+             limits: np.ndarray) -> np.ndarray:
+    """Largest heat into every lump that pushes it out of its lower (0) or upper (1) face [W].
+
+    The lump is at ``face``, all others anywhere in the box; linear links are taken at the same side.
+    """
+    n, na, sign = len(eq.capacity), around.shape[1], (-1, 1)[side]
+    own_heat = eq.A.diagonal() * (face - box[side])
+    extreme = sign * (eq.A @ box[side] + own_heat + loads[side] + eq.B[:, eq.B.shape[1] - na:] @ around[side])
+    nodes, faces = np.concatenate([box, around], axis=1), np.concatenate([face, around[side]])
     for term in eq.terms:
         count = len(term.a)
         grid = np.linspace(limits[0], limits[1], 9) if limits.shape[1] == count and _is_module(term, eq) else None
         currents = grid if grid is not None else np.zeros((1, 0))
         for own, other, which in ((term.a, term.b, 0), (term.b, term.a, 1)):
-            at_face = nodes[side, own]
             best = np.full(count, -np.inf)
             for current, far in product(currents, nodes[:, other]):
-                pair = (at_face, far) if which == 0 else (far, at_face)
-                best = np.maximum(best, sign * term.heat(*pair, current)[which])
+                first, second = (faces[own], far) if which == 0 else (far, faces[own])
+                best = np.maximum(best, sign * term.heat(first, second, current)[which])
             inside = own < n
-            np.add.at(extreme, own[inside], sign * best[inside])
-    return lu.solve(extreme)  # type: ignore[attr-defined]
+            np.add.at(extreme, own[inside], best[inside])
+    return np.asarray(extreme)
 
 
 def _is_module(term: object, eq: Equations) -> bool:

@@ -9,6 +9,8 @@ from ._filters import Filters as Filters
 from ._fixed_point import FixedPoint as FixedPoint
 from ._fixed_point import ScaledPath as ScaledPath
 from ._inner import inner_factor as inner_factor
+from ._joint import Joint as Joint
+from ._joint import joint as joint
 from ._mu import mu as mu
 from ._mu_bound import mu_bound as mu_bound
 from ._mu_result import MuBound as MuBound
@@ -24,6 +26,7 @@ from ._uncertainty import dual_youla as dual_youla
 from ._worst_case import WorstCase as WorstCase
 from ._worst_case import worst_case as worst_case
 
-__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "MuBound", "Performance", "ScaledPath",
-           "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime", "destabilising", "dual_youla", "evaluate",
-           "inner_factor", "mu", "mu_bound", "overbound", "simulate", "spectra", "synthesize", "worst_case"]
+__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "Performance",
+           "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime", "destabilising",
+           "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound", "overbound", "simulate", "spectra",
+           "synthesize", "worst_case"]

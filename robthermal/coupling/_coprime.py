@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import control
@@ -30,8 +31,8 @@ class CoprimeFactors:
 
     Parameters
     ----------
-    loops : pair of Loop
-        The two subsystems as zeros, poles and gains.
+    loops : tuple of Loop
+        The two subsystems (of several axes: all of them) as zeros, poles and gains.
 
     Examples
     --------
@@ -43,7 +44,7 @@ class CoprimeFactors:
     (4, True, True)
     """
 
-    loops: tuple[Loop, Loop]
+    loops: tuple[Loop, ...]
 
     @property
     def Np(self) -> control.StateSpace:
@@ -86,7 +87,7 @@ class CoprimeFactors:
         omega = corner_grid([root for loop in self.loops for root in (loop.P, loop.C, loop.S)], 2000)
         L, N, W, D = (Response(system)(omega) for system in (self.L, self.Np, self.W, self.Dp))
         product = np.einsum("ijf,jkf->ikf", L, N) + np.einsum("ijf,jkf->ikf", W, D)
-        return float(np.max(np.abs(product - np.eye(2)[:, :, None])))
+        return float(np.max(np.abs(product - np.eye(len(self.loops))[:, :, None])))
 
     def bezout(self, bound: float = 1e-6) -> Certificate:
         """Certificate that the realised factors satisfy L Np + W Dp = I + E with a norm of E below the bound.
@@ -116,7 +117,7 @@ class CoprimeFactors:
 
         Returns
         -------
-        dict of ndarray, shape (2, n_f)
+        dict of ndarray, shape (n_loops, n_f)
             "Np", "Dp", "Nk", "Dk" and "P0".
         """
         names = {"Np": "Z", "Dp": "Q", "Nk": "Nk", "Dk": "Dk", "P0": "P"}
@@ -221,5 +222,4 @@ def _unit_inverse(loop: Loop) -> Zpk:
 
 
 def _both(channels: Any) -> control.StateSpace:
-    first, second = (realise(channel) for channel in channels)
-    return apart(first, second)
+    return reduce(apart, [realise(channel) for channel in channels])

@@ -16,22 +16,24 @@ Array = NDArray[Any]
 Measured = Any  # control.FrequencyResponseData or identify.FrequencyResponse, 2x2, or a list of them
 
 
-def read_plants(plants: Measured, dt: float, where: str) -> tuple[Array, Array, Array | None]:
-    """Frequencies [rad/s], responses (n_plants, 2, 2, n_f), and 95 % confidence radii of the same shape or None.
+def read_plants(plants: Measured, dt: float, where: str, size: int = 2) -> tuple[Array, Array, Array | None]:
+    """Frequencies [rad/s], responses (n_plants, n, n, n_f), and 95 % confidence radii of the same shape or None.
 
     Parameters
     ----------
-    plants : 2x2 FRF or list of them
+    plants : square FRF or list of them
         What the user gave.
     dt : float
         Sample time of the loop [s].
     where : str
         Name of the argument.
+    size : int
+        Inputs and outputs n that they must have.
     """
     listed = list(plants) if isinstance(plants, Sequence) else [plants]
     if not listed:
-        raise InputError("no measured plant", where=where, expected="at least one 2x2 frequency response")
-    read = [_one(plant, dt, _label(where, k, len(listed))) for k, plant in enumerate(listed)]
+        raise InputError("no measured plant", where=where, expected=f"at least one {size}x{size} frequency response")
+    read = [_one(plant, dt, _label(where, k, len(listed)), size) for k, plant in enumerate(listed)]
     omega = read[0][0]
     for k, (other, _, _) in enumerate(read):
         if len(other) != len(omega) or not np.allclose(other, omega, rtol=1e-9, atol=0.0):
@@ -40,7 +42,7 @@ def read_plants(plants: Measured, dt: float, where: str) -> tuple[Array, Array, 
     radii = [radius for _, _, radius in read]
     if all(radius is None for radius in radii):
         return omega, np.stack([response for _, response, _ in read]), None
-    filled = [np.zeros((2, 2, len(omega))) if radius is None else radius for radius in radii]
+    filled = [np.zeros((size, size, len(omega))) if radius is None else radius for radius in radii]
     return omega, np.stack([response for _, response, _ in read]), np.stack(filled)
 
 
@@ -48,7 +50,7 @@ def _label(where: str, index: int, count: int) -> str:
     return where if count == 1 else f"{where}[{index}]"
 
 
-def _one(plant: Measured, dt: float, where: str) -> tuple[Array, Array, Array | None]:
+def _one(plant: Measured, dt: float, where: str, size: int) -> tuple[Array, Array, Array | None]:
     if isinstance(plant, FrequencyResponse):
         omega, response = 2 * np.pi * plant.frequencies, plant.response
         if dt and not np.isclose(plant.sample_time, dt, rtol=1e-6):
@@ -59,8 +61,8 @@ def _one(plant: Measured, dt: float, where: str) -> tuple[Array, Array, Array | 
     else:
         raise InputError(f"{type(plant).__name__} is not a frequency response", where=where,
                          expected="a control.FrequencyResponseData or an rt.identify frequency response")
-    if response.shape[:2] != (2, 2):
-        raise InputError(f"{response.shape[0]}x{response.shape[1]} response", where=where, expected="2x2")
+    if response.shape[:2] != (size, size):
+        raise InputError(f"{response.shape[0]}x{response.shape[1]} response", where=where, expected=f"{size}x{size}")
     order = np.argsort(omega)
     omega, response = omega[order], response[:, :, order]
     _check_grid(omega, response, dt, where)
@@ -87,4 +89,4 @@ def _radius(plant: Measured, order: Array) -> Array | None:
     if not isinstance(plant, FrequencyResponse):
         return None
     radius = np.asarray(plant.confidence_radius(0.95))[:, :, order]
-    return None if not np.any(radius > 0) else np.where(np.isfinite(radius), radius, 0.0)
+    return radius if np.any(radius > 0) else None

@@ -37,7 +37,8 @@ class Uncertainty:
     factors : CoprimeFactors
         Of the model and the controllers.
     radius : ndarray, shape (n_plants, 2, 2, n_f), optional
-        95 % confidence radius of each sample, to first order; None when the measurements carry no covariance.
+        What Delta_p can move by when the measured plant moves within its 95 % circles, each entry and frequency by
+        itself; infinite where a circle holds plants that K0 does not stabilise. None without covariance.
 
     Examples
     --------
@@ -81,13 +82,27 @@ class Uncertainty:
     def with_confidence(self) -> Uncertainty:
         """The same with the 95 % confidence circles of the measurements inside the envelope.
 
+        Give the result to `synthesize` or `evaluate` as `uncertainty`; without this call the circles are not used.
+
         Returns
         -------
         Uncertainty
             Unchanged when the measurements carry no covariance.
+
+        Raises
+        ------
+        InputError
+            Where a circle is infinite, or so large that some plant in it is not stabilised.
         """
         if self.radius is None:
             return self
+        bad = ~np.all(np.isfinite(self.radius), axis=(1, 2))
+        if np.any(bad):
+            plant, index = np.argwhere(bad)[0]
+            raise InputError(f"the confidence circle of plant {plant + 1} at {self.omega[index]:.6g} rad/s is unknown "
+                             "or too large for the controllers", where="with_confidence",
+                             expected="a plant that K0 stabilises wherever it is in its circle",
+                             remedy="Measure longer, or leave that frequency out.")
         return replace(self, envelope=np.max(np.abs(self.samples) + self.radius, axis=0))
 
     def plot(self) -> Any:
@@ -145,18 +160,19 @@ def dual_youla(P_frf: Measured, P0: Any, K0: Any) -> Uncertainty:
 
 
 def from_factors(plants: Measured, factors: CoprimeFactors, where: str) -> Uncertainty:
-    """The same with factors at hand.
+    """The same with factors at hand, of any number of loops.
 
     Parameters
     ----------
-    plants : 2x2 frequency response, or list of them
-        Measured plants.
+    plants : square frequency response, or list of them
+        Measured plants; one input and output per loop.
     factors : CoprimeFactors
         Of model and controllers.
     where : str
         Name of the argument, for messages.
     """
-    omega, measured, radius = read_plants(plants, factors.loops[0].P.dt, where)
+    size = len(factors.loops)
+    omega, measured, radius = read_plants(plants, factors.loops[0].P.dt, where, size)
     for number, loop in enumerate(factors.loops, 1):
         _expect_resolved(omega, loop, number, where)
     f = factors.at(omega)
@@ -164,18 +180,32 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str) -> Uncer
         at_pole = omega[~np.all(np.isfinite(f["P0"]), axis=0)][0]
         raise InputError(f"frequency {at_pole:.6g} rad/s is a pole of the model", where=where,
                          expected="frequencies at which P0 is finite", remedy="Leave that frequency out.")
-    diag = {name: np.moveaxis(value[:, None, :] * np.eye(2)[:, :, None], -1, 0) for name, value in f.items()}
+    diag = {name: np.moveaxis(value[:, None, :] * np.eye(size)[:, :, None], -1, 0) for name, value in f.items()}
     P = np.moveaxis(measured, -1, 1)  # (n_plants, n_f, 2, 2)
     for index in range(len(P)):
         _expect_stabilised(P[index], diag, where if len(P) == 1 else f"{where}[{index}]")
     left = np.linalg.inv(diag["Dk"] + P @ diag["Nk"])
     samples = left @ (P - diag["P0"]) @ diag["Dp"]
     circles = None
-    if radius is not None:  # d Delta = (Dk + P Nk)^-1 dP (Dp - Nk Delta)
-        right = diag["Dp"] - diag["Nk"] @ samples
-        circles = np.moveaxis(np.abs(left) @ np.moveaxis(radius, -1, 1) @ np.abs(right), 1, -1)
+    if radius is not None:
+        circles = np.moveaxis(_circles(left, np.moveaxis(radius, -1, 1), diag, samples), 1, -1)
     samples = np.moveaxis(samples, 1, -1)
     return Uncertainty(omega, samples, np.max(np.abs(samples), axis=0), factors, circles)
+
+
+def _circles(left: Array, radius: Array, diag: dict[str, Array], samples: Array) -> Array:
+    """Bound of the change of Delta_p for every |dP| <= radius, not to first order only.
+
+    The change is (I + L dP Nk)⁻¹ L dP (Dp - Nk Delta) with L = (Dk + P Nk)⁻¹, exactly; entry by entry the inverse is
+    at most (I - |L| radius |Nk|)⁻¹ where that Neumann series converges.
+    """
+    known = np.all(np.isfinite(radius), axis=(2, 3))
+    size = np.abs(left) @ np.where(known[:, :, None, None], radius, 0.0)
+    loop = size @ np.abs(diag["Nk"])
+    known &= np.max(np.abs(np.linalg.eigvals(loop)), axis=2) < 1
+    loop[~known] = 0.0
+    found = np.linalg.solve(np.eye(len(loop[0, 0])) - loop, size @ np.abs(diag["Dp"] - diag["Nk"] @ samples))
+    return np.where(known[:, :, None, None], found, np.inf)
 
 
 def _expect_resolved(omega: Array, loop: Loop, number: int, where: str) -> None:

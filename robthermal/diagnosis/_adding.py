@@ -16,7 +16,8 @@ def joined(system: System, where: Where, **content: Any) -> System:
     taken, name, number = {link.name for link in system.links}, "-".join(where), 2
     while name in taken:
         name, number = f"{'-'.join(where)} {number}", number + 1
-    return system.model_copy(update={"links": (*system.links, Link(between=(where[0], where[1]), name=name, **content))})
+    link = Link(between=(where[0], where[1]), name=name, **content)
+    return system.model_copy(update={"links": (*system.links, link)})
 
 
 def missing_link(system: System, where: Where, values: Values) -> System:

@@ -132,13 +132,35 @@ class Along:
         return C
 
     def heat_of(self, system: System) -> tuple[Array, Array]:
-        """Extra heat of a changed system with the same lumps, at the start and end of every sample, (n, n_lumps) [W]."""
+        """Extra heat of a changed system, at the start and at the end of every sample.
+
+        Parameters
+        ----------
+        system : System
+            With the same lumps.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n, n_lumps)
+            [W].
+        """
         other = Equations(system)
         return (other.heat(self.x, self.u) - self.equations.heat(self.x, self.u),
                 other.heat(self.end, self.u) - self.equations.heat(self.end, self.u))
 
     def readings_of(self, responses: list[Response]) -> Array:
-        """Change of the record's sensors (n, n_sensors, m) that each response causes [K]."""
+        """Change of the record's sensors that each response causes.
+
+        Parameters
+        ----------
+        responses : list of Response
+            Of m effects.
+
+        Returns
+        -------
+        ndarray, shape (n, n_sensors, m)
+            [K].
+        """
         n, nl = self.x.shape
         start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
         out = np.zeros((n, len(self.one.sensors), len(responses)))
@@ -150,7 +172,18 @@ class Along:
         return out + self.answer(start, end)
 
     def answer(self, start: Array, end: Array) -> Array:
-        """Readings (n, n_sensors, m) to heats at the start and end of every sample, both (n, n_lumps, m) [K]."""
+        """Change of the readings that extra heats cause.
+
+        Parameters
+        ----------
+        start, end : ndarray, shape (n, n_lumps, m)
+            Heat at the start and at the end of every sample [W].
+
+        Returns
+        -------
+        ndarray, shape (n, n_sensors, m)
+            [K].
+        """
         A, by_start, by_end = self.steps
         push = by_start @ start + by_end @ end
         state = np.zeros((len(push), *push.shape[1:]))
@@ -168,4 +201,5 @@ def along(system: System, one: Data) -> Along:
                else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
     if not np.isfinite(run.lumps).all():
         raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
-    return Along(system, one, run.lumps, run.readings, np.column_stack(columns))
+    return Along(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
+                 np.column_stack(columns))

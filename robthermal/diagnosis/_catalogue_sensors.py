@@ -23,8 +23,8 @@ def _driven(system: System) -> list[Where]:
 
 def _prompt(key: str) -> Callable[[System], list[Where]]:
     """Inputs and modules that are not late already."""
-    return lambda system: [(name,) for name, part in {**system.inputs, **system.modules}.items()
-                           if not getattr(part.drive, key)]
+    return lambda system: [*((name,) for name, part in system.inputs.items() if not getattr(part.drive, key)),
+                           *((name,) for name, part in system.modules.items() if not getattr(part.drive, key))]
 
 
 def _leaks(system: System) -> list[Where]:

@@ -56,8 +56,8 @@ def diagnose(system: System, records: Record | Sequence[Record], *, validation: 
     Raises
     ------
     InputError
-        Records too short, validation on the training data, no noise declared and none visible, a nominal model that runs
-        away, an unknown effect.
+        Records too short, validation on the training data, no noise declared and none visible, a nominal model that
+        runs away, an unknown effect.
 
     Examples
     --------
@@ -88,10 +88,11 @@ def diagnose(system: System, records: Record | Sequence[Record], *, validation: 
     verdict, outcome = _verdict(rounds, fit, checks, unseen)
     found = tuple(_found(fit, i, round_) for i, round_ in enumerate(rounds))
     named = verdict in ("named", "ambiguous")
+    gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit))}
     return Diagnosis(
         verdict=verdict, effects=found if named else (), alternatives=tuple(map(_others, rounds)) if named else (),
         system=fit.system if named else nominal.system,
-        gap={"train": Gap(nominal.rms, fit.rms, expected_rms(fit))} | ({} if unseen is None else {"validation": unseen.gap}),
+        gap=gap | ({} if unseen is None else {"validation": unseen.gap}),
         located=locate(nominal), not_testable=scores.not_testable, next_experiment=_plan(rounds) if named else None,
         outcome=outcome, provisional=() if named else found, noise_floor=floor, nominal=nominal, fit=fit, scores=scores,
         rounds=rounds, adequacy=checks, hold_out=unseen)

@@ -31,8 +31,8 @@ class Quantity:
     lower, upper : float
         What is physically possible; the same number twice: known.
     grid : tuple of float or callable
-        Values tried when candidates are scored, or ``grid(along, where)`` that finds them. For a size it is empty if the
-        readings are nearly linear in it.
+        Values tried when candidates are scored, or ``grid(along, where)`` that finds them. For a size it is empty if
+        the readings are nearly linear in it.
     typical : float
         Size that is certainly small enough to be linear, for effects without a signature of their own.
 
@@ -66,8 +66,8 @@ class Effect:
     add : callable
         ``add(system, where, values)`` returns the system with the effect; `values` has every quantity.
     signature : callable, optional
-        ``signature(along, where, values)`` returns the `Response` of the readings per unit of the size, linearised along
-        the simulated record. Default: a small effect is added and the record simulated again (slower).
+        ``signature(along, where, values)`` returns the `Response` of the readings per unit of the size, linearised
+        along the simulated record. Default: a small effect is added and the record simulated again (slower).
     confused_with : tuple of str
         Effects with a similar signature.
     separated_by : str
@@ -190,8 +190,8 @@ def check_effect(effect: Effect) -> None:
                          expected="at least its size", remedy="Give quantities=(Quantity(...),).")
     for quantity in effect.quantities[1:]:
         if not quantity.grid:
-            raise InputError(f"quantity {quantity.name!r} of effect {effect.name!r} has no grid", where="argument effect",
-                             expected="trial values of every quantity but the size",
+            raise InputError(f"quantity {quantity.name!r} of effect {effect.name!r} has no grid",
+                             where="argument effect", expected="trial values of every quantity but the size",
                              remedy="Give Quantity(..., grid=(10.0, 40.0, 160.0)).")
     if not effect.size.lower <= 0.0 <= effect.size.upper:
         raise InputError(f"the size of effect {effect.name!r} cannot be 0", where="argument effect",

@@ -69,8 +69,9 @@ class HoldOut:
         return (self.variance_after - 1.0) / excess if excess > 0.05 else float("nan")
 
     def __str__(self) -> str:
-        return (f"held out: rms {self.gap.before:.4g} K before, {self.gap.after:.4g} K after, {self.gap.noise:.4g} K noise; "
-                f"whitened variance {self.variance_before:.3g} before, {self.variance_after:.3g} after\n{self.outcome}")
+        return (f"held out: rms {self.gap.before:.4g} K before, {self.gap.after:.4g} K after, {self.gap.noise:.4g} K "
+                f"noise; whitened variance {self.variance_before:.3g} before, {self.variance_after:.3g} after\n"
+                f"{self.outcome}")
 
 
 def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record]) -> HoldOut:
@@ -117,7 +118,7 @@ def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record])
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
     text = (f"The unseen records are predicted within noise and parameter uncertainty (p = {p:.2g})." if ok else
-            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or it changed between them.")
+            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed.")
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
 
 
@@ -169,8 +170,8 @@ def predicted(fit: Refit, reference: Refit, data: list[Data]) -> tuple[float, fl
 def _information_root(J: Array, p: int) -> Array:
     """R with RᵀR the information on the first p unknowns, the others marginalised."""
     rest = J.shape[1] - p
-    R = np.linalg.qr(np.concatenate([J[:, p:], J[:, :p]], axis=1), mode="r")
-    return np.asarray(R[rest:, rest:], np.float64)
+    R: Array = np.asarray(np.linalg.qr(np.concatenate([J[:, p:], J[:, :p]], axis=1)).R, np.float64)
+    return R[rest:, rest:]
 
 
 def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:

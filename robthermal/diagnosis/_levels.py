@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from ._along import Along
 from ._noise_floor import NoiseFloor
@@ -16,6 +15,7 @@ from ._whitening import settled_cost
 Array = NDArray[np.float64]
 LIMIT = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
 _CLOSE = 0.03
+_TRIED = tuple(float(t) for t in np.geomspace(1.0 / LIMIT, LIMIT, 15))  # five per cent apart
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,34 @@ class Levels:
     noise: dict[str, float]
 
     def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
-        """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none."""
+        """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
+
+        Parameters
+        ----------
+        path : Along
+            Simulated record.
+        floor : NoiseFloor
+            Declared levels.
+
+        Returns
+        -------
+        tuple of ndarray
+        """
         noise = np.array([floor.noise[name] * self.noise.get(name, 1.0) for name in path.one.sensors])
         return noise, self.disturbance * np.array([floor.disturbance.get(name, 0.0) for name in path.system.lumps])
 
     def close_to(self, other: Levels) -> bool:
-        """Whether all factors agree within three per cent."""
+        """Whether all factors agree within three per cent.
+
+        Parameters
+        ----------
+        other : Levels
+            To compare with.
+
+        Returns
+        -------
+        bool
+        """
         pairs = [(self.disturbance, other.disturbance)]
         pairs += [(value, other.noise.get(name, 1.0)) for name, value in self.noise.items()]
         return all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
@@ -62,11 +84,8 @@ def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels
     if not any(floor.disturbance.values()):
         return Levels(levels.disturbance, _by_spread(paths, residuals, floor))
     for name in floor.noise:
-        def along_noise(t: float, name: str = name) -> float:
-            return cost(Levels(levels.disturbance, {**levels.noise, name: float(np.exp(t))}))
-        levels = Levels(levels.disturbance, {**levels.noise, name: _best(along_noise)})
-    noise = levels.noise
-    return Levels(_best(lambda t: cost(Levels(float(np.exp(t)), noise))), noise)
+        levels = _best([Levels(levels.disturbance, {**levels.noise, name: factor}) for factor in _TRIED], cost)
+    return _best([Levels(factor, levels.noise) for factor in _TRIED], cost)
 
 
 def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor) -> dict[str, float]:
@@ -80,7 +99,5 @@ def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseF
     return out
 
 
-def _best(cost: object) -> float:
-    edge = float(np.log(LIMIT))
-    found = minimize_scalar(cost, bounds=(-edge, edge), method="bounded", options={"xatol": 0.03})
-    return float(np.exp(found.x))
+def _best(tried: list[Levels], cost: Callable[[Levels], float]) -> Levels:
+    return min(tried, key=cost)

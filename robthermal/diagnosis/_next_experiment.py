@@ -58,8 +58,8 @@ class NextExperiment:
 def next_experiment(entries: Sequence[Entry], *, trials: int = 16, seed: int = 0) -> NextExperiment:
     """Find an input that separates candidates.
 
-    Linearised T-optimality (Hunter and Reiner 1965) with the nominal parameters profiled out: the smallest over the pairs
-    of β² |J'|² (1 - c²) is made as large as `trials` random staircases within the limits allow.
+    Linearised T-optimality (Hunter and Reiner 1965) with the nominal parameters profiled out: the smallest over the
+    pairs of β² |J'|² (1 - c²) is made as large as `trials` random staircases within the limits allow.
 
     Parameters
     ----------
@@ -136,7 +136,8 @@ def separations(entries: Sequence[Entry], record: Record) -> dict[tuple[str, str
     fit = entries[0].fit
     one = fit.structure.data[0]
     trial = Data(record, one.sensors, one.columns, one.readings)
-    bare = replace(fit.structure, data=(trial,), starts=fit.structure.starts[:1]).with_effects(fit.structure.effects[:-1])
+    own = replace(fit.structure, data=(trial,), starts=fit.structure.starts[:1])
+    bare = own.with_effects(fit.structure.effects[:-1])
     v = bare.start(fit.structure.ranges.values(fit.v[:bare.n_parameters]), fit.structure.quantities(fit.v)[:-1])
     paths, whiteners = filters(bare, v, fit.floor, fit.levels)
     J0 = whitened(bare, v, whiteners)[1]

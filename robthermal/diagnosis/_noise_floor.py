@@ -118,8 +118,8 @@ def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[st
     far = [name for name in noise if rough[name] and not 1 / 3 < noise[name] / rough[name] < 3]
     if far:
         listed = ", ".join(f"{name} (declared {noise[name]:.3g} K, record {rough[name]:.3g} K)" for name in far)
-        return Outcome(False, "doubtful", f"The declared noise is far from what the record shows: {listed}. Correct it: "
-                       "every test below rests on it.")
+        return Outcome(False, "doubtful", f"The declared noise is far from what the record shows: {listed}. Correct "
+                       "it: every test below rests on it.")
     if unknown:
         return Outcome(True, "estimated", f"Noise of {', '.join(unknown)} estimated from third differences.")
     return Outcome(True, "declared", "Noise as declared.")

@@ -89,7 +89,17 @@ class Refit:
         return self.project(self.z)
 
     def project(self, columns: Array) -> Array:
-        """Remove from columns (m, ...) what the unknowns can explain."""
+        """Remove from columns what the unknowns can explain.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (m, ...)
+            Whitened.
+
+        Returns
+        -------
+        ndarray, shape (m, ...)
+        """
         return columns - self.basis @ (self.basis.T @ columns)
 
     @property
@@ -108,7 +118,17 @@ class Refit:
         return self.rss / self.degrees_of_freedom
 
     def whiten(self, per_record: Sequence[Array]) -> Array:
-        """Whitened columns (m, k) of changes of the readings (n, n_sensors, k) of every record; 0 at the priors."""
+        """Whiten changes of the readings; the rows of the priors are 0.
+
+        Parameters
+        ----------
+        per_record : sequence of ndarray, shape (n, n_sensors, k)
+            One per record [K].
+
+        Returns
+        -------
+        ndarray, shape (m, k)
+        """
         k = per_record[0].shape[2]
         rows = [w(r).reshape(-1, k) for w, r in zip(self.whiteners, per_record, strict=True)]
         return np.concatenate([*rows, np.zeros((self.z.size - self.n_readings, k))])
@@ -137,11 +157,13 @@ class Refit:
         scale = np.linalg.norm(self.J, axis=0)
         scale[scale == 0] = 1.0
         J = self.J / scale
-        return np.linalg.pinv(J.T @ J, rcond=_FLAT**2, hermitian=True) / np.outer(scale, scale) * max(self.variance, 1.0)
+        inverse = np.linalg.pinv(J.T @ J, rcond=_FLAT**2, hermitian=True)
+        return np.asarray(inverse / np.outer(scale, scale) * max(self.variance, 1.0), np.float64)
 
     def __str__(self) -> str:
-        lines = [f"{name} = {value:.6g}" for name, value in zip(
-            self.structure.ranges.names, self.structure.ranges.values(self.v[:self.structure.n_parameters]), strict=True)]
+        ranges = self.structure.ranges
+        values = ranges.values(self.v[:len(ranges.names)])
+        lines = [f"{name} = {value:.6g}" for name, value in zip(ranges.names, values, strict=True)]
         lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), free-run rms {self.rms:.4g} K")
         return "\n".join([*lines, str(self.levels), str(self.outcome)])
 
@@ -238,7 +260,8 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
 def relinearised(fit: Refit) -> Refit:
     """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
     systems = fit.structure.systems(fit.v)
-    return replace(fit, paths=tuple(along(system, one) for system, one in zip(systems, fit.structure.data, strict=True)))
+    paths = tuple(along(system, one) for system, one in zip(systems, fit.structure.data, strict=True))
+    return replace(fit, paths=paths)
 
 
 def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
@@ -267,5 +290,5 @@ def whitened(structure: Structure, v: Array, whiteners: Sequence[Whitener]) -> t
 def _outcome(found: Descent) -> Outcome:
     if found.converged:
         return Outcome(True, "converged", f"Converged in {found.iterations} evaluations.")
-    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow the "
-                   "bounds, or give priors (sigma) to parameters the data do not determine.")
+    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow "
+                   "the bounds, or give priors (sigma) to parameters the data do not determine.")

@@ -194,7 +194,8 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
     threshold = math.sqrt(max(norm.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
     limit = np.where(visible, (threshold + norm.ppf(POWER)) * math.sqrt(max(fit.variance, 1.0)) / own_safe, np.inf)
-    possible = np.array([_possible(trial, beta, s) for (_, trial), beta, s in zip(trials, size, std, strict=True)], bool)
+    possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
+                         in zip(trials, size, std, strict=True)], bool)
     best = _best_of([number for number, _ in trials], statistic, possible, len(tested))
     return Scores(tuple(trials[i][1] for i in best), size[best], std[best], statistic[best], p_value[best],
                   possible[best] & visible[best], identifiability[best], limit[best], unit[:, best], len(trials))

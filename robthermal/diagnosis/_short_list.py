@@ -83,7 +83,8 @@ class ShortList:
         for entry in self.entries:
             values = ", ".join(f"{name} {value:.4g} ± {std:.2g}" for name, (value, std) in entry.values.items())
             lines.append(f"{entry.candidate.label:<38} {entry.delta_bic:>10.1f} {entry.p_value:>9.2g}  {values}")
-        return "\n".join([*lines, *(f"{name}({', '.join(where)}): {why}" for (name, where), why in self.failed.items())])
+        lines += [f"{name}({', '.join(where)}): {why}" for (name, where), why in self.failed.items()]
+        return "\n".join(lines)
 
     def plot(self) -> Any:
         """Bars of ΔBIC; returns the matplotlib axes."""

@@ -47,7 +47,7 @@ def exchanged(law: Callable[[Array, Array, Values], Array]) -> Signature:
 
 
 def by_heat(add: Add, size: str, step: float) -> Signature:
-    """Difference of the equations with a small effect and without it: for effects that are heat, linear in their size."""
+    """Difference of the equations with a small effect and without it: for heat that is linear in the size."""
 
     def signature(path: Along, where: Where, values: Values) -> Response:
         start, end = path.heat_of(add(path.system, where, {**values, size: step}))

@@ -147,7 +147,7 @@ class Structure:
             run = trajectory(system, one.record, tolerance=self.tolerance, sensitivities=[*names, *initial])
             J = run.sensitivity[:, one.columns]
             slopes = np.zeros((*J.shape[:2], v.size))
-            slopes[..., :len(chain[0])] = J[..., :len(names)] @ chain
+            slopes[..., :chain.shape[1]] = J[..., :len(names)] @ chain
             slopes[..., at:at + start.n_free] = J[..., len(names):] * start.sigma
             out.append(Run(one.readings - run.readings[:, one.columns], slopes))
             at += start.n_free

@@ -121,8 +121,8 @@ def _too_many(problem: Frequency) -> str:
     s, count = problem.system, len(problem.edges) + 1
     narrow = min(s.inputs, s.outputs)
     if count * (s.states + 1) * (s.states + s.inputs * s.outputs + narrow**3) > _MOST_WORK:
-        return (f"{count} intervals of a system with {s.states} states, {s.inputs} inputs and {s.outputs} outputs are too "
-                "many to check together")
+        return (f"{count} intervals of a system with {s.states} states, {s.inputs} inputs and {s.outputs} outputs are "
+                "too many to check together")
     return ""
 
 

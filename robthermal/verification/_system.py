@@ -200,7 +200,7 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
 
 
 def _no_effects(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
-    """Refuse effects of a system file that no claim takes into account: other keys are free, these change the physics."""
+    """Refuse effects of a system file that no claim takes into account: other keys are free, these are physics."""
     for key in keys:
         if key in table:
             raise InputError(f"{key!r} is an effect that no claim takes into account", where=where,

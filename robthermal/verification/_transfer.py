@@ -27,7 +27,7 @@ class Transfer:
 
 
 def too_large(system: LinearSystem) -> str:
-    """Return why exact polynomials of a system would take too long, empty where they do not: n⁴ grows with the digits."""
+    """Return why exact polynomials of a system would take too long, n⁴ times its digits; empty where they do not."""
     n, m, p = system.states, system.inputs, system.outputs
     bits = 1
     for matrix, rows, columns in ((system.A, n, n), (system.B, n, m), (system.C, p, n)):

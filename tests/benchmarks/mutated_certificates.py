@@ -33,8 +33,9 @@ def main(count: int, seed: int) -> int:
         table = run(subject, np.random.default_rng(seed), round(count * subject.share / shares))
         everything += table
         rejected = sum(number for what, number in table.items() if not what.lower().startswith("accepted"))
-        print(f"{subject.kind:>12}: {sum(table.values()):5} judged, {rejected:5} rejected, "
-              f"{sum(table[alarm] for alarm in ALARMS)} wrongly accepted, {time.perf_counter() - start:.0f} s", flush=True)
+        wrong = sum(table[alarm] for alarm in ALARMS)
+        print(f"{subject.kind:>12}: {sum(table.values()):5} judged, {rejected:5} rejected, {wrong} wrongly accepted, "
+              f"{time.perf_counter() - start:.0f} s", flush=True)
     for what, number in sorted(everything.items()):
         print(f"{number:>7}  {what}")
     wrong = sum(everything[alarm] for alarm in ALARMS)

@@ -85,12 +85,71 @@ def test_identified_plants_in_hertz_carry_confidence_circles(random_pair: Callab
     wide = u.with_confidence().envelope
     rng = np.random.default_rng(0)
     circle = G.confidence_radius(0.95)
-    for _ in range(20):  # any plant in the circles of both diagonal entries
-        moved = frf.copy()
-        for k in (0, 1):
-            moved[k, k] += 0.99 * circle[k, k] * np.exp(2j * np.pi * rng.uniform(size=200))
+    for _ in range(20):  # any plant in the circles of all entries
+        moved = frf + circle * np.exp(2j * np.pi * rng.uniform(size=(2, 2, 200)))
         d = rt.coupling.dual_youla(control.FRD(moved, w), (p.P1, p.P2), (p.C1, p.C2))
-        assert np.all(d.envelope[0, 0] <= wide[0, 0] * (1 + 1e-2))
+        assert np.all(np.abs(d.samples - u.samples)[0] <= u.radius[0] * (1 + 1e-9))
+        assert np.all(d.envelope <= wide * (1 + 1e-9))
+
+
+def made_up(response: Array, hertz: Array, deviation: float) -> rt.identify.FrequencyResponse:
+    """2x2 frequency response whose entries have this standard deviation; infinite where it is not known."""
+    n, variance = len(hertz), np.where(np.eye(2), deviation**2, 0.0)
+    return rt.identify.FrequencyResponse(
+        frequencies=hertz, response=response, noise_covariance=np.repeat(variance[:, :, None], n, axis=2),
+        gram=np.repeat(np.eye(2)[:, :, None], n, axis=2), degrees_of_freedom=np.full(n, 200),
+        input_names=["u1", "u2"], output_names=["y1", "y2"], sample_time=0.01, n_samples=4000, method="made up")
+
+
+def test_large_circles_are_bounded_not_linearised() -> None:
+    """The worst phase moves Delta_p a third more than first order says; the bound holds for it."""
+    P, C = control.tf([0.1], [1, -0.9], 0.01), control.tf([2.0], [1.0], 0.01)
+    w = np.array([30.0, 60.0, 200.0])
+    frf = np.zeros((2, 2, 3), dtype=complex)
+    frf[0, 0] = frf[1, 1] = at(P, w)
+    G = made_up(frf, w / (2 * np.pi), 0.07)
+    u = rt.coupling.dual_youla(G, (P, P), (C, C))
+    assert u.radius is not None
+    r, Dp = G.confidence_radius(0.95)[0, 0], abs(u.factors.at(w)["Dp"][0])
+    turns = r * np.exp(1j * np.linspace(0, 2 * np.pi, 400))[:, None]
+    worst = np.max(np.abs(turns * Dp / (1 + 2 * (frf[0, 0] + turns))), axis=0)  # the other entries at rest
+    first_order = r * Dp / abs(1 + 2 * frf[0, 0])
+    assert np.any(worst > 1.3 * first_order) and np.all(u.radius[0, [0, 1], [0, 1]] >= worst * (1 - 1e-6))
+
+
+def test_circles_too_large_for_the_controllers(random_pair: Callable[[int], Pair]) -> None:
+    p = random_pair(2)
+    hertz = np.linspace(0.5, 49.0, 100)
+    frf = np.zeros((2, 2, 100), dtype=complex)
+    frf[0, 0], frf[1, 1] = at(p.P1, 2 * np.pi * hertz), at(p.P2, 2 * np.pi * hertz)
+    for deviation in (1e3, np.inf):
+        u = rt.coupling.dual_youla(made_up(frf, hertz, deviation), (p.P1, p.P2), (p.C1, p.C2))
+        np.testing.assert_allclose(u.envelope, 0, atol=1e-9)  # the samples do not care
+        with pytest.raises(rt.InputError, match="circle of plant 1 at 3.14159 rad/s is unknown or too large"):
+            u.with_confidence()
+
+
+def test_from_a_record_to_filters_that_keep_off_the_circles(random_pair: Callable[[int], Pair]) -> None:
+    p = random_pair(2)
+    rng = np.random.default_rng(0)
+    machine = control.append(1.1 * p.P1, 0.9 * p.P2)
+    U = rng.standard_normal((2, 400))
+    Y = control.forced_response(machine, np.arange(400) * 0.01, U).outputs
+    noisy = Y + 0.03 * np.std(Y) * rng.standard_normal((2, 400))
+    record = rt.Record(sample_time=0.01, inputs=U.T, outputs=noisy.T, input_names=["u1", "u2"],
+                       output_names=["y1", "y2"])
+    args, loops = ((p.P1, p.P2), (p.C1, p.C2)), (p.P1, p.P2, p.C1, p.C2)
+    u = rt.coupling.dual_youla(rt.identify.lpm(record), *args)
+    truth = rt.coupling.dual_youla(control.FRD(at(machine, u.omega), u.omega), *args).samples
+    assert u.radius is not None and np.mean(np.abs(u.samples - truth) <= u.radius) > 0.9  # nominal 0.95
+    wide = u.with_confidence()
+    assert np.mean(np.abs(truth).max(axis=0) <= wide.envelope) > 0.9
+    bold = rt.coupling.synthesize(*loops, uncertainty=u, order=4, margin=0.6)
+    careful = rt.coupling.synthesize(*loops, uncertainty=wide, order=4, margin=0.6)
+    assert bold.holds and careful.holds and careful.norms["robust"] <= 0.4
+    judged = rt.coupling.evaluate(*loops, X_hat=bold.X_hat, Y_hat=bold.Y_hat, uncertainty=wide)
+    assert judged.norms["robust"] > 0.45  # the circles were in the way
+    assert careful.norms["h2"] > bold.norms["h2"]
 
 
 def test_overbound_lies_above_and_is_stable(random_pair: Callable[[int], Pair]) -> None:

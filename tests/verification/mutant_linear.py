@@ -1,11 +1,17 @@
-"""Certificates of linear systems that just hold, and falsifiers: eigenvalues, dense frequency grids, impulse responses."""
+"""Certificates of linear systems that just hold; falsifiers: eigenvalues, dense frequency grids, impulse responses."""
 
 from __future__ import annotations
 
 import certificate_truth as truth
 import numpy as np
 from mutants import Document, Subject, holds
-from scipy.linalg import expm, solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are, solve_discrete_lyapunov
+from scipy.linalg import (
+    expm,
+    solve_continuous_are,
+    solve_continuous_lyapunov,
+    solve_discrete_are,
+    solve_discrete_lyapunov,
+)
 
 _numbers = np.vectorize(truth.number, otypes=[float])
 
@@ -207,7 +213,8 @@ def make_peak(rng: np.random.Generator) -> Document:
         A, B, C, D = matrices(system)
         steady = np.eye(len(A)) - A if system["sample_time"] else -A
         gain = float((D + C @ np.linalg.solve(steady, B))[0, 0])
-        document = {"system": system, "region": {"bound": gain * (1 + 1e-9) + 1e-12}, "evidence": {"method": "positive"}}
+        document = {"system": system, "region": {"bound": gain * (1 + 1e-9) + 1e-12},
+                    "evidence": {"method": "positive"}}
         return document if holds("peak", document) else make_peak(rng)
     system = random_linear(rng)
     A, B, C, D = matrices(system)

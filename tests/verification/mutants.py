@@ -156,8 +156,8 @@ def _swapped(document: Document, rng: np.random.Generator) -> Document | None:
 
 def _cut(document: Document, rng: np.random.Generator) -> Document | None:
     """A list or object loses one item."""
-    path = _pick([path for section in SECTIONS for path in truth.leaves(document[section], (section,)) if len(path) > 2],
-                 rng)
+    path = _pick([path for section in SECTIONS for path in truth.leaves(document[section], (section,))
+                  if len(path) > 2], rng)
     if path is None:
         return None
     del _at(document, path[:-1])[path[-1]]

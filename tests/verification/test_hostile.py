@@ -16,8 +16,8 @@ from robthermal.verification import Certificate, establish, verify
 from robthermal.verification._bernstein import largest_ratio
 from robthermal.verification._definite import eliminate
 
-MODULE = {"hot": "a", "cold": "b", "seebeck": {"value": 0.001, "slope": 0.0}, "resistance": {"value": 4.0, "slope": 0.001},
-          "conductance": {"value": 0.03, "slope": 0.0}, "reference_temperature": 300.0}
+MODULE = {"hot": "a", "cold": "b", "seebeck": {"value": 0.001, "slope": 0.0}, "reference_temperature": 300.0,
+          "resistance": {"value": 4.0, "slope": 0.001}, "conductance": {"value": 0.03, "slope": 0.0}}
 PAIR = {"lumps": {"a": {"capacity": 10.0}, "b": {"capacity": 5.0}}, "ambients": ["room"], "modules": {"m": MODULE},
         "links": [{"between": ["a", "room"], "conductance": 5.0}, {"between": ["b", "room"], "conductance": 5.0}]}
 BOX = {"temperature": [280.0, 320.0], "current": {"m": [-0.1, 0.1]}}
@@ -29,8 +29,8 @@ def contraction(system, region=None, method="energy", **evidence):
 
 
 @pytest.mark.parametrize(("place", "key", "value"), [
-    (("modules", "m"), "thomson", 5.0), (("modules", "m"), "joule_split", 0.3), (("modules", "m"), "drive", {"gain": 2}),
-    (("modules", "m"), "hysteresis", {}), (("links", 0), "step", {"relative": -0.9}), (("lumps", "a"), "condensation", {}),
+    (("modules", "m"), "thomson", 5.0), (("modules", "m"), "joule_split", 0.3), (("modules", "m"), "drive", {}),
+    (("modules", "m"), "hysteresis", {}), (("links", 0), "step", {}), (("lumps", "a"), "condensation", {}),
     (("lumps", "a"), "heat", 1.0), (("lumps", "a"), "gradient", 1.0), ((), "leads", [])])
 def test_effects_that_no_claim_takes_into_account_are_refused(place, key, value):
     """They were read over once: the certificate was then about another machine than its file."""
@@ -157,7 +157,8 @@ def test_numbers_at_the_end_of_the_floats_give_no_traceback():
         for face in ("h", "c"):
             system["lumps"][f"{face}{k}"] = {"capacity": 1.0}
             system["links"].append({"between": [f"{face}{k}", "room"], "conductance": 1e308})
-        system["modules"][f"m{k}"] = {**MODULE, "hot": f"h{k}", "cold": f"c{k}", "seebeck": {"value": 1e308, "slope": -1e308},
+        system["modules"][f"m{k}"] = {**MODULE, "hot": f"h{k}", "cold": f"c{k}",
+                                      "seebeck": {"value": 1e308, "slope": -1e308},
                                       "conductance": {"value": -1e308, "slope": 1e300}}
         region["current"][f"m{k}"] = [-1e308, 1e308]
     refused = contraction(system, region)
@@ -181,7 +182,8 @@ def test_large_boxes_are_read_and_bounded_in_time():
     names = [f"x{k}" for k in range(n)]
     system = {"lumps": {name: {"capacity": 1.0} for name in names}, "ambients": ["room"], "modules": {},
               "links": [{"between": [name, "room"], "conductance": 1.0} for name in names]}
-    region = {"temperature": {name: [280.0, 320.0] for name in names}, "current": {}, "ambient": {"room": [290.0, 310.0]}}
+    region = {"temperature": {name: [280.0, 320.0] for name in names}, "current": {},
+              "ambient": {"room": [290.0, 310.0]}}
     assert establish("invariance", system=system, region=region, evidence={}, made_by={}, margin={}).holds
 
 
