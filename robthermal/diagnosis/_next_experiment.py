@@ -59,7 +59,7 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 16, seed: int = 0
     """Find an input that separates candidates.
 
     Linearised T-optimality (Hunter and Reiner 1965) with the nominal parameters profiled out: the smallest over the
-    pairs of β² |J'|² (1 - c²) is made as large as `trials` random staircases within the limits allow.
+    pairs of β² ‖J'‖² (1 - c²) is made as large as `trials` random staircases within the limits allow.
 
     Parameters
     ----------

@@ -37,17 +37,17 @@ class Scores:
     candidates : tuple of Candidate
         With the best trial values.
     size : ndarray
-        One-step estimate of the size β = J'·z/|J'|², in its unit.
+        One-step estimate of the size β = J'·z/‖J'‖², in its unit.
     std : ndarray
         Its standard deviation.
     statistic : ndarray
-        T = (J'·z)²/(s² |J'|²), F(1, ν) distributed if the candidate is absent.
+        T = (J'·z)²/(s² ‖J'‖²), F(1, ν) distributed if the candidate is absent.
     p_value : ndarray
         Of T, times the number of trials (Bonferroni): family-wise.
     possible : ndarray of bool
         Whether the sign and size are physically possible.
     identifiability : ndarray
-        ρ = |J'|/|J|: the part of the signature that the nominal parameters cannot imitate.
+        ρ = ‖J'‖/‖J‖: the part of the signature that the nominal parameters cannot imitate.
     limit : ndarray
         Detection limit of the size, at the power of 0.9.
     signatures : ndarray, shape (m, k)

@@ -13,12 +13,13 @@ from ..certify import (
     contraction,
     heater_heat,
     largest_current,
+    largest_regulated_current,
     runaway,
     runaway_free,
 )
 from ..errors import InputError
 from ..thermal import System
-from ..verification import Certificate, Verdict, verify
+from ..verification import Certificate, Verdict, not_certified, verify
 from ._schema import DIRECTIONS, METHODS, Boxes, Method
 
 
@@ -141,10 +142,22 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
         limit_of_load = runaway(system, setpoint=boxes.setpoint)
         found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
                   for name, cert in limit_of_load.certificates.items()]
+        progress("searching the largest current while the cold faces are held")
+        found.append(("regulated", "Largest current while the cold faces are held", _held(system, boxes), False))
     progress("verifying every certificate")
     checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
                     for key, title, cert, required in found)
     return Certification(system, boxes, checked, tuple(limits), limit_of_load, safe)
+
+
+def _held(system: System, boxes: Boxes) -> Certificate:
+    """Certificate of the regulated network at its largest current; for what it does not cover, one that says so."""
+    setpoint = boxes.setpoint or {}
+    try:
+        return largest_regulated_current(system, setpoint=setpoint, temperature=boxes.temperature).certificate
+    except InputError as refusal:
+        return not_certified("regulated", system={}, region={"setpoint": setpoint}, evidence={}, reason=str(refusal),
+                             made_by={}, claim="While its cold faces are held, the rest of the network contracts.")
 
 
 def _limit_methods(boxes: Boxes) -> tuple[Method, ...]:
