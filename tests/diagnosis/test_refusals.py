@@ -70,3 +70,15 @@ def test_built_in_name_and_missing_grid_are_refused() -> None:
 def test_declared_noise_far_from_the_record_is_said(plant: rt.System, hide: Callable) -> None:
     floor = rt.diagnosis.noise_floor(plant, hide(n=100)[0], noise=0.5)
     assert floor.outcome.code == "doubtful" and "declared 0.5 K" in floor.outcome.text
+
+
+def test_quiet_record_says_what_it_could_not_show(plant: rt.System) -> None:
+    rng = np.random.default_rng(4)
+    y = 298.15 + 0.01 * rng.standard_normal((200, 2))
+    record = rt.Record(sample_time=5.0, inputs=np.column_stack([np.zeros(200), np.full(200, 298.15)]), outputs=y,
+                       input_names=["heater", "room"], output_names=["Tp", "Tb"])
+    found = rt.diagnose(plant, record)
+    assert found.verdict == "consistent"
+    assert found.not_testable["input_gain", ("heater",)] == "no effect on any reading of these records"
+    assert found.not_testable["input_delay", ("heater",)] == "no effect on any reading of these records"
+    assert ("heat_source", ("plate",)) not in found.not_testable  # that would have been seen

@@ -40,7 +40,7 @@ def holds(kind: str, document: Document) -> bool:
     return establish(kind, **{key: document[key] for key in SECTIONS}, made_by={}, margin={}).holds
 
 
-def run(subject: Subject, rng: np.random.Generator, count: int, per_document: int = 25) -> Counter[str]:
+def run(subject: Subject, rng: np.random.Generator, count: int, per_document: int = 10) -> Counter[str]:
     """Judge ``count`` mutants of one kind."""
     table: Counter[str] = Counter()
     for k in range(count):
