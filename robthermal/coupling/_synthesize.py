@@ -49,7 +49,7 @@ def synthesize(
     """Design coupling filters that make the synchronisation error small, and prove what they reach.
 
     X̂ and Ŷ are combinations of stable basis functions; every map of the coupled loop is affine in the coefficients
-    (Evers 2021, Theorem 6.4 (b)), so the design is one second-order cone program. Robustness |X̂||Ŷ| r1 r2 is not
+    (Evers 2021, Theorem 6.4 (b)), so the design is one second-order cone program. Robustness ``|X̂||Ŷ| r1 r2`` is not
     convex; ellipses inside it that touch it at the last solution are, and are refitted a few times. What comes back is
     evaluated anew: norms valid at every frequency, certificates, and beside them the solver's own values (`requested`).
 

@@ -32,8 +32,8 @@ class Certificate:
     Parameters
     ----------
     kind : str
-        Kind of claim: contraction, invariance, runaway, network, observer, gain, regulated, loop, stability, hinf, peak or
-        frequency.
+        Kind of claim: contraction, invariance, runaway, network, observer, gain, regulated, loop, stability, hinf,
+        peak or frequency.
     claim : str
         One sentence, the one its data give.
     system : mapping
