@@ -14,8 +14,11 @@ from ._joint import joint as joint
 from ._mu import mu as mu
 from ._mu_bound import mu_bound as mu_bound
 from ._mu_result import MuBound as MuBound
+from ._normalized import NormalizedFactors as NormalizedFactors
+from ._normalized import normalized as normalized
 from ._overbound import overbound as overbound
 from ._performance import Performance as Performance
+from ._sampled import discretize as discretize
 from ._simulate import Simulation as Simulation
 from ._simulate import simulate as simulate
 from ._spectra import Spectra as Spectra
@@ -26,7 +29,7 @@ from ._uncertainty import dual_youla as dual_youla
 from ._worst_case import WorstCase as WorstCase
 from ._worst_case import worst_case as worst_case
 
-__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "Performance",
-           "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime", "destabilising",
-           "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound", "overbound", "simulate", "spectra",
-           "synthesize", "worst_case"]
+__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "NormalizedFactors",
+           "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime",
+           "destabilising", "discretize", "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound",
+           "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]
