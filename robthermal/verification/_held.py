@@ -81,6 +81,8 @@ def shares(network: HeldNetwork, method: str, pieces: int) -> tuple[Entries, Gro
     grips = {c: grip(network, k, pieces) for c, k in network.holder.items()}
     fixed, bent, missing = _links(network, method)
     others, missing = _other_modules(network, pieces) if not missing else ([], missing)
+    if any(len(group) << len(_held(group, grips)) > 4 * _MOST for group in bent + others):
+        return {}, [], "too many combinations of modules that share lumps with cold faces to check them one by one"
     groups = [_passed_on(network, group, grips) for group in bent + others]
     for c, k in network.holder.items():
         slopes = {j: value for (i, j), value in fixed.items() if i == c}
@@ -140,7 +142,7 @@ def _holding(network: HeldNetwork, k: int, own: Grip, slopes: Mapping[int, fmpq]
 
 def _passed_on(network: HeldNetwork, group: Sequence[Alternative], grips: Mapping[int, Grip]) -> list[Alternative]:
     """Return alternatives with the rows of held lumps passed on to the hot lumps, with either end of their factors."""
-    held = sorted({i for item in group for i, _ in item.entries if i in grips})
+    held = _held(group, grips)
     found = []
     for item, factors in product(group, product(*(sorted(set(grips[c].factor)) for c in held))):
         at = dict(zip(held, factors, strict=True))
@@ -152,6 +154,11 @@ def _passed_on(network: HeldNetwork, group: Sequence[Alternative], grips: Mappin
                 _add(entries, {(i, j): value})
         found.append(Alternative(entries, item.where))
     return found
+
+
+def _held(group: Sequence[Alternative], grips: Mapping[int, Grip]) -> list[int]:
+    """Return the held lumps that a group touches."""
+    return sorted({i for item in group for i, _ in item.entries if i in grips})
 
 
 def _links(network: HeldNetwork, method: str) -> tuple[Entries, Groups, str]:
