@@ -106,7 +106,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     >>> law = rt.design.feedback_linearization(system, current_limits=(-0.2, 0.5))
     >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.05, sample_time=1.0)
     >>> print(rt.design.certify_loop(system, pi, law))
-    Certified: whatever its start in the box, 4.7 to 36.7 °C, the loop forgets it, with limits active or not.
+    Certified: whatever its start in the box, 6.0 to 36.7 °C, the loop forgets it, with limits active or not.
     """
     expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     limits = _limits(system, law)

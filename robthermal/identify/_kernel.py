@@ -39,10 +39,10 @@ class ChunkFit:
 
 
 class Kernel:
-    """Solver of chunks of interior windows for one set of spectra, without their first bins `before`, and one basis."""
+    """Solver of chunks of interior windows for one set of spectra and one basis."""
 
-    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis, before: int = 0):
-        self.spectra, self.basis, self.before = spectra, basis, before
+    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis):
+        self.spectra, self.basis = spectra, basis
         self.n_u, self.n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
         offsets = np.arange(-basis.half_width, basis.half_width + 1.0)
         self.powers = basis.powers(offsets)  # (m, R+1)
@@ -61,8 +61,7 @@ class Kernel:
         return self._orthogonalise(columns, energy, full_noise=full_noise)
 
     def _slices(self, start: int, stop: int) -> slice:
-        first = start - 1 - self.before
-        return slice(first - self.basis.half_width, first + stop - start + self.basis.half_width)
+        return slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
 
     def _polynomial(self, start: int, stop: int) -> Array:
         """Columns with the transient projected out, (n_columns, rows, B)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 from robthermal.errors import InputError
 
 from ._basis import LocalBasis
-from ._kernel import ChunkFit, Kernel
-from ._parallel import in_processes, processors, run_all
+from ._kernel import Kernel
 from ._records import Spectrum
+from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
 
 Array = NDArray[Any]
 
 _CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
 _CHUNK_MOST = 4096  # and not so many bins that threads would wait for each other
-_BLOCK = 32  # chunks that a process gets at a time
-_LONG = 5e8  # entries of all columns of all windows from which processes are worth their start
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
 _FULL_NOISE_BYTES = 2**29  # above this the full noise covariance is computed only for the bins asked for
 
@@ -153,30 +151,16 @@ class LocalEstimate:
         points = len(self.spectra) * self.basis.n_points
         chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
 
-        def store(a: int, fit: ChunkFit) -> None:
-            part = slice(a - start, a - start + fit.doubtful.size)
+        def solve(a: int) -> None:
+            b = min(a + chunk, last)
+            fit = kernel.solve(a, b, full_noise=found.noise is not None)
+            part = slice(a - start, b - start)
             found.response[..., part], found.gram[..., part] = fit.response, fit.gram
             _store_noise(found, part, fit.noise)
             exact[part] = fit.doubtful
 
-        full = found.noise is not None
-        if processors() > 1 and (last - first) * float(kernel.n_columns * points) > _LONG:
-            # Threads wait for each other between numpy's calls (measured: 1.2 to 1.4 times with two); processes do not.
-            starts = range(first, last, _BLOCK * chunk)
-            calls = [partial(self._block, a, min(a + _BLOCK * chunk, last), chunk, full) for a in starts]
-            for a, fits in zip(starts, in_processes(_solve_block, calls), strict=True):
-                for place, fit in enumerate(fits):
-                    store(a + place * chunk, fit)
-            return
         starts = range(first, last, chunk)
-        run_all(lambda a: store(a, kernel.solve(a, min(a + chunk, last), full_noise=full)), starts,
-                worth=len(starts) >= 4)
-
-    def _block(self, start: int, stop: int, chunk: int, full_noise: bool) -> tuple[Any, ...]:
-        """What another process needs for bins start ... stop-1: only their part of the spectra travels."""
-        before, after = start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width
-        cut = [Spectrum(s.U[:, before:after], s.Y[:, before:after], s.n_samples) for s in self.spectra]
-        return cut, self.basis, before, range(start, stop, chunk), stop, full_noise
+        run_all(solve, starts, worth=len(starts) >= 4)
 
     def _solve_exactly(self, found: LocalArrays, bins: Array, place: Array) -> None:
         fit = solve_windows(regression(self.spectra, self.basis, bins))
@@ -192,10 +176,3 @@ def _store_noise(found: LocalArrays, part: Any, noise: Array) -> None:
     found.variance[:, part] = np.einsum("oob->ob", noise).real
     if found.noise is not None:
         found.noise[..., part] = noise
-
-
-def _solve_block(spectra: Sequence[Spectrum], basis: LocalBasis, before: int, starts: range, stop: int,
-                 full_noise: bool) -> list[ChunkFit]:
-    """The chunks of one block, in a process of its own."""
-    kernel = Kernel(spectra, basis, before)
-    return [kernel.solve(a, min(a + starts.step, stop), full_noise=full_noise) for a in starts]

@@ -15,10 +15,10 @@ from robthermal.signals import Record
 from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._parallel import run_all
 from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
+from ._threads import run_all
 from ._windows import RANK_TOLERANCE, regression
 
 Array = NDArray[Any]

@@ -13,7 +13,7 @@ from scipy import fft
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
-from ._parallel import run_all
+from ._threads import run_all
 
 Array = NDArray[Any]
 

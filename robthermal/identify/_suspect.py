@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import stats
 
-from ._parallel import run_all
+from ._threads import run_all
 
 Array = NDArray[Any]
 

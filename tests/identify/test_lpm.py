@@ -7,7 +7,6 @@ import pytest
 from scipy import stats
 
 import robthermal as rt
-from robthermal.identify import _local
 
 L, R = 8, 2
 
@@ -236,21 +235,3 @@ def test_two_periods_of_a_multisine_are_estimated_at_the_lines_between_too() -> 
     G = rt.identify.lpm(record)
     inside = abs(G.response[0, 0] - 3.0) < G.confidence_radius()[0, 0]
     assert 0.9 < inside.mean() < 0.99
-
-
-@pytest.mark.parametrize("poles", [None, [-0.02, -0.3]])
-def test_processes_give_what_threads_give(monkeypatch: pytest.MonkeyPatch, poles: list[float] | None) -> None:
-    rng = np.random.default_rng(8)
-    records = [rt.Record(sample_time=1.0, inputs=rng.normal(size=(30_000, 2)), outputs=rng.normal(size=(30_000, 2)),
-                         input_names=["u", "v"], output_names=["y", "z"]) for _ in range(2)]
-
-    def estimate() -> rt.identify.FrequencyResponse:
-        return rt.identify.lpm(records) if poles is None else rt.identify.lrmp(records, poles)
-
-    expected = estimate()
-    monkeypatch.setattr(_local, "_LONG", 0.0)
-    monkeypatch.setattr(_local, "_BLOCK", 3)
-    monkeypatch.setattr(_local, "processors", lambda: 2)
-    found = estimate()
-    np.testing.assert_array_equal(found.response, expected.response)
-    np.testing.assert_array_equal(found.noise_covariance, expected.noise_covariance)
