@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import warnings
 from pathlib import Path
@@ -137,6 +138,30 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
     rt.thermal.write_system(fit.system, out)
     answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
     exit_unless(bool(fit.outcome))
+
+
+@app.command()
+def diagnose(system: SystemFile,
+             records: Annotated[list[Path], typer.Argument(help="Training records.", metavar="TRAIN.csv...")],
+             validation: Annotated[list[Path] | None, typer.Option(
+                 "--validation", help="Record that no fit sees, may repeat.")] = None,
+             out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
+    """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
+
+    Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
+    """
+    found = rt.read_system(system)
+    train, held_out = ([rt.read_record(path, found) for path in paths] for paths in (records, validation or []))
+    rt.project.check_free(out)
+    with progress() as stage:
+        result = rt.project.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage)
+        stage("writing the report")
+        rt.project.write_diagnosis(result, out)
+    summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),
+               "report": str(out / "report.html")}
+    answer(summary, as_json, lambda: say(str(result.diagnosis), f"augmented system: {out / 'augmented.toml'}",
+                                         f"report: {out / 'report.html'}"))
+    exit_unless(result.holds)
 
 
 @app.command()

@@ -24,7 +24,7 @@ from robthermal import cli
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
 COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "design", "map", "certify",
-            "couple", "verify"]
+            "couple", "diagnose", "verify"]
 
 SYSTEM = """
 [system]

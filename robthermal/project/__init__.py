@@ -16,6 +16,10 @@ from ._design import design_system as design_system
 from ._design_report import write_design as write_design
 from ._design_request import DesignRequest as DesignRequest
 from ._design_request import design_from_text as design_from_text
+from ._diagnose import Diagnosed as Diagnosed
+from ._diagnose import Residuals as Residuals
+from ._diagnose import diagnose_records as diagnose_records
+from ._diagnose_report import write_diagnosis as write_diagnosis
 from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
 from ._frequency import design_excitation as design_excitation
@@ -35,8 +39,8 @@ from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
-           "DesignRequest", "JobResult", "MapRequest", "Project", "boxes_from_text", "certificate_files",
-           "certify_system", "check_free", "couple_subsystems", "demo_project", "design_excitation",
-           "design_from_text", "design_system", "estimate_response", "map_from_text", "map_system", "output_folder",
-           "read_coupling", "read_project", "run_job", "write_certify", "write_coupling", "write_design",
-           "write_excitation", "write_job", "write_map"]
+           "DesignRequest", "Diagnosed", "JobResult", "MapRequest", "Project", "Residuals", "boxes_from_text",
+           "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
+           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response",
+           "map_from_text", "map_system", "output_folder", "read_coupling", "read_project", "run_job", "write_certify",
+           "write_coupling", "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]

@@ -11,10 +11,12 @@ from ._figure import Figure as Figure
 from ._html import write_html as write_html
 from ._provenance import file_hash as file_hash
 from ._provenance import versions as versions
+from ._residuals import residuals_before_after as residuals_before_after
 from ._style import house_style as house_style
 from ._summaries import write_json as write_json
 from ._summaries import write_junit as write_junit
 from ._traces import measured_against_model as measured_against_model
 
 __all__ = ["Claim", "Figure", "Report", "Section", "Table", "box_ranges", "current_limits", "file_hash", "house_style",
-           "load_curve", "measured_against_model", "versions", "write_html", "write_json", "write_junit"]
+           "load_curve", "measured_against_model", "residuals_before_after", "versions", "write_html", "write_json",
+           "write_junit"]

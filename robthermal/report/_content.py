@@ -43,6 +43,8 @@ class Claim:
         Kind of certificate.
     seconds : float, optional
         Duration of the check [s].
+    tested : bool, optional
+        Whether it is the result of a test on data: nothing is proven then, and `verified` is None.
 
     Raises
     ------
@@ -68,6 +70,7 @@ class Claim:
     file: str = ""
     kind: str = ""
     seconds: float = 0.0
+    tested: bool = False
 
     def __post_init__(self) -> None:
         # "no" and NaN are true in Python; here they would turn a badge green.
@@ -76,17 +79,21 @@ class Claim:
             raise InputError(f"holds is {self.holds!r}", where=where, expected="True or False")
         if self.verified is not None and not isinstance(self.verified, (bool, np.bool_)):
             raise InputError(f"verified is {self.verified!r}", where=where, expected="True, False or None")
+        if self.tested and self.verified is not None:
+            raise InputError(f"verified is {self.verified!r}", where=where, expected="None: a test proves nothing")
         if not (isfinite(self.seconds) and self.seconds >= 0.0):
             raise InputError(f"seconds is {self.seconds!r}", where=where, expected="a duration ≥ 0 in seconds")
 
     @property
     def good(self) -> bool:
-        """Holds, and the independent check confirmed it."""
-        return bool(self.holds) and bool(self.verified)
+        """Holds, and the independent check confirmed it, where it is a proof."""
+        return bool(self.holds) and bool(self.tested or self.verified)
 
     @property
     def status(self) -> str:
-        """In words, for people: one of three."""
+        """In words, for people."""
+        if self.tested:
+            return "Passed" if self.holds else "Not passed"
         if not self.holds:
             return "Not proven"
         return "Proven and verified" if self.verified else "Not verified"
@@ -99,7 +106,7 @@ class Claim:
         if self.reason:
             return self.reason
         if not self.holds:
-            return "no proof was found"
+            return "the test failed" if self.tested else "no proof was found"
         return f"the independent check {'was not run' if self.verified is None else 'did not confirm it'}"
 
 
@@ -232,6 +239,8 @@ class Report:
         Everything the claims rest on.
     generated : str
         When, as text.
+    answer : str, optional
+        In a word, for the badge of a report whose claims are tests on data; nothing is called certified then.
 
     Examples
     --------
@@ -248,6 +257,7 @@ class Report:
     provenance: Mapping[str, str]
     assumptions: Sequence[str]
     generated: str
+    answer: str = ""
 
     @property
     def holds(self) -> bool:

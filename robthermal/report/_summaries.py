@@ -106,8 +106,14 @@ def _cases(report: Report) -> list[ElementTree.Element]:
         seen[claim.title] += 1  # pipelines drop a second case of the same name
         name = claim.title if seen[claim.title] == 1 else f"{claim.title} [{seen[claim.title]}]"
         about = f"{claim.sentence}\nbox: {claim.box}\nmargin: {claim.margin}\nhow: {claim.how}\nfile: {claim.file}"
-        cases.append(_case(name, claim.seconds, claim.why, "not verified" if claim.holds else "not certified", about))
+        cases.append(_case(name, claim.seconds, claim.why, _failure(claim), about))
     return cases
+
+
+def _failure(claim: Claim) -> str:
+    if claim.tested:
+        return "not passed"
+    return "not verified" if claim.holds else "not certified"
 
 
 def _case(name: str, seconds: float, why: str, kind: str, about: str) -> ElementTree.Element:

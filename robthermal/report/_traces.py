@@ -53,7 +53,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     """
     t = np.asarray(time, dtype=float)
     pairs = _pairs(t, measured, model)
-    scale, unit = _time_unit(t)
+    scale, unit = time_unit(t)
     with house_style():
         figure, axes = canvas(4.4 if residual else 3.0, 2 if residual else 1, sharex=True, squeeze=False,
                               height_ratios=(2, 1) if residual else None)
@@ -133,7 +133,8 @@ def _pairs(
     return pairs
 
 
-def _time_unit(time: Array) -> tuple[float, str]:
+def time_unit(time: Array) -> tuple[float, str]:
+    """Seconds in the unit that suits a record, and its name."""
     span = float(time[-1] - time[0])
     if span > 4 * 3600.0:
         return 3600.0, "h"

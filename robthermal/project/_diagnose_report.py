@@ -1,0 +1,205 @@
+"""Report and files of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..diagnosis import Diagnosis, effects
+from ..report import (
+    Figure,
+    Report,
+    Section,
+    Table,
+    house_style,
+    residuals_before_after,
+    write_html,
+    write_json,
+    write_junit,
+)
+from ..signals import Record
+from ..thermal import write_system
+from ._diagnose import Diagnosed, Residuals
+from ._diagnose_claims import diagnosis_assumptions, diagnosis_claims
+from ._diagnose_ranking import ranking
+from ._folder import output_folder
+from ._write import now, provenance, subtitle
+
+_DRAWN = 6  # sensors: as many as there are colours
+
+
+def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
+    """Write a diagnosis into a folder, which appears only when complete.
+
+    Parameters
+    ----------
+    result : Diagnosed
+        From `diagnose_records`.
+    out : str or Path
+        Output folder: diagnosis.json, augmented.toml, report.html, junit.xml, summary.json; next_experiment.csv if one
+        was found.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds something else.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> drive = rt.Record(sample_time=10.0, inputs=np.repeat([4.0, 0.0, 6.0, 2.0], 50), outputs=np.zeros((200, 0)),
+    ...                   input_names=["heater"], output_names=[])
+    >>> run = rt.thermal.simulate(bar, drive)
+    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> rt.project.write_diagnosis(rt.project.diagnose_records(bar, (), [noisy]), "diagnosed").answer
+    'CONSISTENT'
+    """
+    found = result.diagnosis
+    report = Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
+                    claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)),
+                    provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
+                    generated=now(), answer=found.verdict.upper())
+    with output_folder(out) as folder:
+        found.save(folder / "diagnosis.json")
+        write_system(found.system, folder / "augmented.toml")
+        _write_experiment(found, folder / "next_experiment.csv")
+        write_html(report, folder / "report.html")
+        write_junit(report, folder / "junit.xml")
+        write_json(report, folder / "summary.json")
+    return report
+
+
+def _write_experiment(found: Diagnosis, path: Path) -> None:
+    """Inputs to apply; without the predicted readings, which somebody would take for measured ones."""
+    if found.next_experiment is not None:
+        plan, system = found.next_experiment.record, found.system
+        inputs = Record(sample_time=plan.sample_time, inputs=plan.inputs, outputs=np.zeros((len(plan), 0)),
+                        input_names=plan.input_names, output_names=[])
+        ambients = [name for name in plan.input_names if name in system.ambients]
+        inputs.save(path, temperature_unit=system.temperature_unit if ambients else "K", temperatures=ambients or None)
+
+
+def _sections(result: Diagnosed) -> Iterator[Section]:
+    found = result.diagnosis
+    yield _effect_section(found)
+    yield _gap_section(result)
+    yield Section("Candidates", "Every effect of the catalogue at every place of the system, ranked by what it "
+                  "explains after the nominal parameters were refitted. The limit is the size that would have been "
+                  "seen with a probability of 0.9 beside the misfit of the nominal system.",
+                  tables=(Table(ranking(found), "Candidates, and why each was taken or not.", digits=3),),
+                  anchor="candidates")
+    yield _located_section(found)
+    yield _unseen_section(found)
+    yield _next_section(found)
+
+
+def _effect_section(found: Diagnosis) -> Section:
+    listed = found.effects or found.provisional
+    rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std, "unit": unit,
+             "ΔBIC": effect.delta_bic, "p": effect.p_value}
+            for effect in listed for name, (value, std, unit) in effect.values.items()]
+    text = found.outcome.text
+    if found.provisional:
+        text += ("\n\nThe effects below help, but do not explain everything: they are not names, and augmented.toml "
+                 "does not hold them.")
+    tables = [Table(pd.DataFrame(rows), "Effects, in order of acceptance.")] if rows else []
+    others = [{"accepted": effect.label, "cannot be excluded": f"{name}({', '.join(where)})"}
+              for effect, names in zip(found.effects, found.alternatives, strict=True) for name, where in names]
+    if others:
+        tables.append(Table(pd.DataFrame(others), "What these records cannot tell from it."))
+    return Section("What was found", text, tables=tables, anchor="effects")
+
+
+def _gap_section(result: Diagnosed) -> Section:
+    found = result.diagnosis
+    rows = [{"records": kind, "before [K]": gap.before, "after [K]": gap.after, "noise alone [K]": gap.noise}
+            for kind, gap in found.gap.items()]
+    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before [K]": _rms(one.before[name]),
+              "after [K]": _rms(one.after[name]), "noise alone [K]": float("nan")}
+             for one in result.residuals for name in one.before]
+    text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
+            "the validation records only the initial temperatures were estimated, from the first tenth.")
+    if found.provisional:
+        text += " The effects are provisional, not names."
+    figures = tuple(_figure(one, found) for one in result.residuals)
+    return Section("Residual before and after", text, figures=figures,
+                   tables=(Table(pd.DataFrame(rows), "Residuals, root mean square; all sensors, then each."),),
+                   anchor="gap")
+
+
+def _figure(one: Residuals, found: Diagnosis) -> Figure:
+    names = sorted(one.before, key=lambda name: -_rms(one.before[name]))[:_DRAWN]
+    drawn = residuals_before_after(one.time, {n: one.before[n] for n in names}, {n: one.after[n] for n in names},
+                                   noise=found.gap[one.kind].noise, title=f"{one.kind}: {one.name}")
+    shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
+    return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
+                       caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
+                       "alone would give.")
+
+
+def _located_section(found: Diagnosis) -> Section:
+    where = found.located
+    lumps = pd.DataFrame({"lump": list(where.lumps), "F of an extra heat": [where.strength[n] for n in where.lumps],
+                          "p": list(where.lumps.values())}).sort_values("F of an extra heat", ascending=False,
+                                                                        ignore_index=True)
+    sensors = pd.DataFrame({"sensor": list(where.sensors), "p of whiteness": list(where.sensors.values())})
+    text = ("Of the nominal system, refitted. An extra heat into a lump stands for anything that acts there. The "
+            "misfit over operating conditions:\n\n" + "\n\n".join(where.conditions))
+    with house_style():
+        figure = _from_axes(where.plot(), "Evidence of an extra heat by lump.", "F statistic of an extra heat.")
+    return Section("Where the misfit sits", text, figures=(figure,),
+                   tables=(Table(lumps, "Lumps.", digits=3), Table(sensors, "Sensors.", digits=3)), anchor="located")
+
+
+def _unseen_section(found: Diagnosis) -> Section:
+    rows = [{"effect": effect, "where": ", ".join(where), "why": why}
+            for (effect, where), why in found.not_testable.items()]
+    if not rows:
+        return Section("What could not have been seen", "Every candidate of a physically possible size would have "
+                       "been seen.", anchor="not-testable")
+    return Section("What could not have been seen", "These records are silent about the following; their absence from "
+                   "the answer means nothing.", tables=(Table(pd.DataFrame(rows), "Not testable."),),
+                   anchor="not-testable")
+
+
+def _next_section(found: Diagnosis) -> Section:
+    plan = found.next_experiment
+    if plan is not None:
+        with house_style():
+            figure = _from_axes(plan.plot(), "Inputs of the next experiment and the readings predicted.",
+                                "Inputs to apply, and what the best candidate predicts.")
+        return Section("Next experiment", f"{plan.advice} The inputs are in next_experiment.csv.", figures=(figure,),
+                       anchor="next")
+    return Section("Next experiment", _advice(found), anchor="next")
+
+
+def _advice(found: Diagnosis) -> str:
+    if found.verdict == "ambiguous":
+        known = effects()
+        names = {effect.effect for effect in found.effects}
+        names |= {name for others in found.alternatives for name, _ in others}
+        hints = [f"{name}: {known[name].separated_by}." for name in sorted(names) if known[name].separated_by]
+        return "\n\n".join(["The alternatives act alike on every reading: no input separates them. What does:", *hints])
+    if found.verdict == "unexplained":
+        return ("Look at the lump, sensor and conditions above; repeat the experiment there, with more sensors. A "
+                "cause outside the catalogue can be added with rt.diagnosis.register_effect.")
+    return "There is nothing to separate. Larger or faster inputs lower the detection limits of the table above."
+
+
+def _from_axes(axes: Any, alt: str, caption: str) -> Figure:
+    return Figure.draw(np.ravel(axes)[0].figure, alt=alt, caption=caption)
+
+
+def _rms(values: Any) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

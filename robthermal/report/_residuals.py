@@ -1,0 +1,70 @@
+"""Drawing of what a model leaves unexplained, before and after it was changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import InputError
+from ._style import COLOURS, canvas, house_style, plain
+from ._traces import thin, time_unit
+
+
+def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
+                           noise: float = 0.0, title: str = "") -> Any:
+    """Draw residuals of the same readings for two models, one below the other and on one scale.
+
+    Parameters
+    ----------
+    time : array_like
+        Sample times [s].
+    before, after : mapping
+        {sensor: measured − model} [K], of the same sensors.
+    noise : float, optional
+        Band of twice this size [K]; none by default.
+    title : str, optional
+        Heading.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        No sensors, different sensors, arrays of different length.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> figure = rt.report.residuals_before_after([0.0, 1.0], {"T1": [1.0, 2.0]}, {"T1": [0.1, -0.1]})
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['before', 'after']
+    """
+    t = np.asarray(time, dtype=float)
+    if not before or list(before) != list(after):
+        raise InputError(f"sensors {list(before)} before and {list(after)} after", where="residuals_before_after",
+                         expected="the same sensors, at least one")
+    for name, values in [*before.items(), *after.items()]:
+        if np.shape(values) != t.shape:
+            raise InputError(f"{name!r} has shape {np.shape(values)}", where="residuals_before_after",
+                             expected=f"one value per time, shape {t.shape}")
+    scale, unit = time_unit(t)
+    with house_style():
+        figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
+        for ax, residuals, what in zip(axes, (before, after), ("before", "after"), strict=True):
+            for i, (name, values) in enumerate(residuals.items()):
+                ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=COLOURS[i % len(COLOURS)],
+                        linestyle=("-", "--", ":")[i // len(COLOURS) % 3], linewidth=0.8, label=plain(name))
+            if noise > 0:
+                ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
+            ax.set(ylabel="measured −\nmodel [K]", title=what)
+            ax.margins(x=0.01)
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
+        axes[-1].set(xlabel=f"time [{unit}]")
+        if title:
+            figure.suptitle(plain(title), x=0.02, ha="left")
+    return figure

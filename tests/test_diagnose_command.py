@@ -1,0 +1,248 @@
+"""robthermal diagnose: exit status, files, refusals; data from scipy, so that nothing of the package makes them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import robthermal as rt
+from robthermal import cli
+
+H, DWELL = 5.0, 20
+FILES = ["augmented.toml", "diagnosis.json", "junit.xml", "report.html", "summary.json"]
+SYSTEM = """
+[system]
+name = "block on a plate"
+temperature_unit = "degC"
+
+[ambients.room]
+temperature = 25.0
+
+[lumps.plate]
+capacity = 120.0
+
+[lumps.block]
+capacity = 40.0
+
+[[links]]
+between = ["plate", "room"]
+conductance = 0.6
+
+[[links]]
+between = ["plate", "block"]
+conductance = 1.5
+
+[inputs.heater]
+lump = "block"
+limits = [0.0, 12.0]
+
+[sensors.Tp]
+lump = "plate"
+noise = 0.01
+
+[sensors.Tb]
+lump = "block"
+noise = 0.01
+
+[fit]
+"lumps.plate.capacity" = { lower = 30.0, upper = 480.0, sigma = 12.0 }
+"links.plate-room.conductance" = { lower = 0.15, upper = 2.4, sigma = 0.06 }
+"""
+Run = Callable[..., tuple[int, str, str]]
+
+
+def nothing(t: float, T: np.ndarray) -> np.ndarray:
+    return np.zeros(2)
+
+
+def across(t: float, T: np.ndarray) -> np.ndarray:
+    """A heat path from block to room that the system file does not have."""
+    return np.array([0.0, -0.12 * (T[1] - 25.0)])
+
+
+def constant(t: float, T: np.ndarray) -> np.ndarray:
+    """One heat with several names: source, gradient of the ambient, self-heating of the sensor."""
+    return np.array([0.4, 0.0])
+
+
+def measure(path: Path, hidden: Callable[[float, np.ndarray], np.ndarray], seed: int, n: int) -> Path:
+    rng = np.random.default_rng(seed)
+    heater = rng.choice([0.0, 3.0, 7.0, 11.0], n // DWELL)
+    T, rows = np.array([25.0, 25.0]), []
+    for k, q in enumerate(heater):
+        def rate(t: float, T: np.ndarray, q: float = q) -> np.ndarray:
+            flow = 1.5 * (T[1] - T[0])
+            heat = np.array([flow - 0.62 * (T[0] - 25.0), q - flow]) + hidden(t, T)
+            return heat / np.array([123.0, 40.0])
+
+        t = H * np.arange(k * DWELL, (k + 1) * DWELL + 1)
+        run = solve_ivp(rate, (t[0], t[-1]), T, t_eval=t, max_step=5.0, rtol=1e-8, atol=1e-8)
+        T = run.y[:, -1]
+        rows += [(time, q, *y) for time, y in zip(t[:-1], run.y.T[:-1], strict=True)]
+    table = np.array(rows)
+    table[:, 2:] += 0.01 * rng.standard_normal((n, 2))
+    np.savetxt(path, table, delimiter=",", header="time,heater,Tp,Tb", comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    def command(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["robthermal", *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        said = capsys.readouterr()
+        return int(stop.value.code or 0), said.out, said.err
+
+    return command
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., tuple[Path, Path, Path]]:
+    folder = tmp_path_factory.mktemp("records")
+    (folder / "setup.toml").write_text(SYSTEM, encoding="utf-8")
+
+    def made(hidden: Callable[[float, np.ndarray], np.ndarray]) -> tuple[Path, Path, Path]:
+        train, unseen = (folder / f"{hidden.__name__}_{kind}.csv" for kind in ("train", "unseen"))
+        if not train.exists():
+            measure(train, hidden, 1, 400)
+            measure(unseen, hidden, 2, 200)
+        return folder / "setup.toml", train, unseen
+
+    return made
+
+
+def free_run(system: Path, record: Path) -> np.ndarray:
+    """Residual of a file from outside: simulated from the true start, 25 °C everywhere."""
+    found = rt.read_system(system)
+    measured = rt.read_record(record, found)
+    model = rt.thermal.simulate(found, measured, initial=dict.fromkeys(found.lumps, 298.15))
+    return measured.outputs - np.column_stack([model[name] for name in measured.output_names])
+
+
+@pytest.fixture(scope="module")
+def out(files: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    system, train, unseen = files(across)
+    found = rt.read_system(system)
+    result = rt.project.diagnose_records(found, (system, train, unseen), [rt.read_record(train, found)],
+                                         [rt.read_record(unseen, found)])
+    folder = tmp_path_factory.mktemp("named") / "out"
+    rt.project.write_diagnosis(result, folder)
+    return folder
+
+
+class TestNamed:
+    def test_diagnosis_json_has_the_keys_of_its_contract(self, out: Path) -> None:
+        found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
+        assert {"format", "verdict", "effects", "alternatives", "located", "gap", "not_testable",
+                "next_experiment"} <= set(found)
+        assert (found["format"], found["verdict"]) == ("robthermal-diagnosis/1", "named")
+        assert [(e["effect"], e["where"]) for e in found["effects"]] == [("missing_ambient_link", ["block", "room"])]
+        size = found["effects"][0]["parameters"]["conductance"]
+        assert abs(size["value"] - 0.12) < 4 * size["std"] and size["unit"] == "W/K"
+
+    def test_augmented_toml_closes_the_gap_on_unseen_data(self, out: Path, files: Any) -> None:
+        """The files alone, free runs by another way than the diagnosis's own."""
+        system, _, unseen = files(across)
+        gap = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["gap"]["validation"]
+        before, after = (np.sqrt(np.mean(free_run(file, unseen) ** 2)) for file in (system, out / "augmented.toml"))
+        assert before > 0.2 and after == pytest.approx(gap["after"], rel=0.1) and after < 0.012
+
+    def test_junit_and_summary_are_tests_not_proofs(self, out: Path) -> None:
+        cases = ElementTree.parse(out / "junit.xml").getroot().findall(".//testcase")
+        assert [case.get("name") for case in cases] == [
+            "Verdict: named", "Nothing is left in the training records", "Unseen records are predicted"]
+        assert not any(case.findall("failure") for case in cases)
+        summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+        assert summary["holds"] and all(c["tested"] and c["verified"] is None for c in summary["claims"])
+
+    def test_the_report_says_what_was_found_and_never_that_it_is_certified(self, out: Path) -> None:
+        page = (out / "report.html").read_text(encoding="utf-8")
+        for words in ("Diagnosis report", "✓</span> NAMED", "missing_ambient_link(block, room)", "accepted, ΔBIC",
+                      "which it resembles", "no more than noise", "Residual before and after", "train: across_train",
+                      "validation: across_unseen", "Where the misfit sits", "What could not have been seen",
+                      "Next experiment", "SHA-256 of across_unseen.csv", "nothing here is proven"):
+            assert words in page, words
+        assert "ertified" not in page and "CERTIFIED" not in page and "robthermal verify" not in page
+
+
+def test_consistent_is_yes(run: Run, files: Any, tmp_path: Path) -> None:
+    system, train, unseen = files(nothing)
+    out = tmp_path / "out"
+    status, said, warned = run("diagnose", system, train, "--validation", unseen, "--out", out, "--json")
+    assert (status, warned) == (0, "")
+    found = json.loads(said)
+    assert found["verdict"] == "consistent" and found["effects"] == [] and found["out"] == str(out)
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    assert set(found) == set(json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))) | {"out", "report"}
+
+
+def test_without_validation_the_report_says_so(run: Run, files: Any, tmp_path: Path) -> None:
+    system, train, _ = files(nothing)
+    status, said, _ = run("diagnose", system, train, "--out", tmp_path / "out")
+    assert status == 0 and "verdict: consistent" in said
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "No validation record was given" in page and "Unseen records are predicted" not in page
+
+
+def test_ambiguous_is_no_and_lists_the_others(run: Run, files: Any, tmp_path: Path) -> None:
+    system, train, unseen = files(constant)
+    out = tmp_path / "out"
+    status, said, _ = run("diagnose", system, train, "--validation", unseen, "--out", out, "--json")
+    found = json.loads(said)
+    assert (status, found["verdict"]) == (1, "ambiguous")
+    names = {found["effects"][0]["effect"], *(other["effect"] for other in found["alternatives"][0])}
+    assert {"heat_source", "ambient_gradient", "sensor_self_heating"} <= names
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert sorted(path.name for path in out.iterdir()) == sorted([*FILES, "next_experiment.csv"])
+    assert (out / "next_experiment.csv").read_text(encoding="utf-8").splitlines()[0] == "time,heater"
+    assert run("simulate", system, out / "next_experiment.csv", "--out", tmp_path / "predicted.csv")[0] == 0
+    assert "✗</span> AMBIGUOUS" in page and "these records cannot tell it from" in page
+
+
+def test_what_does_not_hold_on_unseen_records_has_no_name(run: Run, files: Any, tmp_path: Path) -> None:
+    system, train, _ = files(nothing)
+    out = tmp_path / "out"
+    status, said, _ = run("diagnose", system, train, "--validation", files(across)[2], "--out", out)
+    assert status == 1 and "verdict: unexplained" in said
+    assert json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["effects"] == []
+    failed = [case.get("name") for case in ElementTree.parse(out / "junit.xml").iter("testcase") if len(
+        case.findall("failure"))]
+    assert failed == ["Verdict: unexplained", "Unseen records are predicted"]
+    assert "✗</span> UNEXPLAINED" in (out / "report.html").read_text(encoding="utf-8")
+
+
+class TestBadInput:
+    def refused(self, run: Run, out: Path, *words: object) -> str:
+        status, said, message = run("diagnose", *words, "--out", out)
+        assert (status, said, message.count("\n")) == (2, "", 1)
+        assert not out.exists() and not list(out.parent.glob(".*"))
+        return message
+
+    def test_validation_on_training_data(self, run: Run, files: Any, tmp_path: Path) -> None:
+        system, train, _ = files(nothing)
+        message = self.refused(run, tmp_path / "out", system, train, "--validation", train)
+        assert "--validation" in message and "is the training record" in message and "argument" not in message
+
+    def test_missing_record(self, run: Run, files: Any, tmp_path: Path) -> None:
+        assert "no.csv" in self.refused(run, tmp_path / "out", files(nothing)[0], tmp_path / "no.csv")
+
+    def test_record_too_short(self, run: Run, files: Any, tmp_path: Path) -> None:
+        system, train, _ = files(nothing)
+        short = tmp_path / "short.csv"
+        short.write_text("\n".join(train.read_text(encoding="utf-8").splitlines()[:4]) + "\n", encoding="utf-8")
+        assert "training records" in self.refused(run, tmp_path / "out", system, short)
+
+    def test_a_folder_with_other_things_is_kept(self, run: Run, files: Any, tmp_path: Path) -> None:
+        (tmp_path / "mine").mkdir()
+        (tmp_path / "mine" / "thesis.txt").write_text("years", encoding="utf-8")
+        status, _, message = run("diagnose", *files(nothing)[:2], "--out", tmp_path / "mine")
+        assert status == 2 and "other things" in message
+        assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
