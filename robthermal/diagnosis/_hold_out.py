@@ -117,7 +117,7 @@ def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record])
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
-    text = (f"The unseen records are predicted within noise and parameter uncertainty (p = {p:.2g})." if ok else
+    text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
             f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed.")
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
 
