@@ -14,7 +14,7 @@ from ..verification import Certificate, establish, not_certified
 from ._loop_picture import Picture, picture
 from ._loop_search import Candidate, contraction, frozen, search, sides
 from ._lyapunov import check_choice, short_matrices
-from ._sections import Currents, Temperatures, made_by, region_section, system_section
+from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
 
 Plant = Literal["continuous", "held"]
 Array = NDArray[np.floating[Any]]
@@ -28,7 +28,7 @@ _DIGITS = 4  # of the multipliers
 
 def loop(system: System, *, current: Currents, temperature: Temperatures, sample_time: float,
          controller: Mapping[str, ArrayLike], plant: Plant = "continuous", drift: float | None = None,
-         large: bool = False) -> Certificate:
+         parameters: Mapping[str, Interval] | None = None, large: bool = False) -> Certificate:
     """Certify that a sampled closed loop forgets its start, limits active or not.
 
     The controller is v = C z + D x, z⁺ = A z + B x + windup (achieved - v), set-points apart: v the heats wanted into
@@ -52,6 +52,9 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
         Temperatures move continuously between samples, or as the observer's sampled model says: x⁺ = A_d x + Γ f(x, I).
     drift : float, optional
         Claim it only for trajectories on which no face of a module moves further than this within a sample [K].
+    parameters : mapping, optional
+        Uncertain conductances of links, {"links.NAME.conductance": (lower, upper)} [W/K], for plant "continuous". What
+        the law and the controller know (the modules) is not uncertain.
     large : bool
         Search a dense P for more than 40 lumps too, which may take hours.
 
@@ -89,7 +92,8 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
         raise InputError(f"{system.name!r} has no module", where="argument system", expected="modules to drive")
     check_choice(system, "full", large)
     section["controller"] = _controller(controller, len(system.lumps), len(system.modules))
-    region = region_section(system, current, temperature)
+    region = region_section(system, current, temperature, parameters)
+    _links_only(region.get("parameters", {}), plant)
     region["sample_time"] = _number(sample_time, "sample_time", "s")
     if plant not in ("continuous", "held"):
         raise InputError(f"plant = {plant!r}", where="argument plant", expected='"continuous" or "held"')
@@ -97,12 +101,13 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
     if drift is not None:
         region["drift"] = _number(drift, "drift", "K")
     parts: dict[str, Any] = {"system": section, "region": region}
+    least = system.with_parameters({name: low for name, (low, _) in region.get("parameters", {}).items()})
     reason, solves = "", 0
     for pieces in _PIECES:
         if (8 * pieces + 8) ** len(system.modules) > _MOST:
             reason = reason or "too many combinations of slopes to check one by one"
             break
-        seen = picture(system, section, region, pieces)
+        seen = picture(least, section, region, pieces)
         reason = _refused(system, seen)
         if reason:
             break
@@ -189,6 +194,17 @@ def _controller(value: Mapping[str, ArrayLike], n: int, m: int) -> dict[str, lis
                              expected=f"finite numbers, {shape}")
         found[key] = matrix.tolist()
     return found
+
+
+def _links_only(parameters: Mapping[str, Interval], plant: str) -> None:
+    other = [name for name in parameters if not name.startswith("links.")]
+    if other:
+        raise InputError(f"{other[0]!r} cannot be uncertain in a loop", where="argument parameters",
+                         expected="conductances of links",
+                         remedy="Certify contraction or regulated with it; the law is built from the modules' values.")
+    if parameters and plant == "held":
+        raise InputError("uncertain links in the sampled model", where="argument parameters",
+                         expected='plant="continuous"')
 
 
 def _number(value: float, name: str, unit: str) -> float:

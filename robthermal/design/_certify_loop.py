@@ -61,7 +61,8 @@ class CertifiedLoop:
 def certify_loop(system: System, controller: PID | StateFeedback | LinearController, law: FeedbackLinearization, *,
                  temperature: Interval | Mapping[str, Interval] | None = None,
                  ambient: Mapping[str, Interval] | None = None, heat: Mapping[str, Interval] | None = None,
-                 observer: GainObserver | None = None, drift: float | None = None) -> CertifiedLoop:
+                 observer: GainObserver | None = None, drift: float | None = None,
+                 parameters: Mapping[str, Interval] | None = None) -> CertifiedLoop:
     """Certify that a closed loop forgets its start, and stays in its box.
 
     Parameters
@@ -82,6 +83,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         heat of the modules held over a sample; without one it is about the plant in continuous time.
     drift : float, optional
         As in `rt.certify.loop`.
+    parameters : mapping, optional
+        Uncertain conductances of links, as in `rt.certify.loop`; needs a `temperature` box, and no observer.
 
     Returns
     -------
@@ -116,6 +119,10 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         if observer.sample_time != controller.sample_time:
             raise InputError(f"the observer's sample time is {observer.sample_time:g} s", where="argument observer",
                              expected=f"the controller's, {controller.sample_time:g} s")
+    if parameters and temperature is None:
+        raise InputError("uncertain links without a box", where="argument temperature",
+                         expected="a box that is not left for any of these conductances",
+                         remedy="Take the box of rt.certify.runaway_free with some room to spare.")
     if temperature is None:
         free = runaway_free(system, current=limits, ambient=ambient, heat=heat)
         stays, box = free.invariance, free.temperature
@@ -124,10 +131,11 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
                                  f"that the currents cannot leave. {stays.reason}"))
     else:
         box = dict(temperature) if isinstance(temperature, Mapping) else dict.fromkeys(system.lumps, temperature)
-        stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat)
+        stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat,
+                                   parameters=parameters)
     loop = certify_plain_loop(system, current=limits, temperature=box, sample_time=controller.sample_time,
                               controller=matrices, plant="continuous" if observer is None else "held",
-                              drift=drift if observer is None else None)
+                              drift=drift if observer is None else None, parameters=parameters)
     estimate = None if observer is None else certify_observer(
         system, gain=observer.gain, sensors=observer.sensors, sample_time=observer.sample_time, current=limits,
         temperature=box)

@@ -22,6 +22,7 @@ from ._loop_growth import Growth, growth
 from ._lyapunov import asymmetry
 from ._numbers import exact, name_of, round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
+from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
 
 Rows = tuple[tuple[fmpq, ...], ...]
 _PLANTS = {"continuous": "currents held and temperatures moving continuously in between",
@@ -56,13 +57,16 @@ class Loop:
     pieces: int
     weights: tuple[fmpq, ...]
     sizes: tuple[fmpq, ...]
+    parameters: Parameters = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
     """Return the exact problem, or raise InputError."""
-    network = read_system(system)
-    box, table, found = read_region(region, network), mapping(region, "region"), mapping(evidence, "evidence")
-    no_other(table, ("temperature", "current", "sample_time", "plant", "drift"), "region")
+    nominal = read_system(system)
+    box, table, found = read_region(region, nominal), mapping(region, "region"), mapping(evidence, "evidence")
+    no_other(table, ("temperature", "current", "sample_time", "plant", "drift", "parameters"), "region")
+    parameters = _links_only(read_parameters(region), table.get("plant", "continuous"))
+    network = worst_system(nominal, system, parameters)
     if not network.modules:
         raise InputError("no module to drive", where="system.modules", expected="at least one")
     n, m = len(network.lumps), len(network.modules)
@@ -82,7 +86,19 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
                 margin_of(margin, "contraction"), _matrix(get(found, "matrix", "evidence"), size, size,
                                                           "evidence.matrix"),
                 int(pieces.p), _list(found.get("weights", []), "evidence.weights"),
-                _list(found.get("sizes", []), "evidence.sizes"))
+                _list(found.get("sizes", []), "evidence.sizes"), parameters)
+
+
+def _links_only(parameters: Parameters, plant: Any) -> Parameters:
+    """Refuse what the proof does not cover: the law knows the modules, the sampled model the network."""
+    for name, _ in parameters:
+        if not name.startswith("links."):
+            raise InputError("only conductances of links can be uncertain in a loop",
+                             where=f"region.parameters[{name_of(name)}]", expected="links.NAME.conductance")
+    if parameters and plant != "continuous":
+        raise InputError("uncertain links need the plant in continuous time", where="region.parameters",
+                         expected="plant 'continuous'")
+    return parameters
 
 
 def claim(problem: Loop) -> str:
@@ -95,9 +111,10 @@ def claim(problem: Loop) -> str:
     return (f"The closed loop of the {say_system(problem.system)}, {_PLANTS[problem.plant]}, with its controller "
             f"({states} state{'' if states == 1 else 's'}) sampled every {show(problem.sample_time)} s, heats turned "
             f"into currents by feedback linearisation at the true temperatures, contracts for all "
-            f"{say_region(problem.system, problem.region)}, the current ranges being its limits: provided that no "
-            f"trajectory from this box leaves it{moves}, e'Pe of the differences in temperatures and controller states "
-            f"between any two trajectories under the same set-points, ambients and heat loads {speed}.")
+            f"{say_region(problem.system, problem.region)}{say_parameters(problem.parameters)}, the current ranges "
+            f"being its limits: provided that no trajectory from this box leaves it{moves}, e'Pe of the differences in "
+            f"temperatures and controller states between any two trajectories under the same set-points, ambients and "
+            f"heat loads {speed}.")
 
 
 def prove(problem: Loop) -> Proof:

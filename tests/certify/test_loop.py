@@ -65,6 +65,33 @@ def test_certified_loops_contract_in_simulation(bent):
     assert certified >= 2
 
 
+def test_uncertain_links():
+    """Every machine of the ranges contracts in the one certified norm; ranges that reach too far are refused."""
+    rng = np.random.default_rng(7)
+    system = machine(rng)
+    law, pi = design(system, (-0.15, 0.3))
+    names = ("links.sink-room.conductance", "links.cold-mass.conductance")
+    ranges = {name: (0.9 * system.parameter(name), 1.1 * system.parameter(name)) for name in names}
+    free = rt.certify.runaway_free(system, current={"m": (-0.15, 0.3)}).temperature
+    box = {name: (low - 3.0, high + 3.0) for name, (low, high) in free.items()}
+    proven = rt.design.certify_loop(system, pi, law, temperature=box, parameters=ranges)
+    assert proven.loop.holds and "sink-room" in proven.loop.claim and rt.verify(proven.loop).valid
+    P, c = np.array(proven.loop.evidence["matrix"]), proven.loop.evidence["contraction"]
+    for _ in range(4):
+        other = system.with_parameters({name: float(rng.choice(pair)) for name, pair in ranges.items()})
+        e, _ = pair(other, law, pi, box, rng)
+        V = np.einsum("ka,ab,kb->k", e, P, e)
+        assert (V[1:] <= c**2 * V[:-1] * (1 + 1e-6)).all()
+    wide = dataclasses.replace(proven.loop, region={**proven.loop.region, "parameters": {names[0]: [1e-6, 10.0]}})
+    assert not rt.verify(wide).valid
+    for parameters, message in (({"modules.m.seebeck.value": (0.049, 0.051)}, "cannot be uncertain in a loop"),
+                                ({names[0]: (0.1, 0.2)}, "excludes")):
+        with pytest.raises(rt.InputError, match=message):
+            rt.design.certify_loop(system, pi, law, temperature=box, parameters=parameters)
+    with pytest.raises(rt.InputError, match="without a box"):
+        rt.design.certify_loop(system, pi, law, parameters=ranges)
+
+
 def test_limits_are_active_in_these_simulations():
     """Otherwise the test above says nothing about the limiter."""
     rng = np.random.default_rng(7)
