@@ -29,7 +29,7 @@ _DOUBTFUL = 1e-14  # remaining energy of a regressor relative to its input; belo
 
 
 @dataclass(frozen=True)
-class ChunkFit:
+class BlockFit:
     """Results of consecutive interior bins; `noise` holds the diagonal (n_y, B) or the matrix (n_y, n_y, B)."""
 
     response: Array
@@ -54,11 +54,31 @@ class Kernel:
             self.project_powers = (complement * descending).reshape(-1, basis.n_points)
             self.project_constant = np.ascontiguousarray(complement)
 
-    def solve(self, start: int, stop: int, *, full_noise: bool) -> ChunkFit:
-        """Windows centred at bins start ... stop-1, counted from 1; all of them must fit between the edges."""
-        columns = self._rational(start, stop) if self.basis.poles.size else self._polynomial(start, stop)
-        energy = self._input_energy(start, stop)
-        return self._orthogonalise(columns, energy, full_noise=full_noise)
+    def solve(self, start: int, stop: int, *, chunk: int, full_noise: bool) -> BlockFit:
+        """Windows centred at bins start ... stop-1, counted from 1; all of them must fit between the edges.
+
+        The windows are orthogonalised `chunk` bins at a time, which stay in the cache; what follows from the last
+        columns is small and is done for all bins at once, in calls long enough for other threads to run meanwhile.
+        """
+        count, n_k = stop - start, self.n_u * self.basis.size
+        triangle = np.zeros((self.n_u, self.n_u + self.n_y, count), dtype=complex)
+        remains = np.empty((n_k, count))
+        shape = (self.n_y, self.n_y, count) if full_noise else (self.n_y, count)
+        noise = np.empty(shape, dtype=complex if full_noise else float)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # of doubtful bins, which are solved again
+            for a in range(start, stop, chunk):
+                b = min(a + chunk, stop)
+                columns = self._rational(a, b) if self.basis.poles.size else self._polynomial(a, b)
+                part = slice(a - start, b - start)
+                self._orthogonalise(columns, triangle[..., part], remains[:, part])
+                _residual_power(columns[n_k:], noise[..., part])
+                remains[:, part] /= self._energy_of_columns(a, b)
+            doubtful = np.logical_not((remains > _DOUBTFUL).all(axis=0))
+            inverse = _invert_triangle(triangle[:, : self.n_u])
+            response = np.einsum("ijb,job->oib", inverse, triangle[:, self.n_u :])
+            gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
+        noise /= self.degrees_of_freedom
+        return BlockFit(response, gram, noise, doubtful)
 
     def _slices(self, start: int, stop: int) -> slice:
         return slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
@@ -90,8 +110,11 @@ class Kernel:
         descending = np.multiply(self.powers.T[::-1, :, None], row_weights, out=_buffer("descending", shape))
         functions = _buffer("functions", shape)
         functions[...] = descending
+        inverses = []
         for s in range(size):
-            _remove(functions[s], functions[s + 1 :], 0.0)
+            products = _products(functions[s], functions[s:])
+            inverses.append(1.0 / products[0].real)
+            _subtract(functions[s], products[1:] * inverses[s], functions[s + 1 :])
         columns = _buffer("columns", (self.n_columns, len(self.spectra) * m, width))
         for place, spectrum in enumerate(self.spectra):
             mine = columns[:, place * m : (place + 1) * m]
@@ -102,12 +125,12 @@ class Kernel:
                 np.multiply(descending[degree], U, out=mine[degree * n_u + i])
             for o in range(self.n_y):
                 mine[size * n_u + o] = _windows(spectrum.Y[o, part], m).view(complex)
-            for function in functions:
-                _remove(function, mine, 0.0)
+            for function, inverse in zip(functions, inverses, strict=True):
+                _subtract(function, _products(function, mine) * inverse, mine)
         return columns
 
-    def _input_energy(self, start: int, stop: int) -> Array:
-        """Energy of each input in each window, all records together, (n_u, B)."""
+    def _energy_of_columns(self, start: int, stop: int) -> Array:
+        """Energy of the input of each regressor in each window, all records together, (n_k, B)."""
         part, m = self._slices(start, stop), self.basis.n_points
         energy = np.zeros((self.n_u, stop - start))
         for spectrum in self.spectra:
@@ -115,31 +138,31 @@ class Kernel:
             sums = np.cumsum(U.real**2 + U.imag**2, axis=1)
             energy += sums[:, m - 1 :]
             energy[:, 1:] -= sums[:, :-m]
-        return energy
+        return np.concatenate([np.repeat(energy, self.basis.degree, axis=0), energy])
 
-    def _orthogonalise(self, columns: Array, energy: Array, *, full_noise: bool) -> ChunkFit:
-        size, n_u, width = self.basis.size, self.n_u, columns.shape[2]
-        n_k = size * n_u
-        doubtful = np.zeros(width, dtype=bool)
-        triangle = np.empty((n_u, columns.shape[0], width), dtype=complex)  # rows of R that belong to U x^0
+    def _orthogonalise(self, columns: Array, triangle: Array, remains: Array) -> None:
+        """Fill the rows of the triangular factor that belong to U x^0, and the energy left of each regressor."""
+        n_u = self.n_u
+        n_k = n_u * self.basis.size
         for c in range(n_k):
-            of_input = c // self.basis.degree if c < n_k - n_u else c - n_k + n_u
-            norms, coefficients = _remove(columns[c], columns[c + 1 :], _DOUBTFUL * energy[of_input])
-            doubtful |= norms == 0.0
-            if c >= n_k - n_u:
-                triangle[c - n_k + n_u, c] = norms
-                triangle[c - n_k + n_u, c + 1 :] = coefficients
-        inverse = _invert_triangle(triangle[:, n_k - n_u : n_k])
-        response = np.einsum("ijb,job->oib", inverse, triangle[:, n_k:])
-        gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
-        residual = columns[n_k:]
-        if full_noise and self.n_y > 1:
-            pairs = [_sum_rows((residual * row.conj()).view(float)).view(complex) for row in residual]
-            noise = np.stack(pairs, axis=1)
+            products = _products(columns[c], columns[c:])
+            remains[c] = products[0].real
+            inverse = 1.0 / remains[c]
+            _subtract(columns[c], products[1:] * inverse, columns[c + 1 :])
+            row = c - (n_k - n_u)
+            if row >= 0:
+                triangle[row, row:] = products * np.sqrt(inverse)
+
+
+def _residual_power(residual: Array, noise: Array) -> None:
+    """Products of the residuals (n_y, rows, B) over the rows into `noise`, all of them or the diagonal alone."""
+    for o, row in enumerate(residual):
+        if noise.ndim == 2:
+            noise[o] = _energy(row)
+        elif len(residual) == 1:
+            noise[o, o] = _energy(row)
         else:
-            noise = np.stack([_energy(row) for row in residual])
-            noise = noise[None] if full_noise else noise
-        return ChunkFit(response, gram, noise / self.degrees_of_freedom, doubtful)
+            noise[:, o] = _sum_rows((residual * row.conj()).view(float)).view(complex)
 
 
 def _buffer(name: str, shape: tuple[int, ...]) -> Array:
@@ -178,34 +201,26 @@ def _energy(column: Array) -> Array:
     return np.asarray(sums[0::2] + sums[1::2])
 
 
-def _remove(column: Array, others: Array, floor: Array | float) -> tuple[Array, Array]:
-    """Remove `column` (rows, B) from `others` (n, rows, B) in place, where its energy is above `floor`.
-
-    Returns the row of the triangular factor: the norms of the column (B,), zero where it is not above the floor and
-    nothing was removed, and the coefficients of the others (n, B).
-    """
-    square = _energy(column)
-    norms = np.sqrt(np.where(square > floor, square, 0.0))
-    inverse = np.divide(1.0, norms, out=np.zeros_like(norms), where=norms > 0.0)
-    # All columns at once: long calls, during which another thread can have the interpreter.
+def _products(column: Array, columns: Array) -> Array:
+    """Inner products over the rows of `column` (rows, B) with each of `columns` (n, rows, B), as (n, B)."""
+    # All columns at once: few long calls, during which another thread can have the interpreter.
     conjugate = np.conjugate(column, out=_buffer("conjugate", column.shape))
-    work = np.multiply(conjugate, others, out=_buffer("work", others.shape))
-    coefficients = _sum_rows(work.view(float)).view(complex)
-    coefficients *= inverse
-    np.multiply(column, (coefficients * inverse)[:, None], out=work)
-    others -= work
-    return norms, coefficients
+    work = np.multiply(conjugate, columns, out=_buffer("work", columns.shape))
+    return np.asarray(_sum_rows(work.view(float)).view(complex))
+
+
+def _subtract(column: Array, coefficients: Array, others: Array) -> None:
+    """Take `coefficients` (n, B) times `column` (rows, B) from `others` (n, rows, B), in place."""
+    others -= np.multiply(column, coefficients[:, None], out=_buffer("work", others.shape))
 
 
 def _invert_triangle(triangle: Array) -> Array:
-    """Inverse of upper triangles (n, n, B); zero diagonal entries give zeros, their bins are solved again."""
+    """Inverse of upper triangles (n, n, B), whose diagonal is not zero."""
     n = triangle.shape[0]
     inverse = np.zeros_like(triangle)
     for j in range(n):
-        inverse[j, j] = np.divide(1.0, triangle[j, j], out=np.zeros_like(triangle[j, j]), where=triangle[j, j] != 0.0)
+        inverse[j, j] = 1.0 / triangle[j, j]
         for i in range(j - 1, -1, -1):
             total = sum(triangle[i, k] * inverse[k, j] for k in range(i + 1, j + 1))
-            inverse[i, j] = -total * np.divide(
-                1.0, triangle[i, i], out=np.zeros_like(triangle[i, i]), where=triangle[i, i] != 0.0
-            )
+            inverse[i, j] = -total * inverse[i, i]
     return inverse

@@ -21,6 +21,7 @@ from ._windows import points_per_record, regression, rows_of, solve_windows
 Array = NDArray[Any]
 
 _CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
+_CHUNKS = 4  # that share the small computations at the end
 _CHUNK_MOST = 4096  # and not so many bins that threads would wait for each other
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
 _FULL_NOISE_BYTES = 2**29  # above this the full noise covariance is computed only for the bins asked for
@@ -150,16 +151,17 @@ class LocalEstimate:
         last = min(start + exact.size, self.n_bins - self.basis.half_width + 1)
         points = len(self.spectra) * self.basis.n_points
         chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
+        block = chunk * _CHUNKS
 
         def solve(a: int) -> None:
-            b = min(a + chunk, last)
-            fit = kernel.solve(a, b, full_noise=found.noise is not None)
+            b = min(a + block, last)
+            fit = kernel.solve(a, b, chunk=chunk, full_noise=found.noise is not None)
             part = slice(a - start, b - start)
             found.response[..., part], found.gram[..., part] = fit.response, fit.gram
             _store_noise(found, part, fit.noise)
             exact[part] = fit.doubtful
 
-        starts = range(first, last, chunk)
+        starts = range(first, last, block)
         run_all(solve, starts, worth=len(starts) >= 4)
 
     def _solve_exactly(self, found: LocalArrays, bins: Array, place: Array) -> None:
