@@ -227,8 +227,8 @@ def exogenous_point(eq: Equations, inputs: Mapping[str, float]) -> Array:
         if name not in names:
             raise InputError(f"{name!r} is not a heater, module or ambient", where="argument inputs",
                              expected="one of " + ", ".join(names))
-        if not np.isfinite(value) or (name in eq.system.ambients and value < LOWEST_KELVIN):
-            raise InputError(f"{name} = {value}", where="argument inputs",
+        if not _finite(value) or (name in eq.system.ambients and value < LOWEST_KELVIN):
+            raise InputError(f"{name} = {value!r}", where="argument inputs",
                              expected="a finite number, kelvin for ambients")
         u[names.index(name)] = value
     return u
@@ -252,8 +252,12 @@ def _regulated(eq: Equations, setpoint: Mapping[str, float],
 def _vector(values: Mapping[str, float], names: tuple[str, ...], argument: str, kind: str) -> Array:
     out = np.zeros(len(names))
     for name, value in values.items():
-        if name not in names or not np.isfinite(value):
-            raise InputError(f"{name} = {value}", where=f"argument {argument}",
+        if name not in names or not _finite(value):
+            raise InputError(f"{name} = {value!r}", where=f"argument {argument}",
                              expected=f"a {kind} and a finite number")
         out[names.index(name)] = value
     return out
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and bool(np.isfinite(value))

@@ -94,6 +94,8 @@ def test_currents_that_run_away_have_no_equilibrium():
     ({"setpoint": {"m1": 5.0}}, "Add 273.15"),
     ({"inputs": {"m1": 1.0}, "setpoint": {"m1": 283.15}}, "a current and a set-point"),
     ({"heat": {"nowhere": 1.0}}, "argument heat"),
+    ({"heat": {"x1": "2 W"}}, "a lump and a finite number"),
+    ({"inputs": {"m1": "1 A"}}, "a finite number"),
 ])
 def test_bad_arguments_are_refused(arguments, message):
     with pytest.raises(rt.InputError, match=message):
