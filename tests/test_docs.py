@@ -8,6 +8,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -62,3 +63,15 @@ def test_the_system_and_record_of_the_start_page_are_read(tmp_path: Path) -> Non
     assert record.sample_time == 1.0
     np.testing.assert_allclose(record["T_plate"], [22.10 + 273.15, 22.11 + 273.15])
     np.testing.assert_allclose(record["m1"], [0.0, 0.8])
+
+
+def test_the_recipes_run_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / "how_to.md").read_text(encoding="utf-8"), re.M | re.S)
+    names: dict[str, Any] = {}
+    for block in blocks:
+        exec(compile(block, "how_to.md", "exec"), names)  # noqa: S102  (our own documentation)
+    found, proof, limit, possible = (names[name] for name in ("found", "proof", "limit", "possible"))
+    assert found.verdict == "named" and found.effects[0].effect == "sensor_lag"
+    assert names["verdict"].valid and proof.holds and possible.outcome.ok and limit.current == pytest.approx(5.52, abs=0.01)
+    assert 500 not in rt.signals.find_glitches(names["record"]).get("T", ())
