@@ -33,6 +33,8 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import systems as systems
     from . import thermal as thermal
     from . import verification as verification
+    from ._fleet import FleetRun as FleetRun
+    from ._fleet import fleet as fleet
     from .calibration import calibrate as calibrate
     from .diagnosis import diagnose as diagnose
     from .signals import Record as Record
@@ -48,11 +50,13 @@ _ROOMS = ("calibration", "certify", "coupling", "design", "diagnosis", "errors",
 
 _HOME = {  # public name: the room it lives in
     "Certificate": "verification",
+    "FleetRun": "_fleet",
     "Record": "signals",
     "System": "thermal",
     "Verdict": "verification",
     "calibrate": "calibration",
     "diagnose": "diagnosis",
+    "fleet": "_fleet",
     "read_record": "signals",
     "read_system": "thermal",
     "verify": "verification",

@@ -12,7 +12,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+_PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
@@ -41,10 +43,12 @@ def show_report(report: Any, out: Path, as_json: bool, **more: Any) -> None:
     def show() -> None:
         table = Table("claim", "answer", "box", "margin")
         for claim in report.claims:
-            good = claim.holds and claim.verified
-            table.add_row(claim.title, "certified, verified" if good else f"NOT CERTIFIED: {claim.reason}", claim.box,
-                          claim.margin)
-        Console().print(table)
+            said = Text(_word(claim), style="green" if claim.good else "bold red")
+            table.add_row(Text(claim.title), said, Text(claim.box), Text(claim.margin))  # [1/s] is a unit, no markup
+        console = Console()
+        if not console.is_terminal:
+            console.width = max(console.width, _PIPE_WIDTH)
+        console.print(table)
         say(*(f"{name}: {value}" for name, value in more.items()), f"report: {out / 'report.html'}")
 
     summary = {"holds": report.holds, "out": str(out), "report": str(out / "report.html"), **more,
@@ -52,6 +56,12 @@ def show_report(report: Any, out: Path, as_json: bool, **more: Any) -> None:
                           for c in report.claims]}
     answer(summary, as_json, show)
     exit_unless(report.holds)
+
+
+def _word(claim: Any) -> str:
+    if claim.tested:
+        return "passed" if claim.good else f"NOT PASSED: {claim.why}"
+    return "certified, verified" if claim.good else f"NOT CERTIFIED: {claim.why}"
 
 
 def answer(summary: Any, as_json: bool, show: Callable[[], None]) -> None:

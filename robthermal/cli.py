@@ -12,6 +12,7 @@ import typer
 
 import robthermal as rt  # the front door, so that every command loads only the rooms it needs
 
+from . import _cli_learn, _cli_results
 from ._terminal import (
     AmbientRange,
     Box,
@@ -327,34 +328,12 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
     show_report(report, out, as_json, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
 
 
-@app.command()
-def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")],
-           as_json: Json = False) -> None:
-    """Re-derive certificates from their files alone, in ball arithmetic. Exit 0 valid, 1 not valid, 2 unreadable.
-
-    Example: robthermal verify certified/certificates/*.json
-    """
-    rows: list[dict[str, Any]] = []
-    status = 0
-    for path in rt.project.certificate_files(certificates):
-        try:
-            verdict = rt.verify(rt.Certificate.load(path))
-            rows.append({"file": str(path), "valid": verdict.valid, "reason": verdict.reason,
-                         "margins": verdict.margins})
-            status = max(status, 0 if verdict.valid else 1)
-        except InputError as error:
-            rows.append({"file": str(path), "valid": None, "reason": str(error), "margins": {}})
-            status = 2
-    answer(rows, as_json, lambda: say(*(f"{_word(r['valid'])}  {r['file']}: {r['reason']}" for r in rows)))
-    raise typer.Exit(status)
-
-
-def _word(valid: bool | None) -> str:
-    return {True: "valid     ", False: "NOT VALID ", None: "unreadable"}[valid]
+for _command in (_cli_results.report, _cli_results.verify, _cli_learn.new, _cli_learn.explain):
+    app.command()(_command)
 
 
 def main() -> None:
-    """Entry point: one clear message on standard error and exit status 2 for bad input."""
+    """Entry point: one clear message on standard error and exit status 2 for bad input; with --json also as JSON."""
     warnings.simplefilter("always", UserWarning)
     warnings.showwarning = lambda message, *rest, **kwargs: typer.echo(f"note: {message}", err=True)
     try:
@@ -362,9 +341,9 @@ def main() -> None:
     except _UsageError as error:
         _stop(_usage(error), 2)
     except InputError as error:
-        _stop(str(error), 2)
+        _stop(str(error), 2, what=error.what, where=error.where, expected=error.expected, remedy=error.remedy)
     except Diverged as error:
-        _stop(str(error), 1)
+        _stop(str(error), 1, time=error.time)
     except OSError as error:  # a full disk, a folder without permission
         _stop(f"{error.filename or 'a file'}: {error.strerror or error}", 2)
     except (KeyboardInterrupt, typer.Abort):
@@ -381,6 +360,9 @@ def _usage(error: Any) -> str:
     return f"{said}. See {command} --help." if said and "\n" not in said else f"no command\n{said}"
 
 
-def _stop(message: str, status: int) -> None:
+def _stop(message: str, status: int, **details: object) -> None:
     typer.echo(f"robthermal: {message}", err=True)
+    if "--json" in sys.argv:  # a script that asked for JSON gets it, whatever happened
+        error = {"message": message, "status": status, **details}
+        typer.echo(json.dumps({"error": error}, indent=1, default=str))
     sys.exit(status)

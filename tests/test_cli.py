@@ -24,7 +24,7 @@ from robthermal import cli
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
 COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "design", "map", "certify",
-            "couple", "diagnose", "verify"]
+            "couple", "diagnose", "report", "verify", "new", "explain"]
 
 SYSTEM = """
 [system]
@@ -160,8 +160,8 @@ def refused(outcome: Outcome, *words: str) -> None:
 def test_demo_writes_a_complete_folder_and_says_yes(demo: tuple[subprocess.CompletedProcess[str], Path]) -> None:
     done, out = demo
     assert done.returncode == 0, done.stderr
-    assert {path.name for path in out.iterdir()} == {"report.html", "junit.xml", "summary.json", "certificates",
-                                                     "calibrated.toml", "parameters.csv"}
+    assert {path.name for path in out.iterdir()} == {"report.html", "report.json", "junit.xml", "summary.json",
+                                                     "certificates", "calibrated.toml", "parameters.csv"}
     assert [path.name for path in out.parent.iterdir()] == ["out"]
     assert "SIMULATED DATA" in (out / "report.html").read_text(encoding="utf-8")
     assert str(Path("out") / "report.html") in done.stdout
@@ -249,7 +249,7 @@ def test_interrupt_while_writing_leaves_nothing(run: Cli, system: Path, tmp_path
         seen.append(everything(tmp_path))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robthermal.project._write.write_html", interrupt)
+    monkeypatch.setattr("robthermal.project._evidence.write_html", interrupt)
     before = everything(tmp_path)
     done = run("certify", system, "--current", "m1=0:1", "--out", tmp_path / "out")
     assert done.status == 130 and "interrupted" in done.err

@@ -101,7 +101,7 @@ class TestYes:
         summary = json.loads(said)
         assert summary["holds"] and summary["verdict"] == "robust" and summary["filters"] == str(out / "coupling.json")
         assert sorted(path.name for path in out.iterdir()) == [
-            "certificates", "coupling.json", "junit.xml", "report.html", "summary.json"]
+            "certificates", "coupling.json", "junit.xml", "report.html", "report.json", "summary.json"]
         assert run("verify", out)[0] == 0
 
     def test_coupling_json_has_the_keys_of_its_contract(self, robust: Done) -> None:

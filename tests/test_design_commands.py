@@ -172,7 +172,7 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Cli) -
     out, summary = written / "out", json.loads((written / "said.json").read_text(encoding="utf-8"))
     assert summary["holds"] and summary["controller"] == "out/design.json"
     assert {path.name for path in out.iterdir()} == {"certificates", "design.json", "junit.xml", "report.html",
-                                                     "summary.json"}
+                                                     "report.json", "summary.json"}
     titles = [claim["title"] for claim in summary["claims"]]
     assert titles == ["Contraction at the current limits", "The box is never left",
                       "Contraction in the box that is never left", "The observer's error shrinks"]

@@ -16,7 +16,7 @@ import robthermal as rt
 from robthermal import cli
 
 H, DWELL = 5.0, 20
-FILES = ["augmented.toml", "diagnosis.json", "junit.xml", "report.html", "summary.json"]
+FILES = ["augmented.toml", "diagnosis.json", "junit.xml", "report.html", "report.json", "summary.json"]
 SYSTEM = """
 [system]
 name = "block on a plate"

@@ -29,12 +29,15 @@ class Data:
         Their places in `System.sensor_names`.
     readings : ndarray, shape (n, n_sensors)
         What they read [K].
+    missing : ndarray of bool, shape (n, n_sensors), optional
+        Readings that count for nothing.
     """
 
     record: Record
     sensors: tuple[str, ...]
     columns: NDArray[np.intp]
     readings: Array
+    missing: NDArray[np.bool_] | None = None
 
     @property
     def label(self) -> str:

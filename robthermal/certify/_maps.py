@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
 
+from .._fleet import fleet
 from ..errors import InputError, Outcome
-from ..thermal import System, fold, steady_state
+from ..thermal import System, fold, format_system, steady_state
 from ._contraction import Method
 from ._limits import CurrentLimit, largest_current
 from ._sections import Temperatures
@@ -64,7 +66,8 @@ class LimitMap:
 
 def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[float], load: Sequence[float],
               temperature: Temperatures, method: Method = "energy", jobs: int = 2,
-              progress: Callable[[int, int], None] = lambda done, total: None) -> LimitMap:
+              progress: Callable[[int, int], None] = lambda done, total: None,
+              store: str | Path | None = None) -> LimitMap:
     """Map the allowed current over ambient temperature, set-point and load.
 
     A saturated controller runs on a given current, so the limit must pass the contraction certificate; the regulated
@@ -89,6 +92,8 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
         Processes.
     progress : callable, optional
         Called with the number of ambients and set-points that are done, and how many there are.
+    store : str or path, optional
+        File that keeps what is done, as in `rt.fleet`: a map that was stopped continues where it was.
 
     Returns
     -------
@@ -112,14 +117,10 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise InputError(f"jobs = {jobs!r}", where="argument jobs", expected="a whole number, at least 1")
     certified = largest_current(system, temperature=temperature, direction="cooling", method=method)
-    points = [(T, target) for T in axes[0] for target in axes[1]]
-    progress(0, len(points))
-    rows: list[dict[str, float]] = []
-    work = Parallel(n_jobs=jobs, return_as="generator")(delayed(_rows)(system, *point, axes[2]) for point in points)
-    for done, found in enumerate(work, 1):
-        rows += found
-        progress(done, len(points))
-    data = pd.DataFrame(rows)
+    points = [{"ambient": T, "setpoint": target, "loads": axes[2]} for T in axes[0] for target in axes[1]]
+    run = fleet(partial(_rows, system), points, store=store, setting="" if store is None else format_system(system),
+                jobs=jobs, progress=progress)
+    data = pd.DataFrame([row for rows in run.results for row in rows])
     if (data.pop("lowest [A]") < 0).any():  # [0, c] proves nothing about the heating current of a warm set-point
         certified = largest_current(system, temperature=temperature, direction="symmetric", method=method)
     data["certified [A]"] = certified.current
@@ -131,7 +132,8 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
         f"{certified.outcome.text}"))
 
 
-def _rows(system: System, ambient: float, setpoint: float, loads: Sequence[float]) -> list[dict[str, float]]:
+def _rows(system: System, point: Mapping[str, Any]) -> list[dict[str, float]]:
+    ambient, setpoint, loads = point["ambient"], point["setpoint"], point["loads"]
     surroundings = dict.fromkeys(system.ambient_names, ambient)
     targets = dict.fromkeys(system.module_names, setpoint)
     limit = float(np.min(fold(system, targets, ambient=surroundings).current[-1]))

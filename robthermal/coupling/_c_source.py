@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._export import identifier, number, rows, self_test
 from ._recursion import Recursion
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ _TEXT = """\
  */
 #ifndef {p}_included
 #define {p}_included
+
+#include <math.h>
 
 {tables}
 typedef struct {{
@@ -76,36 +78,7 @@ static inline void {p}_step({p}_state *s, const double e[2], int on, double plus
     add[1] = {p}_run({nQ2}, {p}_Q2, s->Q2, y);
 }}
 
-#ifdef COUPLING_TEST
-#include <math.h>
-#include <stdio.h>
-
-/* e1 e2 on, then what must come out: plus[0] plus[1] add[0] add[1] */
-static const double {p}_test[{n_test}][7] = {{
-{test}
-}};
-
-int main(void)
-{{
-    {p}_state state = {{0}};
-    double largest[4] = {{0}}, wrong[4] = {{0}}, worst = 0.0;
-    for (int t = 0; t < {n_test}; t++) {{
-        double out[4];
-        {p}_step(&state, {p}_test[t], {p}_test[t][2] != 0.0, out, out + 2);
-        for (int k = 0; k < 4; k++) {{
-            double right = {p}_test[t][3 + k], off = fabs(out[k] - right);
-            largest[k] = fmax(largest[k], fabs(right));
-            wrong[k] = off <= wrong[k] ? wrong[k] : off; /* NaN counts as wrong */
-        }}
-    }}
-    for (int k = 0; k < 4; k++) {{
-        double ratio = wrong[k] == 0.0 ? 0.0 : wrong[k] / largest[k];
-        worst = ratio <= worst ? worst : ratio;
-    }}
-    printf("%.3g\\n", worst);
-    return worst <= 1e-9 ? 0 : 1;
-}}
-#endif
+{main}
 #endif
 """
 
@@ -120,17 +93,23 @@ def source(filters: Filters, name: str = "coupling") -> str:
     name : str
         Prefix of every identifier; characters that C does not allow become underscores.
     """
-    prefix = _identifier(name)
+    prefix = identifier(name, "coupling")
     recursion = Recursion(filters)
     chains = recursion.chains
     sizes = {key: len(chain.rows) for key, chain in chains.items()}
     states = [f"    double {key}[{size}][2];" for key, size in sizes.items()]
-    tables = "".join(f"static const double {prefix}_{key}[{sizes[key]}][5] = {{\n{_lines(chain.rows)}\n}};\n"
+    tables = "".join(f"static const double {prefix}_{key}[{sizes[key]}][5] = {{\n{rows(chain.rows)}\n}};\n"
                      for key, chain in chains.items())
     return _TEXT.format(p=prefix, dt=filters.problem.dt, verdict=filters.verdict, tables=tables,
-                        states="\n".join(states), dx=recursion.direct[0].hex(), dy=recursion.direct[1].hex(),
+                        states="\n".join(states), dx=number(recursion.direct[0]), dy=number(recursion.direct[1]),
                         nX=sizes["X_hat"], nY=sizes["Y_hat"], nZ1=sizes["Z1"], nZ2=sizes["Z2"], nQ1=sizes["Q1"],
-                        nQ2=sizes["Q2"], n_test=_TEST_SAMPLES, test=_lines(_test_vector(recursion)))
+                        nQ2=sizes["Q2"], main=_main(prefix, recursion))
+
+
+def _main(prefix: str, recursion: Recursion) -> str:
+    """Inputs e1 e2 on, then plus[0] plus[1] add[0] add[1]."""
+    return self_test(prefix, "COUPLING_TEST", list(_test_vector(recursion)), 3, f"    {prefix}_state state = {{0}};",
+                     f"        {prefix}_step(&state, in, in[2] != 0.0, out, out + 2);")
 
 
 def _test_vector(recursion: Recursion) -> Iterable[list[float]]:
@@ -138,12 +117,3 @@ def _test_vector(recursion: Recursion) -> Iterable[list[float]]:
     for t, (e1, e2) in enumerate(noise):
         on = t < _ON_UNTIL
         yield [e1, e2, float(on), *recursion.step(e1, e2, on)]
-
-
-def _lines(rows: Iterable[Sequence[float]]) -> str:
-    return ",\n".join("    {" + ", ".join(float(value).hex() for value in row) + "}" for row in rows)
-
-
-def _identifier(name: str) -> str:
-    word = re.sub(r"[^0-9A-Za-z_]", "_", name) or "coupling"
-    return word if word[0].isalpha() else f"coupling_{word}"

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.io import savemat
 
-from ..errors import InputError
+from .._export import by_suffix, matlab_bytes
 from ._c_source import source
-from ._files import document, write
+from ._files import document
 
 if TYPE_CHECKING:
     from ._filters import Filters
@@ -30,11 +27,8 @@ def export(filters: Filters, path: str | Path, name: str) -> None:
     name : str
         Name of the design; in C the prefix of every identifier.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in _WRITERS:
-        raise InputError(f'file type "{suffix}"', where=ascii(str(path)), expected=" or ".join(_WRITERS),
-                         remedy="JSON is written by save().")
-    write(path, _WRITERS[suffix](filters, name))
+    by_suffix(path, {".mat": lambda: _mat(filters, name), **dict.fromkeys((".c", ".h"), lambda: _c(filters, name))},
+              remedy="JSON is written by save().")
 
 
 def _mat(filters: Filters, name: str) -> bytes:
@@ -46,13 +40,8 @@ def _mat(filters: Filters, name: str) -> bytes:
     for key in ("X", "Y", "X_hat", "Y_hat", "Z1", "Z2", "X_input", "Y_input", "controller"):
         system = getattr(filters, key)
         content[key] = {part: np.asarray(getattr(system, part)) for part in "ABCD"}
-    file = BytesIO()
-    savemat(file, content, oned_as="row")
-    return file.getvalue()
+    return matlab_bytes(content)
 
 
 def _c(filters: Filters, name: str) -> bytes:
     return source(filters, name).encode("ascii")
-
-
-_WRITERS: dict[str, Callable[[Filters, str], bytes]] = {".mat": _mat, ".c": _c, ".h": _c}

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import control
 import numpy as np
 
+from .._export import json_bytes, write
 from ..errors import InputError
 from ._sections import sections
 
@@ -51,32 +49,7 @@ def save(filters: Filters, path: str | Path, name: str) -> None:
     name : str
         Name of the design.
     """
-    write(path, json.dumps(document(filters, name), indent=1, allow_nan=False).encode())
-
-
-def write(path: str | Path, content: bytes) -> None:
-    """Write any file whole, or not at all.
-
-    Parameters
-    ----------
-    path : str or path
-        File to write.
-    content : bytes
-        What it will hold.
-    """
-    target = Path(path)
-    try:
-        handle, part = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(part, 0o644)
-            os.replace(part, target)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise InputError(f"cannot write: {error.strerror}", where=ascii(str(target))) from error
+    write(path, json_bytes(document(filters, name)))
 
 
 def _sections(filters: Filters) -> dict[str, Any]:

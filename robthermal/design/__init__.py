@@ -22,6 +22,9 @@ from ._loop import ClosedLoop as ClosedLoop
 from ._loop import simulate_loop as simulate_loop
 from ._lti import LinearController as LinearController
 from ._lti import linear_controller as linear_controller
+from ._matrices import Matrices as Matrices
+from ._matrix_controller import MatrixController as MatrixController
+from ._matrix_controller import load_controller as load_controller
 from ._observer import GainObserver as GainObserver
 from ._observer import observer as observer
 from ._observer_model import ObserverModel as ObserverModel
@@ -43,8 +46,8 @@ from ._state_feedback import state_feedback as state_feedback
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
            "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization",
-           "GainObserver", "LinearController", "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable",
-           "Seen", "StateFeedback", "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain",
-           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller",
-           "loop_poles", "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback",
-           "unobservable"]
+           "GainObserver", "LinearController", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
+           "Polarity", "Reach", "Reachable", "Seen", "StateFeedback", "certify_loop", "check_polarity", "cold_side",
+           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "feed_forward",
+           "feedback_linearization", "linear_controller", "load_controller", "loop_poles", "observer", "pid",
+           "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]

@@ -3,30 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from pathlib import Path
 
 from ..errors import InputError
+from ._export_controller import export
 from ._modules import Array
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a controller sees at a sample.
-
-    Parameters
-    ----------
-    reference, cold : ndarray, shape (n_modules,)
-        Set-points and temperatures of the cold faces [K].
-    temperatures : ndarray, shape (n_lumps,)
-        All lumps, measured or estimated [K].
-    around : ndarray
-        Values of `ColdSide.around`, measured.
-    """
-
-    reference: Array
-    cold: Array
-    temperatures: Array
-    around: Array
+from ._seen import Seen as Seen
 
 
 class Controller(ABC):
@@ -73,6 +55,26 @@ class Controller(ABC):
         achieved : ndarray
             Heat the modules give within their limits [W].
         """
+
+    def export(self, path: str | Path, name: str = "controller") -> None:
+        """Write the controller for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
+
+        All hold the same three matrices: start, heat and advance are linear in the memory and in what is seen. C gets
+        a state struct and three functions in double, with a test vector; JSON is read back by `load_controller`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step; its ending says which.
+        name : str
+            Name of the design; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, a controller that is not linear, or when the file cannot be written.
+        """
+        export(self, path, name)
 
 
 def expect_modules(count: int, heat: Array) -> None:

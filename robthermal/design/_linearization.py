@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate
 from ._error_box import check_box
+from ._export_law import export
 from ._modules import Array, ModuleSet, Properties
 
 Limits = Mapping[str, tuple[float, float]] | tuple[float, float] | None
@@ -240,6 +242,26 @@ class FeedbackLinearization:
         """
         p = self.modules.properties(temperatures)
         return (self.modules.vector(voltage, "voltage", "V") - p.S * (p.hot - p.cold)) / p.R
+
+    def export(self, path: str | Path, name: str = "law") -> None:
+        """Write the law for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
+
+        C gets a step function in double that computes to the last bit what `command` computes, with a test vector;
+        MATLAB and JSON get the numbers of the modules and the limits.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step; its ending says which.
+        name : str
+            Name of the design; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, or when the file cannot be written.
+        """
+        export(self, path, name)
 
     def _voltage_range(self, p: Properties) -> tuple[Array, Array]:
         """Voltage limits as currents [A]."""

@@ -40,6 +40,11 @@ class LinearController(Controller):
     L: Array
     sample_time: float
 
+    @property
+    def count(self) -> int:
+        """Number of modules."""
+        return len(self.C)
+
     def start(self, seen: Seen, heat: Array) -> Array:
         expect_modules(len(self.C), heat)
         # as constant as possible, and zero error gives the heat

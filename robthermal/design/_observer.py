@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..verification import Certificate
 from ._covariances import Noise, process_covariance, reading_covariance
 from ._error_box import Block, Interval, Temperatures, blocks, check_box, largest_radius
 from ._estimate import Observer
+from ._export_observer import export
 from ._extended import ExtendedKalmanFilter
 from ._modules import Array
 from ._numbers import positive
@@ -57,6 +59,26 @@ class GainObserver(Observer):
     def step(self, memory: Array, readings: Array, inputs: Mapping[str, float]) -> Array:
         u = self.model.exogenous(inputs)
         return self.model.predict(memory, u) + self.gain @ (self.model.measured(readings) - self.model.C @ memory)
+
+    def export(self, path: str | Path, name: str = "observer") -> None:
+        """Write the observer for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
+
+        C gets a state struct, init and step in double, with a test vector; MATLAB and JSON get the matrices and the
+        text of the system file.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step; its ending says which.
+        name : str
+            Name of the design; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, or when the file cannot be written.
+        """
+        export(self, path, name)
 
     def spectral_radius(self, current: Mapping[str, Interval], temperature: Temperatures) -> float:
         """Largest spectral radius of the error with currents and temperatures frozen at the corners of a box.

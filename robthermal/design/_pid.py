@@ -43,6 +43,11 @@ class PID(Controller):
     tracking_time: Array
     sample_time: float
 
+    @property
+    def count(self) -> int:
+        """Number of modules."""
+        return len(self.proportional)
+
     def start(self, seen: Seen, heat: Array) -> Array:
         expect_modules(len(self.proportional), heat)
         # integrators at the heat, derivative filters at rest

@@ -19,6 +19,10 @@ from ._effect import Quantity as Quantity
 from ._hold_out import Gap as Gap
 from ._hold_out import HoldOut as HoldOut
 from ._hold_out import hold_out as hold_out
+from ._joint import JointSelection as JointSelection
+from ._joint import select_jointly as select_jointly
+from ._joint_check import JointCheck as JointCheck
+from ._joint_sets import EffectSet as EffectSet
 from ._levels import Levels as Levels
 from ._locate import Location as Location
 from ._locate import locate as locate
@@ -33,8 +37,11 @@ from ._score import score as score
 from ._short_list import Entry as Entry
 from ._short_list import ShortList as ShortList
 from ._short_list import refit_short_list as refit_short_list
+from ._unknown_heat import UnknownHeat as UnknownHeat
+from ._unknown_heat import unknown_heat as unknown_heat
 
-__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "Entry", "Found", "Gap", "HoldOut",
-           "Levels", "Location", "NextExperiment", "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList",
-           "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
-           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score"]
+__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
+           "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "NextExperiment", "NoiseFloor",
+           "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "adequacy", "candidates", "decide",
+           "diagnose", "effects", "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit",
+           "refit_short_list", "register_effect", "score", "select_jointly", "unknown_heat"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,8 @@ from scipy.stats import f as f_distribution
 
 from ..errors import Outcome
 from ._along import Along
+from ._frequency_model import AlongResponse
+from ._frequency_tails import inflation, sureness
 from ._refit import Refit
 
 Array = NDArray[np.float64]
@@ -32,7 +35,7 @@ class Adequacy:
     lumps : dict
         p-value of a spline of extra heat into every lump.
     p_value : float
-        Joint: Bonferroni over the portmanteau test of all sensors together and the lumps.
+        Joint: Bonferroni over the portmanteau test of all sensors together, without quantised ones, and the lumps.
     variance : float
         Whitened variance; 1 if the noise levels are right.
     outcome : Outcome
@@ -92,9 +95,10 @@ def adequacy(fit: Refit) -> Adequacy:
     statistics = {name: _portmanteau([z[:, one.sensors.index(name)] for z, one in
                                       zip(innovations, fit.structure.data, strict=True) if name in one.sensors])
                   for name in fit.floor.noise}
-    together = (sum(Q for Q, _ in statistics.values()), sum(lags for _, lags in statistics.values()))
+    tested = [statistics[name] for name in statistics if name not in fit.floor.quantised]  # steps are never white
+    together = (sum(Q for Q, _ in tested), sum(lags for _, lags in tested))
     lumps = {name: p for name, (_, p) in spline_tests(fit).items()}
-    white = float(chi2.sf(*together))
+    white = float(chi2.sf(*together)) if tested else 1.0
     p = min(1.0, 2.0 * min(white, min(lumps.values()) * len(lumps)))
     ok = p > SMALLEST_P
     text = (f"Nothing is left to explain (p = {p:.2g})." if ok else
@@ -104,10 +108,10 @@ def adequacy(fit: Refit) -> Adequacy:
 
 
 def _portmanteau(segments: list[Array]) -> tuple[float, int]:
-    """Ljung and Box's Q about zero, and its degrees of freedom."""
+    """Ljung and Box's Q about zero, and its degrees of freedom: a tenth of the samples, with more χ² is too narrow."""
     Q, total = 0.0, 0
     for e in segments:
-        n, lags, power = e.size, min(LAGS, e.size // 5), float(e @ e)
+        n, lags, power = e.size, min(LAGS, e.size // 10), float(e @ e)
         rho = np.array([float(e[lag:] @ e[:-lag]) for lag in range(1, lags + 1)]) / power
         Q += n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
         total += lags
@@ -122,8 +126,10 @@ def splines(time: Array, count: int = N_SPLINES) -> Array:
     return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
 
 
-def spline_response(path: Along, lump: int) -> Array:
-    """Readings (n, n_sensors, count) to a spline of heat of 1 W into one lump."""
+def spline_response(path: Along | AlongResponse, lump: int) -> Array:
+    """Readings (n, n_sensors, count) to a spline of heat of 1 W into one lump; of a response, see `splines` there."""
+    if isinstance(path, AlongResponse):
+        return path.splines(lump)
     basis = splines(path.time)
     start = np.zeros((*path.x.shape, basis.shape[1]))
     end = np.zeros_like(start)
@@ -131,11 +137,24 @@ def spline_response(path: Along, lump: int) -> Array:
     return path.answer(start, end)
 
 
+def side_by_side(columns: list[Array], paths: Sequence[Along | AlongResponse]) -> list[Array]:
+    """Give every frequency response columns of its own; records share theirs."""
+    places, at = [], N_SPLINES if any(isinstance(path, Along) for path in paths) else 0
+    for column, path in zip(columns, paths, strict=True):
+        start = 0 if isinstance(path, Along) else at
+        places.append(slice(start, start + column.shape[2]))
+        at = max(at, places[-1].stop)
+    out = [np.zeros((*column.shape[:2], at)) for column in columns]
+    for wide, column, place in zip(out, columns, places, strict=True):
+        wide[..., place] = column
+    return out
+
+
 def spline_tests(fit: Refit) -> dict[str, tuple[float, float]]:
     """F statistic and p-value of a spline of extra heat into every lump, after the unknowns of the fit."""
     out = {}
     for i, lump in enumerate(fit.system.lumps):
-        J = fit.project(fit.whiten([spline_response(path, i) for path in fit.paths]))
+        J = fit.project(fit.whiten(side_by_side([spline_response(path, i) for path in fit.paths], fit.paths)))
         out[lump] = f_test(fit, J)
     return out
 
@@ -150,4 +169,5 @@ def f_test(fit: Refit, J: Array) -> tuple[float, float]:
         return 0.0, 1.0
     explained = float(np.sum((U.T @ fit.rest) ** 2))
     F = (explained / q) / (max(float(fit.rest @ fit.rest) - explained, 1e-300) / nu)
-    return F, float(f_distribution.sf(F, q, nu))
+    F /= float(np.mean(inflation(fit, U)))
+    return F, float(f_distribution.sf(F, q * sureness(fit, U), nu))

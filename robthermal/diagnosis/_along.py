@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,31 @@ from scipy.linalg import expm
 
 from ..calibration._data import Data
 from ..errors import InputError
-from ..thermal import Equations, System, trajectory
+from ..thermal import Equations, System, Trajectory, trajectory
 
 Array = NDArray[np.float64]
-_IMAGINARY = 1e-40
+Places = NDArray[np.intp]
+_SAME = 1e-4  # change of a rate times the sample time [-]
+
+
+class Seen(Protocol):
+    """What trial values of an effect may depend on: `Along`, or its counterpart for a frequency response."""
+
+    @property
+    def system(self) -> System:
+        """Simulated."""
+
+    @property
+    def x(self) -> Array:
+        """Lump temperatures (n, n_lumps) [K]."""
+
+    @property
+    def h(self) -> float:
+        """Sample time [s]."""
+
+    @property
+    def span(self) -> float:
+        """Longest time seen [s]."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +98,24 @@ class Along:
         """Temperature about which sensor gains act [K]."""
         return next(iter(self.system.ambients.values())).temperature
 
+    @property
+    def span(self) -> float:
+        """Length of the record [s]."""
+        return len(self.x) * self.h
+
+    def draw(self, ax: Any, r: Array) -> None:
+        """Draw residuals (n, n_sensors) [K] against time.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes
+            Where.
+        r : ndarray, shape (n, n_sensors)
+            Residuals [K].
+        """
+        ax.plot(self.time, r, linewidth=0.7, label=self.one.sensors)
+        ax.set(xlabel="time [s]", ylabel="measured − model [K]")
+
     @cached_property
     def equations(self) -> Equations:
         """Equations of the system."""
@@ -97,11 +137,7 @@ class Along:
         n, nl = self.x.shape
         nz = nl + len(self.lags)
         M = np.zeros((n, nz, nz))
-        middle = 0.5 * (self.x + self.end)
-        for j in range(nl):
-            moved = middle.astype(complex)
-            moved[:, j] += 1j * _IMAGINARY
-            M[:, :nl, j] = self.equations.rate(moved, self.u).imag / _IMAGINARY
+        M[:, :nl, :nl] = _heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u) / self.equations.capacity[:, None]
         for row, name in enumerate(self.lags, start=nl):
             sensor = self.system.sensors[name]
             M[:, row, row] = -1.0 / sensor.time_constant
@@ -109,16 +145,27 @@ class Along:
         return M
 
     @cached_property
+    def kinds(self) -> tuple[Array, Places]:
+        """The different rates among the samples, (n_kinds, n_z, n_z), and which one each sample has, (n,).
+
+        Rates that differ by less than 1e-4 of a sample are one: a held current has one matrix, not one per sample.
+        """
+        rounded = np.round(self.M * (self.h / _SAME)).reshape(len(self.M), -1)
+        _, first, kind = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        return self.M[first], kind.reshape(-1)
+
+    @cached_property
     def steps(self) -> tuple[Array, Array, Array]:
         """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end."""
-        Mh = self.M * self.h
+        M, kind = self.kinds
+        Mh = M * self.h
         A = expm(Mh)
         one = np.eye(A.shape[1])
         phi1 = np.linalg.solve(Mh, A - one)
         phi2 = np.linalg.solve(Mh, phi1 - one)
         nl = self.x.shape[1]
         per_watt = self.h / self.equations.capacity
-        return A, (phi1 - phi2)[..., :nl] * per_watt, phi2[..., :nl] * per_watt
+        return A[kind], ((phi1 - phi2)[..., :nl] * per_watt)[kind], (phi2[..., :nl] * per_watt)[kind]
 
     @cached_property
     def C(self) -> Array:
@@ -194,12 +241,25 @@ class Along:
         return np.einsum("sz,kzm->ksm", self.C, state, optimize=True)
 
 
-def along(system: System, one: Data) -> Along:
-    """Simulate a record and prepare its linearisation."""
-    run = trajectory(system, one.record)
+def along(system: System, one: Data, run: Trajectory | None = None) -> Along:
+    """Simulate a record, unless it has been, and prepare its linearisation."""
+    run = trajectory(system, one.record) if run is None else run
     columns = [one.record[name] if name in one.record.input_names
                else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
     if not np.isfinite(run.lumps).all():
         raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
     return Along(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
                  np.column_stack(columns))
+
+
+def _heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
+    """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
+    nl = x.shape[1]
+    out = np.broadcast_to(equations.A.toarray(), (len(x), nl, nl)).copy()
+    for term in equations.terms:
+        s = term.slopes(*equations.ends(term, x, u))
+        for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
+            for row, column, slope in ((a, a, s.aa), (a, b, s.ab), (b, a, s.ba), (b, b, s.bb)):
+                if row < nl and column < nl:
+                    out[:, row, column] += slope[..., pair]
+    return out

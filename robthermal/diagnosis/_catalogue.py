@@ -9,11 +9,12 @@ from ..thermal import System
 from ._catalogue_links import LINK_EFFECTS
 from ._catalogue_lumps import LUMP_EFFECTS
 from ._catalogue_modules import MODULE_EFFECTS
-from ._catalogue_sensors import INPUT_EFFECTS, SENSOR_EFFECTS
+from ._catalogue_sensors import CLIP, INPUT_EFFECTS, SENSOR_EFFECTS
 from ._effect import Candidate, Effect, check_effect
 
 _BUILT_IN = {effect.name: effect for effect in
              (*MODULE_EFFECTS, *LINK_EFFECTS, *LUMP_EFFECTS, *INPUT_EFFECTS, *SENSOR_EFFECTS)}
+_FORMS = {CLIP.name: (CLIP,)}  # further laws under the same name
 _OWN: dict[str, Effect] = {}
 
 
@@ -91,16 +92,15 @@ def forget_effect(name: str) -> None:
 
 
 def chosen_effects(names: Iterable[str] | None) -> list[Effect]:
-    """Effects by name; all of them by default."""
+    """Effects by name in all their forms; all of them by default."""
     known = effects()
-    if names is None:
-        return list(known.values())
+    names = list(known) if names is None else list(names)
     unknown = [name for name in names if name not in known]
     if unknown:
         raise InputError(f"there is no effect {unknown[0]!r}", where="argument effects",
                          expected="some of " + ", ".join(known),
                          remedy="Register your own with robthermal.diagnosis.register_effect.")
-    return [known[name] for name in names]
+    return [form for name in names for form in (known[name], *_FORMS.get(name, ()))]
 
 
 def candidates(system: System, names: Iterable[str] | None = None) -> list[Candidate]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import product
 
+import numpy as np
+
 from ..thermal import System
 from . import _adding as adding
 from ._along import Along
 from ._catalogue_lumps import TIMES
 from ._effect import Effect, Quantity, Where
-from ._signatures import by_heat, input_delay, input_lag, sensor_gain, sensor_lag, sensor_offset
+from ._signatures import Values, by_heat, input_clip, input_delay, input_lag, sensor_gain, sensor_lag, sensor_offset
 
 
 def _sensors(system: System) -> list[Where]:
@@ -30,6 +32,24 @@ def _prompt(key: str) -> Callable[[System], list[Where]]:
 def _leaks(system: System) -> list[Where]:
     return [(name, lump) for (name, part), lump in product(system.inputs.items(), system.lumps)
             if lump != part.lump and part.feedthrough is None]
+
+
+def _unclipped(system: System) -> list[Where]:
+    """Inputs and modules without a clip."""
+    parts = {**system.inputs, **system.modules}
+    return [(name,) for name, part in parts.items() if part.drive.clip is None]
+
+
+def _clips(path: Along, where: Where) -> list[float]:
+    """Levels within the record's range."""
+    u = np.abs(path.u[:, path.system.exogenous_names.index(where[0])])
+    return [float(level) for level in u.max() * np.arange(0.3, 1.0, 0.05)] if u.max() > 0 else []
+
+
+def _add_clip(system: System, where: Where, values: Values) -> System:
+    """Magnitudes above the clip are cut off; a clip of 0 says that there is none."""
+    table = "inputs" if where[0] in system.inputs else "modules"
+    return system.with_parameters({f"{table}.{where[0]}.drive.clip": values["clip"]}) if values["clip"] > 0 else system
 
 
 def _delays(path: Along, where: Where) -> list[float]:
@@ -76,3 +96,6 @@ INPUT_EFFECTS = (
     Effect("input_feedthrough", _leaks, (Quantity("share", "-", 0.0, 1.0),), _share, by_heat(_share, "share", 1e-2),
            ("missing_link",), "the heater alone, in fast steps"),
 )
+# the second form of an effect: the same name, another law
+CLIP = Effect("input_saturation", _unclipped, (Quantity("clip", "unit", 0.0, 1e6, grid=_clips, typical=1e6),), _add_clip,
+              input_clip, ("joule_split", "lead_heating"), "a sweep of the amplitude")

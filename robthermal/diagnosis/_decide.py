@@ -88,11 +88,11 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Decision:
     again = sorted(refiltered(before, renewed, near), key=lambda entry: -entry.delta_bic)
     winner = again[0]
     others = tuple(entry for entry in again[1:] if winner.delta_bic - entry.delta_bic < BIC_GAP)
-    if winner.candidate.key == best.candidate.key:
+    if winner.fit.structure is best.fit.structure:
         winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.aliases)
     else:
         own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
         winner = Entry(winner.candidate, own, next(e.delta_bic for e in entries
-                                                   if e.candidate.key == winner.candidate.key), winner.p_value,
+                                                   if e.fit.structure is winner.fit.structure), winner.p_value,
                        winner.aliases)
     return Decision(True, before, winner, others)

@@ -55,7 +55,8 @@ def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: 
     limit : int
         Evaluations.
     enough : float
-        Predicted decrease of the sum of squares, relative to it, at which to stop.
+        Predicted decrease of the sum of squares, relative to it, at which to stop; ten times as much per factor e by
+        which the mean square exceeds 1: what is hopeless is not polished.
     """
     v = np.clip(v, *bounds)
     z, J = evaluate(v)
@@ -63,7 +64,8 @@ def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: 
     while True:
         step = _step(z, J, v, bounds)
         decrease = float(z @ z - (z - J @ step) @ (z - J @ step))
-        if decrease <= enough * float(z @ z):
+        power = float(z @ z)
+        if decrease <= enough * power * (1.0 + 10.0 * np.log(max(power / z.size, 1.0))):
             return Descent(v, z, J, True, count)
         for _ in range(_HALVINGS):
             if count >= limit:

@@ -2,45 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..calibration._data import as_data, refuse_same
 from ..calibration._ranges import Choice
 from ..errors import Outcome
-from ..signals import Record
 from ..thermal import System
 from ._adequacy import Adequacy, adequacy
+from ._catalogue import candidates
 from ._decide import Decision, decide
 from ._diagnosis import Diagnosis, Found, Verdict
-from ._hold_out import Gap, HoldOut, expected_rms, hold_out
+from ._frequency_data import Measured, as_measured
+from ._hold_out import Gap, HoldOut, expected_rms, hold_out, refuse_seen
+from ._joint_check import checked_jointly
 from ._locate import locate
-from ._next_experiment import NextExperiment, next_experiment
+from ._next_experiment import NextExperiment, next_experiment, rivals
 from ._noise_floor import noise_floor
 from ._refit import Refit, refit, whitened
 from ._revise import revised
 from ._score import ALPHA, BIC_GAP, Scores, score
+from ._sessions import SessionGain
 from ._short_list import Entry, quantities_of, refit_short_list
+from ._unknown_heat import unknown_heat
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
 
-def diagnose(system: System, records: Record | Sequence[Record], *, validation: Record | Sequence[Record] | None = None,
+def diagnose(system: System, records: Measured | Sequence[Measured], *,
+             validation: Measured | Sequence[Measured] | None = None,
              parameters: Choice = None, effects: Iterable[str] | None = None,
-             noise: Mapping[str, float] | float | None = None) -> Diagnosis:
+             noise: Mapping[str, float] | float | None = None, operating_point: Mapping[str, float] | None = None,
+             session_gain: SessionGain = False,
+             progress: Callable[[str], None] = lambda stage: None) -> Diagnosis:
     """Find where records and simulation part, name the missing effect, add it, and test it on unseen records.
 
     Parameters
     ----------
     system : System
         Nominal: `noise` of its sensors, `disturbance` of its lumps, `sigma` of its fit table say what is known.
-    records : Record or list of Record
-        Measured.
-    validation : Record or list of Record, optional
+    records : Record, FrequencyResponse, or list of them
+        Measured. Records may come from a closed loop. Of a frequency response (from `rt.identify`, with its covariance)
+        the linearisation at `operating_point` is compared.
+    validation : Record, FrequencyResponse, or list of them, optional
         Not seen by any fit.
     parameters : iterable or mapping, optional
         Nominal parameters to refit, as in `rt.calibrate`. Default: the fit table; without one they are taken as known.
@@ -48,6 +55,14 @@ def diagnose(system: System, records: Record | Sequence[Record], *, validation: 
         Names of the catalogue to try; default all, your own registered ones included.
     noise : mapping or float, optional
         Overrides the declared noise of the sensors [K].
+    operating_point : mapping, optional
+        For frequency responses: mean heaters [unit], module currents [A] and ambients [K] of the experiment; default
+        off and nominal.
+    session_gain : bool or mapping
+        Records from several days: every record has a gain of its own of every heater and module. True: with a prior of
+        5 %; a mapping from input to the standard deviation of its gain [-].
+    progress : callable, optional
+        Called with a sentence before every stage.
 
     Returns
     -------
@@ -78,35 +93,56 @@ def diagnose(system: System, records: Record | Sequence[Record], *, validation: 
     """
     effects = None if effects is None else list(effects)
     if validation is not None:
-        refuse_same(as_data(system, records, "records"), as_data(system, validation, "validation"))
-    floor = noise_floor(system, records, noise=noise)
-    nominal = refit(system, records, floor, parameters=parameters)
+        refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
+    progress("reading the noise off the records")
+    floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
+    progress("refitting the nominal system")
+    nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
+                    session_gain=session_gain)
+    progress("trying every effect of the catalogue at every place")
     scores = score(nominal, effects)
-    rounds, fit = _accepted(nominal, scores, effects)
+    rounds, fit = _accepted(nominal, scores, effects, progress)
+    joint = None
+    if len(rounds) > 1:
+        progress("selecting all effects at once, to compare")
+        rounds, fit, joint = checked_jointly(rounds, fit, nominal, scores, effects)
+    progress("testing whether anything is left")
     checks = adequacy(fit)
-    unseen = None if validation is None else hold_out(nominal, fit, validation)
+    if validation is not None:
+        progress("predicting the unseen records")
+    unseen = None if validation is None else hold_out(nominal, fit, validation, operating_point=operating_point)
+    progress("locating the misfit and planning the next experiment")
     verdict, outcome = _verdict(rounds, fit, checks, unseen)
     found = tuple(_found(fit, i, round_) for i, round_ in enumerate(rounds))
     named = verdict in ("named", "ambiguous")
-    gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit))}
+    gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit), fit.unit)}
+    tested = {c.key for c in scores.candidates}
+    hidden = {c.key: why for c in candidates(nominal.system, effects)
+              if c.key not in tested and (why := nominal.structure.hides(c))}
+    where = locate(nominal)
     return Diagnosis(
         verdict=verdict, effects=found if named else (), alternatives=tuple(map(_others, rounds)) if named else (),
         system=fit.system if named else nominal.system,
         gap=gap | ({} if unseen is None else {"validation": unseen.gap}),
-        located=locate(nominal), not_testable=scores.not_testable, next_experiment=_plan(rounds) if named else None,
+        located=where, not_testable=hidden | scores.not_testable,
+        next_experiment=_plan(rounds) if named else None,
         outcome=outcome, provisional=() if named else found, noise_floor=floor, nominal=nominal, fit=fit, scores=scores,
-        rounds=rounds, adequacy=checks, hold_out=unseen)
+        rounds=rounds, adequacy=checks, hold_out=unseen, joint=joint,
+        unknown_heat=unknown_heat(nominal, where.lump) if verdict == "unexplained" and nominal.along else None)
 
 
-def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None) -> tuple[tuple[Decision, ...], Refit]:
+def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progress: Callable[[str], None]
+              ) -> tuple[tuple[Decision, ...], Refit]:
     """Add effects one by one while any is beyond doubt, then revise those added before others were known."""
     rounds: tuple[Decision, ...] = ()
     fit = nominal
     while len(rounds) < MOST_EFFECTS:
         if rounds:
+            progress(f"trying every effect again beside {len(rounds)} accepted")
             scores = score(fit, effects)
         if not _promising(fit, scores):
             break
+        progress("refitting the best candidates")
         decision = decide(refit_short_list(fit, scores))
         if decision.best is None:
             break
@@ -114,7 +150,10 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None) -> tupl
         rounds, fit = (*rounds, decision), decision.best.fit
         if hopeless:
             return rounds, fit
-    return revised(rounds, nominal, effects) if len(rounds) > 1 else (rounds, fit)
+    if len(rounds) < 2:
+        return rounds, fit
+    progress(f"choosing each of {len(rounds)} effects again beside the others")
+    return revised(rounds, nominal, effects)
 
 
 def _flails(fit: Refit, best: Entry) -> bool:
@@ -182,9 +221,9 @@ def _found(fit: Refit, place: int, round_: Decision) -> Found:
 
 
 def _plan(rounds: tuple[Decision, ...]) -> NextExperiment | None:
-    """Experiment for the first effect that has contenders."""
+    """Experiment for the first effect that has rivals."""
     for round_ in rounds:
-        if round_.best is not None and round_.contenders:
-            entries: list[Entry] = [round_.best, *round_.contenders]
-            return next_experiment(entries)
+        entries = rivals(round_)
+        if len(entries) > 1:
+            return next_experiment(entries) if entries[0].fit.along else None
     return None

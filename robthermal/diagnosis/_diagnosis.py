@@ -14,11 +14,13 @@ from ._adequacy import Adequacy
 from ._decide import Decision
 from ._file import write_json
 from ._hold_out import Gap, HoldOut
+from ._joint_check import JointCheck
 from ._locate import Location
 from ._next_experiment import NextExperiment
 from ._noise_floor import NoiseFloor
 from ._refit import Refit
 from ._score import Scores
+from ._unknown_heat import UnknownHeat
 
 Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
 Name = tuple[str, tuple[str, ...]]
@@ -82,6 +84,10 @@ class Diagnosis:
         Effects that helped but do not explain everything: no names.
     noise_floor, nominal, fit, scores, rounds, adequacy, hold_out
         Results of the stages.
+    joint : JointCheck or None
+        Two effects or more compared with a selection of all at once; None with fewer.
+    unknown_heat : UnknownHeat or None
+        If nothing known explains the records: the heat into the most suspect lump that would; None otherwise.
     """
 
     verdict: Verdict
@@ -101,6 +107,8 @@ class Diagnosis:
     rounds: tuple[Decision, ...]
     adequacy: Adequacy
     hold_out: HoldOut | None
+    joint: JointCheck | None = None
+    unknown_heat: UnknownHeat | None = None
 
     def __str__(self) -> str:
         lines = [f"verdict: {self.verdict}"]
@@ -110,20 +118,21 @@ class Diagnosis:
                 + f"   ΔBIC {found.delta_bic:.1f}, p {found.p_value:.1g}")
             lines += [f"    or {effect}({', '.join(where)})" for effect, where in others]
         for name, gap in self.gap.items():
-            lines.append(f"{name}: rms {gap.before:.4g} K before, {gap.after:.4g} K after, {gap.noise:.4g} K noise")
+            lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
+                         f"[{gap.unit}]")
         lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
         return "\n".join([*lines, str(self.outcome)])
 
     def plot(self) -> Any:
-        """Free-run residuals of the first training record before and after [K]; returns the matplotlib axes."""
+        """Residuals of the first training record [K], or response, before and after; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(2, 1, sharex=True, sharey=True, layout="constrained")
         for ax, fit, what in zip(axes, (self.nominal, self.fit), ("before", "after"), strict=True):
-            ax.plot(fit.paths[0].time, fit.residuals[0], linewidth=0.7, label=fit.paths[0].one.sensors)
-            ax.set(ylabel="measured − model [K]", title=f"{what}: rms {fit.rms:.3g} K")
+            fit.paths[0].draw(ax, fit.residuals[0])
+            ax.set(title=f"{what}: rms {fit.rms:.3g} {fit.unit}")
         axes[0].legend(fontsize="small")
-        axes[1].set(xlabel="time [s]")
+        axes[0].set(xlabel="")
         return np.asarray(axes)
 
     def to_dict(self) -> dict[str, Any]:
@@ -151,6 +160,7 @@ class Diagnosis:
                 "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
             "provisional": [_plain(found) for found in self.provisional],
             "outcome": vars(self.outcome),
+            **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
         }
 
     def save(self, path: str | Path) -> None:

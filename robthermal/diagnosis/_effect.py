@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..thermal import System
-from ._along import Along, Response
+from ._along import Along, Response, Seen
 
 Array = NDArray[np.float64]
 Where = tuple[str, ...]
 Add = Callable[[System, Where, Mapping[str, float]], System]
-Grid = tuple[float, ...] | Callable[[Along, Where], Sequence[float]]
+Grid = tuple[float, ...] | Callable[[Any, Where], Sequence[float]]  # of an `Along` or `AlongResponse`
 Signature = Callable[[Along, Where, Mapping[str, float]], Response]
 
 
@@ -154,13 +155,13 @@ class Candidate:
         """
         return self.effect.add(system, self.where, {**self.shape, self.effect.size.name: size})
 
-    def trials(self, path: Along) -> list[Candidate]:
+    def trials(self, path: Seen) -> list[Candidate]:
         """The same with every combination of trial values, for one record.
 
         Parameters
         ----------
-        path : Along
-            Simulated record.
+        path : Along or AlongResponse
+            Simulated record, or frequency response.
 
         Returns
         -------
@@ -172,11 +173,11 @@ class Candidate:
                 for combination in product(*values)]
 
 
-def _possible(quantity: Quantity, grid: Sequence[float], path: Along) -> list[float]:
+def _possible(quantity: Quantity, grid: Sequence[float], path: Seen) -> list[float]:
     """Trial values; times only if the record can resolve them."""
     if quantity.unit != "s" or callable(quantity.grid):
         return list(grid)
-    longest = len(path.x) * path.h / 3
+    longest = path.span / 3
     return [value for value in grid if path.h / 2 <= value <= longest]
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from ..calibration._data import Data, as_data, refuse_same
+from ..calibration._data import Data, refuse_same
 from ..calibration._score import validate
-from ..calibration._start import initial_of
-from ..errors import Diverged, Outcome
-from ..signals import Record
-from ._descent import descend
-from ._refit import Refit, filters, whitened
+from ..errors import Diverged, InputError, Outcome
+from ..thermal import System
+from ._along import Along
+from ._descent import Descent, descend
+from ._frequency_data import Measured, ResponseData, as_measured
+from ._frequency_locate import response_rms
+from ._glitches import without_glitches
+from ._refit import Refit, filters, paths_of, whitened
+from ._structure import Structure, start_of
 from ._whitening import gathered
 
 Array = NDArray[np.float64]
@@ -24,7 +28,7 @@ SMALLEST_P = 1e-4
 
 @dataclass(frozen=True)
 class Gap:
-    """Root mean square of the free-running residual over all sensors [K].
+    """Root mean square of the free-running residual over all sensors [K]; of responses alone, whitened.
 
     Parameters
     ----------
@@ -32,11 +36,14 @@ class Gap:
         Nominal system refitted; with the effects.
     noise : float
         What sensor noise and random heat alone would give.
+    unit : str
+        "K", or "standard deviations" of a frequency response's noise where there is no record.
     """
 
     before: float
     after: float
     noise: float
+    unit: str = "K"
 
 
 @dataclass(frozen=True)
@@ -69,12 +76,13 @@ class HoldOut:
         return (self.variance_after - 1.0) / excess if excess > 0.05 else float("nan")
 
     def __str__(self) -> str:
-        return (f"held out: rms {self.gap.before:.4g} K before, {self.gap.after:.4g} K after, {self.gap.noise:.4g} K "
-                f"noise; whitened variance {self.variance_before:.3g} before, {self.variance_after:.3g} after\n"
-                f"{self.outcome}")
+        return (f"held out: rms {self.gap.before:.4g} before, {self.gap.after:.4g} after, {self.gap.noise:.4g} "
+                f"{self.gap.unit} noise; whitened variance {self.variance_before:.3g} before, "
+                f"{self.variance_after:.3g} after\n{self.outcome}")
 
 
-def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record]) -> HoldOut:
+def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measured], *,
+             operating_point: Mapping[str, float] | None = None) -> HoldOut:
     """Predict unseen records with and without the effects.
 
     Parameters
@@ -83,8 +91,10 @@ def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record])
         Nominal.
     after : Refit
         With the effects.
-    validation : Record or list of Record
-        Not among the records fitted.
+    validation : Record, FrequencyResponse, or list of them
+        Not among those fitted.
+    operating_point : mapping, optional
+        Of frequency responses, as in `refit`.
 
     Returns
     -------
@@ -111,9 +121,10 @@ def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record])
     >>> rt.diagnosis.hold_out(fit, fit, measured(2)).outcome.code
     'predicted'
     """
-    data = as_data(after.structure.base, validation, "validation")
-    refuse_same(list(after.structure.data), data)
-    gap = Gap(_free_run(before, data), _free_run(after, data), expected_rms(after, data))
+    base = after.structure.base
+    data = without_glitches(base, as_measured(base, validation, "validation", operating_point), after.floor.noise)
+    refuse_seen(after.structure.data, data)
+    gap = _unseen_gap(before, after, data)
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
@@ -122,49 +133,83 @@ def hold_out(before: Refit, after: Refit, validation: Record | Sequence[Record])
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
 
 
-def _free_run(fit: Refit, data: list[Data]) -> float:
+def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Data | ResponseData]) -> None:
+    """Data validate nothing that was fitted to them."""
+    seen, unseen = ([one for one in data if isinstance(one, Data)] for data in (training, validation))
+    refuse_same(seen, unseen)
+    for new in validation:
+        for old in training:
+            if (isinstance(new, ResponseData) and isinstance(old, ResponseData)
+                    and np.array_equal(new.readings, old.readings)):
+                raise InputError("the validation response is the training response", where="argument validation",
+                                 expected="data the fit has not seen", remedy="Estimate it from another record.")
+
+
+def _unseen_gap(before: Refit, after: Refit, data: Sequence[Data | ResponseData]) -> Gap:
+    records = [one for one in data if isinstance(one, Data)]
+    if not records:
+        return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
+    return Gap(_free_run(before, records), _free_run(after, records), expected_rms(after, records))
+
+
+def _free_run(fit: Refit, data: Sequence[Data]) -> float:
     noise = fit.floor.noise
     try:
-        residuals = [validate(fit.system, one, "free", noise)[1] for one in data]
+        residuals = [validate(system, one, "free", noise)[1]
+                     for system, one in zip(_session_systems(fit, data), data, strict=True)]
     except Diverged:
         return float("inf")
     return float(np.sqrt(np.mean(np.concatenate([r.ravel() for r in residuals]) ** 2)))
 
 
-def predicted(fit: Refit, reference: Refit, data: list[Data]) -> tuple[float, float]:
+def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:
+    """Trained system in every unseen session: a new session has a gain of its own, estimated on all of it."""
+    sessions = fit.structure.sessions
+    if not sessions.inputs:
+        return [fit.system] * len(data)
+    structure, own, _ = _own_unknowns(fit, fit, data)
+    return [sessions.applied(fit.system, g) for g in structure.gains(own.v)]
+
+
+def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[float, float]:
     """Whitened variance with trained parameters, and the p-value of the prediction, with the noise of `reference`.
 
-    The trained parameters enter as a prior with the covariance of their training, the initial temperatures with theirs;
-    at the optimum the sum of squares is χ² with as many degrees of freedom as there are readings.
+    The trained parameters enter as a prior with the covariance of their training, what is the records' own (initial
+    temperatures, session gains) with theirs; at the optimum the sum of squares is χ² with as many degrees of freedom as
+    there are readings, fewer where the noise is itself an estimate.
     """
-    starts = tuple(initial_of(fit.system, one, "free") for one in data)
-    structure = replace(fit.structure, data=tuple(data), starts=starts)
-    p = fit.structure.n_parameters + fit.structure.n_effects
-    trained = fit.v[:p]
-    v = np.concatenate([trained, np.zeros(sum(start.n_free for start in starts))])
-    R = _information_root(fit.J, p)
-    fixed = np.zeros(v.size, bool)
-    fixed[:p] = True
     try:
-        _, whiteners = filters(structure, v, reference.floor, reference.levels)
-        n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
-
-        def evaluate(v: Array) -> tuple[Array, Array]:
-            z, J = whitened(structure, v, whiteners)
-            prior = np.zeros((len(R), v.size))
-            prior[:, :p] = R
-            keep = np.r_[0:n, n + n_known:z.size]  # the parameters' own priors are in R already
-            return np.concatenate([z[keep], -R @ (v[:p] - trained)]), np.concatenate([J[keep], prior])
-
-        low, high = (bound.copy() for bound in structure.bounds)
-        low[:p], high[:p] = trained, trained
-        only = descend(evaluate, v, (low, high), 20, 1e-4)
+        structure, only, n = _own_unknowns(fit, reference, data)
     except Diverged:
         return float("inf"), 0.0
     # the trained parameters move by a standard deviation or so: one linear step is their optimum
     left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
     rss = float(left @ left) / max(reference.variance, 1e-12)
-    return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n, reference.degrees_of_freedom))
+    known = reference.degrees_of_freedom * reference.structure.certainty
+    return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
+
+
+def _own_unknowns(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[Structure, Descent, int]:
+    """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
+    starts = tuple(start_of(fit.system, one) for one in data)
+    structure = replace(fit.structure, data=tuple(data), starts=starts)
+    p = fit.structure.n_parameters + fit.structure.n_effects
+    trained = fit.v[:p]
+    v = np.concatenate([trained, np.zeros(structure.n_own)])
+    R = _information_root(fit.J, p)
+    _, whiteners = filters(structure, v, reference.floor, reference.levels)
+    n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
+
+    def evaluate(v: Array) -> tuple[Array, Array]:
+        z, J = whitened(structure, v, whiteners)
+        prior = np.zeros((len(R), v.size))
+        prior[:, :p] = R
+        keep = np.r_[0:n, n + n_known:z.size]  # the parameters' own priors are in R already
+        return np.concatenate([z[keep], -R @ (v[:p] - trained)]), np.concatenate([J[keep], prior])
+
+    low, high = (bound.copy() for bound in structure.bounds)
+    low[:p], high[:p] = trained, trained
+    return structure, descend(evaluate, v, (low, high), 20, 1e-4), n
 
 
 def _information_root(J: Array, p: int) -> Array:
@@ -175,15 +220,18 @@ def _information_root(J: Array, p: int) -> Array:
 
 
 def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
-    """Free-run rms that sensor noise and random heat alone would give [K]."""
+    """Free-run rms that sensor noise and random heat alone would give [K]; 1 of frequency responses alone."""
     structure = fit.structure
     paths = fit.paths
     if data is not None:
-        starts = tuple(initial_of(fit.system, one, "measured") for one in data)
+        starts = tuple(start_of(fit.system, one, "measured") for one in data)
         structure = replace(structure, data=tuple(data), starts=starts)
-        paths, _ = filters(structure, fit.v[:structure.n_parameters + structure.n_effects], fit.floor, fit.levels)
+        v = np.concatenate([fit.v[:structure.n_parameters + structure.n_effects], np.zeros(structure.n_own)])
+        paths = paths_of(structure, v)
     total, count = 0.0, 0
     for path in paths:
+        if not isinstance(path, Along):
+            continue
         noise, disturbance = fit.levels.of(path, fit.floor)
         A, P = path.steps[0], np.zeros(path.M.shape[1:])
         Q = gathered(path, disturbance)
@@ -191,4 +239,4 @@ def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
             total += float(np.trace(path.C @ P @ path.C.T)) + float(noise @ noise)
             P = A[k] @ P @ A[k].T + Q[k]
         count += path.one.readings.size
-    return float(np.sqrt(total / count))
+    return float(np.sqrt(total / count)) if count else 1.0

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._adequacy import adequacy, spline_tests
+from ._along import Along
+from ._frequency_locate import bands
 from ._refit import Refit
 
 Array = NDArray[np.float64]
@@ -85,20 +87,24 @@ def locate(fit: Refit) -> Location:
     """
     tests = spline_tests(fit)
     return Location({name: p for name, (_, p) in tests.items()}, {name: F for name, (F, _) in tests.items()},
-                    adequacy(fit).sensors, _conditions(fit))
+                    adequacy(fit).sensors, (*_conditions(fit), *bands(fit)))
 
 
 def _conditions(fit: Refit) -> tuple[str, ...]:
     """The bin with the largest mean square of the innovations, for each way of looking at them."""
-    sizes = [np.mean(z**2, axis=1) for z in fit.innovations()]
-    out = [_worst("time [s]", [path.time for path in fit.paths], sizes)]
+    paths = fit.along
+    if not paths:
+        return ()
+    sizes = [np.mean(z**2, axis=1) for z, path in zip(fit.innovations(), fit.paths, strict=True)
+             if isinstance(path, Along)]
+    out = [_worst("time [s]", [path.time for path in paths], sizes)]
     for column, name in enumerate(fit.system.exogenous_names):
-        values = [path.u[:, column] for path in fit.paths]
+        values = [path.u[:, column] for path in paths]
         if np.ptp(np.concatenate(values)) > 0:
             out.append(_worst(name, values, sizes))
-    for name in dict.fromkeys(name for path in fit.paths for name in path.one.sensors):
+    for name in dict.fromkeys(name for path in paths for name in path.one.sensors):
         kept = [(path.one.readings[:, path.one.sensors.index(name)], size) for path, size in
-                zip(fit.paths, sizes, strict=True) if name in path.one.sensors]
+                zip(paths, sizes, strict=True) if name in path.one.sensors]
         out.append(_worst(f"{name} [K]", [value for value, _ in kept], [size for _, size in kept]))
     out.append(_frequency(fit))
     return tuple(out)
@@ -116,9 +122,11 @@ def _worst(what: str, values: list[Array], sizes: list[Array]) -> str:
 
 def _frequency(fit: Refit) -> str:
     power = []
-    for z, one in zip(fit.innovations(), fit.structure.data, strict=True):
+    for z, path in zip(fit.innovations(), fit.paths, strict=True):
+        if not isinstance(path, Along):
+            continue
         spectrum = np.mean(np.abs(np.fft.rfft(z, axis=0)[1:]) ** 2, axis=1) / len(z)
-        frequency = np.fft.rfftfreq(len(z), one.record.sample_time)[1:]
+        frequency = np.fft.rfftfreq(len(z), path.h)[1:]
         for low, high in zip(np.geomspace(frequency[0], frequency[-1], _BINS + 1)[:-1],
                              np.geomspace(frequency[0], frequency[-1], _BINS + 1)[1:], strict=True):
             inside = (frequency >= low) & (frequency <= high)

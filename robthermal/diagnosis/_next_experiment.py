@@ -2,25 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration._data import Data
-from ..errors import Diverged
+from ..errors import Diverged, InputError
 from ..signals import Record
-from ..thermal import simulate
-from ._refit import Refit, filters, whitened
-from ._score import columns
+from ..thermal import simulate, trajectory
+from ._decide import Decision
+from ._effect import Candidate
+from ._joint_sets import refit_set
+from ._refit import Refit
+from ._score import score_candidates
+from ._separation import Hypothesis, Pair, hypotheses_of, separations
 from ._short_list import Entry
+from ._trial_inputs import Limits, crossed, drawn, limits_of, towards_rest
 
 Array = NDArray[np.float64]
-_DWELLS = (4, 10, 30, 100)  # samples
+MOST = 4  # candidates that one experiment is designed for
 _ENOUGH = 20.0  # expected ΔBIC that makes a name nearly certain
+_PLENTY = 80.0  # a search that reaches it ends
+_ALIKE = 0.5  # expected ΔBIC below which no input is said to separate a pair
+_FIRST = 5  # evaluations of the refit of an alias, which is as good as its twin already
+_INSTEAD = {
+    "ambient_gradient": "a second ambient sensor beside {0}",
+    "heat_source": "switch off what could heat {0}, or a heat-flux sensor there",
+    "sensor_self_heating": "read {0} with another excitation current",
+    "sensor_offset": "compare {0} with a reference thermometer in an isothermal soak",
+    "sensor_gain": "compare {0} with a reference thermometer at two temperatures",
+    "input_offset": "measure the current or power of {0} itself",
+    "input_gain": "measure the current or power of {0} itself",
+    "input_delay": "record the current or power of {0} itself, sampled faster",
+    "input_lag": "record the current or power of {0} itself, sampled faster",
+    "joule_split": "measure the voltage of {0}: it gives its resistance alone",
+    "resistance_slope": "measure the voltage of {0}: it gives its resistance alone",
+    "lead_heating": "measure the voltage across the leads of {1} and across {1} alone",
+    "thomson": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
+    "seebeck_slope": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +55,14 @@ class NextExperiment:
     record : Record
         Inputs to apply; its outputs are what the best candidate predicts [K].
     expected : float
-        Expected squared distance of the closest two candidates on it, nominal parameters profiled out: about the ΔBIC.
+        Expected ΔBIC between the closest two candidates that any input tells apart, from this record with the present
+        ones, everything refitted.
     present : float
-        The same of the present records' inputs.
+        The same if the present inputs were repeated.
     pairs : dict
-        Expected distance of every pair, by labels.
+        Expected ΔBIC of every pair, by labels.
+    inseparable : tuple of (str, str)
+        Pairs that no trial input tells apart: something else has to be measured.
     advice : str
         In words.
     """
@@ -44,7 +70,8 @@ class NextExperiment:
     record: Record
     expected: float
     present: float
-    pairs: dict[tuple[str, str], float]
+    pairs: dict[Pair, float]
+    inseparable: tuple[Pair, ...]
     advice: str
 
     def __str__(self) -> str:
@@ -55,24 +82,33 @@ class NextExperiment:
         return self.record.plot()
 
 
-def next_experiment(entries: Sequence[Entry], *, trials: int = 16, seed: int = 0) -> NextExperiment:
+def next_experiment(entries: Sequence[Entry], *, trials: int = 12, seed: int = 0,
+                    temperature: tuple[float, float] | None = None) -> NextExperiment:
     """Find an input that separates candidates.
 
-    Linearised T-optimality (Hunter and Reiner 1965) with the nominal parameters profiled out: the smallest over the
-    pairs of β² ‖J'‖² (1 - c²) is made as large as `trials` random staircases within the limits allow.
+    T-optimality (Hunter and Reiner 1965) with everything refitted: the smallest over the pairs of the expected gain of
+    ΔBIC is made large over switched, stepped and multisine inputs within the limits, one input at a time or all
+    together; a coordinate search then improves the best.
 
     Parameters
     ----------
     entries : sequence of Entry
-        Two candidates or more that the records cannot tell apart.
+        Two candidates or more that the records cannot tell apart; the first four are told apart.
     trials : int
-        Random inputs tried.
+        Inputs tried, as many again to improve the best; a search that has found plenty ends earlier.
     seed : int
         Of the random numbers.
+    temperature : tuple of float, optional
+        Lowest and highest temperature allowed of any lump [K], as the best candidate predicts it.
 
     Returns
     -------
     NextExperiment
+
+    Raises
+    ------
+    InputError
+        Fewer than two candidates, no record in the time domain.
 
     Examples
     --------
@@ -92,70 +128,145 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 16, seed: int = 0
     >>> plan.expected > plan.present
     True
     """
-    best = entries[0]
+    search = _search_of(entries[:MOST], temperature)
     rng = np.random.default_rng(seed)
-    one = best.fit.structure.data[0]
-    present = separations(entries, one.record)
-    tried = []
+    repeated = search.at(search.one.record)
+    tried = [repeated]
     for number in range(trials):
-        record = staircase(best.fit, one, _DWELLS[number % len(_DWELLS)], rng)
-        try:
-            found = separations(entries, record)
-        except Diverged:
-            continue
-        tried.append((min(found.values()), number, found, record))
-    now = min(present.values())
-    if not tried:
-        return NextExperiment(one.record, now, now, present, "Every trial input runs away: set limits of the inputs.")
-    expected, _, pairs, record = max(tried, key=lambda item: item[:2])
-    hints = {entry.candidate.effect.separated_by for entry in entries if entry.candidate.effect.separated_by}
-    advice = (f"Apply the inputs of this plan: expected ΔBIC {expected:.0f} between the closest two candidates "
-              f"(the present inputs: {now:.0f})." if expected > _ENOUGH else
-              f"No input within the limits separates them well (expected ΔBIC {expected:.0f}); try: "
-              f"{'; '.join(sorted(hints))}.")
-    return NextExperiment(simulate(best.fit.system, record), expected, now, pairs, advice)
+        tried.append(search.at(drawn(search.one, search.limits, number, rng)))
+        if search.plenty(tried):
+            break
+    else:
+        for _ in range(trials if search.limits else 0):
+            tried.sort(key=search.worth)
+            other = tried[int(rng.integers(len(tried)))]
+            tried.append(search.at(crossed(tried[-1].record, other.record, search.limits, rng)))
+            if search.plenty(tried):
+                break
+    return _plan(entries, search, repeated, tried)
 
 
-def staircase(fit: Refit, one: Data, dwell: int, rng: np.random.Generator) -> Record:
-    """Random steps of every input within its limits (of the record where none are declared); ambients as measured."""
-    record, system = one.record, fit.system
-    limits = {**system.input_limits, **system.current_limits}
-    inputs = np.array(record.inputs, float)
-    n = len(record)
-    for column, name in enumerate(record.input_names):
-        if name in limits:
-            low, high = limits[name] or (float(inputs[:, column].min()), float(inputs[:, column].max()))
-            steps = rng.uniform(low, high, n // dwell + 2)
-            inputs[:, column] = np.repeat(steps, dwell)[:n]
-    return Record(sample_time=record.sample_time, inputs=inputs, outputs=record.outputs,
-                  input_names=record.input_names, output_names=record.output_names, name="next experiment")
+def rivals(decision: Decision) -> tuple[Entry, ...]:
+    """Best candidate and everything the records cannot tell from it, exact aliases refitted too."""
+    best = decision.best
+    if best is None:
+        return ()
+    entries = [best, *decision.contenders]
+    known = {entry.candidate.key for entry in entries}
+    for entry in tuple(entries):
+        for alias in entry.aliases:
+            if alias.key not in known and len(entries) < MOST:
+                known.add(alias.key)
+                entries += _alias(decision.before, alias)
+    return tuple(entries)
 
 
-def separations(entries: Sequence[Entry], record: Record) -> dict[tuple[str, str], float]:
-    """Squared distance of every pair of candidates on a record, in whitened units, nominal parameters profiled out."""
-    fit = entries[0].fit
-    one = fit.structure.data[0]
-    trial = Data(record, one.sensors, one.columns, one.readings)
-    own = replace(fit.structure, data=(trial,), starts=fit.structure.starts[:1])
-    bare = own.with_effects(fit.structure.effects[:-1])
-    v = bare.start(fit.structure.ranges.values(fit.v[:bare.n_parameters]), fit.structure.quantities(fit.v)[:-1])
-    paths, whiteners = filters(bare, v, fit.floor, fit.levels)
-    J0 = whitened(bare, v, whiteners)[1]
-    signatures, sizes = [], []
-    for entry in entries:
-        value = entry.values
-        shape = {name: value[name][0] for name in entry.candidate.shape}
-        signatures.append(columns(paths[0], [replace(entry.candidate, shape=shape)]))
-        sizes.append(value[entry.candidate.effect.size.name][0])
-    J = np.zeros((len(J0), len(entries)))
-    J[:trial.readings.size] = whiteners[0](np.concatenate(signatures, axis=2)).reshape(-1, len(entries)) * sizes
-    scale = np.linalg.norm(J0, axis=0)
-    U, s, _ = np.linalg.svd(J0 / np.where(scale > 0, scale, 1.0), full_matrices=False)
-    U = U[:, s > 1e-9 * s[0]]
-    J = J - U @ (U.T @ J)
-    out = {}
-    for i, j in combinations(range(len(entries)), 2):
-        a, b = J[:, i], J[:, j]
-        cos2 = float(a @ b) ** 2 / max(float(a @ a) * float(b @ b), 1e-300)
-        out[entries[i].candidate.label, entries[j].candidate.label] = min(float(a @ a), float(b @ b)) * (1.0 - cos2)
-    return out
+def _alias(before: Refit, alias: Candidate) -> list[Entry]:
+    scores = score_candidates(before, [alias])
+    if not scores.candidates:
+        return []
+    try:
+        found = refit_set(before, scores.candidates, scores.size.tolist(), limit=_FIRST)
+    except (Diverged, InputError):
+        return []
+    return [Entry(found.candidates[0], found.fit, found.delta_bic, float(scores.p_value[0]))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Inputs with the separation they promise; no pairs if they cannot be applied."""
+
+    record: Record
+    pairs: dict[Pair, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What all trials share."""
+
+    best: Refit
+    hypotheses: tuple[Hypothesis, ...]
+    place: int
+    one: Data
+    limits: Mapping[str, Limits]
+    temperature: tuple[float, float] | None
+
+    def at(self, record: Record) -> _Trial:
+        """Evaluate inputs; those that get too warm are brought nearer to rest."""
+        for _ in range(4):
+            try:
+                if self._allowed(record):
+                    return _Trial(record, separations(self.hypotheses, self.best, self.place, record))
+            except (Diverged, InputError):  # one of the candidates runs away
+                pass
+            record = towards_rest(record, self.limits, 0.6)
+        return _Trial(record, {})
+
+    def _allowed(self, record: Record) -> bool:
+        if self.temperature is None:
+            return True
+        x = trajectory(self.best.structure.systems(self.best.v)[self.place], record).lumps
+        return bool(x.min() >= self.temperature[0] and x.max() <= self.temperature[1])
+
+    def worth(self, trial: _Trial) -> tuple[float, float]:
+        """Pairs told apart, none counting more than plenty; a pair that no input separates must not decide."""
+        values = list(trial.pairs.values())
+        return sum(min(value, _PLENTY) for value in values), min(values, default=0.0)
+
+    def plenty(self, tried: Sequence[_Trial]) -> bool:
+        """Whether a trial separates every pair; or nothing has separated any."""
+        best = max(tried, key=self.worth)
+        hopeless = len(tried) > 8 and self.worth(best)[0] < _ALIKE
+        return hopeless or bool(best.pairs) and min(best.pairs.values()) >= _PLENTY
+
+
+def _search_of(entries: Sequence[Entry], temperature: tuple[float, float] | None) -> _Search:
+    if len(entries) < 2:
+        raise InputError(f"{len(entries)} candidates", where="argument entries", expected="two or more to tell apart")
+    best = entries[0].fit
+    places = [i for i, one in enumerate(best.structure.data) if isinstance(one, Data)]
+    if not places:
+        raise InputError("no record in the time domain", where="argument entries",
+                         remedy="Measure a record; inputs are designed in the time domain.")
+    one = best.structure.data[places[0]]
+    assert isinstance(one, Data)
+    return _Search(best, hypotheses_of(entries), places[0], one, limits_of(best.system, one.record), temperature)
+
+
+def _plan(entries: Sequence[Entry], search: _Search, repeated: _Trial, tried: Sequence[_Trial]) -> NextExperiment:
+    best = max(tried, key=search.worth)
+    if not best.pairs:
+        return NextExperiment(search.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or runs away: "
+                              "set limits of the inputs, or start from another state.")
+    alike = tuple(pair for pair in best.pairs if max(t.pairs.get(pair, 0.0) for t in tried) < _ALIKE)
+    apart = [pair for pair in best.pairs if pair not in alike]
+    expected = min((best.pairs[pair] for pair in apart), default=0.0)
+    now = min((repeated.pairs.get(pair, 0.0) for pair in apart), default=0.0)
+    record = simulate(search.best.structure.systems(search.best.v)[search.place], best.record)
+    named = {entry.candidate.label: entry.candidate for entry in entries}
+    return NextExperiment(record, expected, now, best.pairs, alike, _advice(named, alike, apart, expected, now))
+
+
+def _advice(named: Mapping[str, Candidate], alike: Sequence[Pair], apart: Sequence[Pair], expected: float,
+            now: float) -> str:
+    text = []
+    if apart and expected > _ENOUGH:
+        text.append(f"Apply the inputs of this plan: expected ΔBIC {expected:.0f} between the closest two candidates "
+                    f"that inputs tell apart (the present inputs once more: {now:.0f}).")
+    elif apart:
+        hints = {named[label].effect.separated_by for pair in apart for label in pair} - {""}
+        longer = f"; {np.ceil(_ENOUGH / expected):.0f} such records" if expected > 1.0 else ""
+        text.append(f"The inputs of this plan separate them little (expected ΔBIC {expected:.1f}){longer}. "
+                    f"What separates them: {'; '.join(sorted(hints))}.")
+    if alike:
+        labels = list(dict.fromkeys(label for pair in alike for label in pair))
+        measure = dict.fromkeys(_instead(named[label]) for label in labels)
+        text.append(f"No input within the limits tells {' from '.join(labels)}. Measure something else: "
+                    f"{'; '.join(measure)}.")
+    return " ".join(text)
+
+
+def _instead(candidate: Candidate) -> str:
+    """What would show this effect and no alias of it."""
+    said = _INSTEAD.get(candidate.effect.name, "")
+    return said.format(*candidate.where) if said else candidate.effect.separated_by

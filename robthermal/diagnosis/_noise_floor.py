@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data, as_data
+from ..calibration._data import Data
 from ..calibration._noise import SMALLEST, declared_noise, quantum
 from ..errors import InputError, Outcome
-from ..signals import Record
 from ..thermal import System
+from ._frequency_data import Measured, ResponseData, as_measured
+from ._glitches import counted, without_glitches
 
 Array = NDArray[np.float64]
 _SHORTEST = 50  # samples
@@ -36,6 +37,10 @@ class NoiseFloor:
         Noise read off third differences, of every sensor [K]; for comparison.
     outcome : Outcome
         Code "declared", "estimated" or "doubtful" (a declared noise far from what the record shows).
+    glitches : dict
+        Number of isolated outliers of every sensor that has any; no fit sees them.
+    quantised : tuple of str
+        Sensors whose steps are more than two standard deviations of their noise: their errors are no white noise.
     """
 
     noise: dict[str, float]
@@ -43,10 +48,15 @@ class NoiseFloor:
     disturbance: dict[str, float]
     rough: dict[str, float]
     outcome: Outcome
+    glitches: dict[str, int] = field(default_factory=dict)
+    quantised: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{'sensor':<12} {'noise [K]':>10} {'differences [K]':>16}"]
         lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>16.4g}" for name, level in self.noise.items()]
+        lines += [f"{name}: {n} isolated outliers left out" for name, n in self.glitches.items()]
+        lines += [f"{name}: quantised; its errors count as noise of step/√12, and are not tested for whiteness"
+                  for name in self.quantised]
         return "\n".join([*lines, str(self.outcome)])
 
     def plot(self) -> Any:
@@ -62,18 +72,22 @@ class NoiseFloor:
         return ax
 
 
-def noise_floor(system: System, records: Record | Sequence[Record], *,
-                noise: Mapping[str, float] | float | None = None) -> NoiseFloor:
+def noise_floor(system: System, records: Measured | Sequence[Measured], *,
+                noise: Mapping[str, float] | float | None = None,
+                operating_point: Mapping[str, float] | None = None) -> NoiseFloor:
     """Find the noise of every sensor: declared, or else read off the record.
 
     Parameters
     ----------
     system : System
         With the declared `noise` of its sensors and `disturbance` of its lumps.
-    records : Record or list of Record
-        Measured.
+    records : Record, FrequencyResponse, or list of them
+        Measured. Of a frequency response every element "output/input" is listed with its median relative standard
+        deviation, as estimated with the response.
     noise : mapping or float, optional
         Overrides the declared noise [K].
+    operating_point : mapping, optional
+        As in `refit`.
 
     Returns
     -------
@@ -96,7 +110,16 @@ def noise_floor(system: System, records: Record | Sequence[Record], *,
     >>> floor.outcome.code, round(floor.noise["T"], 3)
     ('estimated', 0.02)
     """
-    data = as_data(system, records, "records")
+    measured = as_measured(system, records, "records", operating_point)
+    relative = {name: float(level) for one in measured if isinstance(one, ResponseData)
+                for name, level in zip(one.sensors, one.noise, strict=True)}
+    data = [one for one in measured if isinstance(one, Data)]
+    if not data and noise is not None:
+        raise InputError("noise is given with a frequency response", where="argument noise",
+                         remedy="Leave it out: the response brings its covariance.")
+    if not data:
+        return NoiseFloor(relative, (), {}, relative, Outcome(True, "estimated", "Noise of the elements as estimated "
+                                                              "with the frequency response, relative to its size."))
     for one in data:
         if len(one.record) < _SHORTEST:
             raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
@@ -111,7 +134,9 @@ def noise_floor(system: System, records: Record | Sequence[Record], *,
                              remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
-    return NoiseFloor(noise_of, unknown, disturbance, rough, _outcome(noise_of, rough, unknown))
+    glitches = counted(without_glitches(system, data, noise_of))
+    return NoiseFloor({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
+                      _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
 
 
 def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...]) -> Outcome:
@@ -123,6 +148,13 @@ def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[st
     if unknown:
         return Outcome(True, "estimated", f"Noise of {', '.join(unknown)} estimated from third differences.")
     return Outcome(True, "declared", "Noise as declared.")
+
+
+def _quantised(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:
+    """Sensors whose noise is nothing but their steps: q/√12 of them is most of it."""
+    steps = {name: max(quantum(one.readings[:, one.sensors.index(name)]) for one in data if name in one.sensors)
+             for name in noise}
+    return tuple(name for name, step in steps.items() if step / 12**0.5 > 0.7 * noise[name])
 
 
 def _rough(data: list[Data], name: str) -> float:

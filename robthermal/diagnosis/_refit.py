@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,20 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import as_data
 from ..calibration._ranges import NONE, Choice, chosen_ranges
-from ..calibration._start import initial_of
 from ..errors import Diverged, InputError, Outcome
-from ..signals import Record
 from ..thermal import System
 from ._along import Along, along
 from ._descent import Descent, descend
+from ._effect import Candidate
+from ._frequency_data import Measured, ResponseData, as_measured
+from ._frequency_model import AlongResponse, along_response
+from ._frequency_whitening import ResponseWhitener
+from ._glitches import without_glitches
 from ._levels import Levels, refined
 from ._noise_floor import NoiseFloor, noise_floor
-from ._structure import Structure, structure_of
+from ._sessions import SessionGain, session_table, sessions_of
+from ._structure import Structure, start_of, structure_of
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
+Path = Along | AlongResponse
+White = Whitener | ResponseWhitener
 LIMIT = 40  # evaluations of a refit
 _ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
 _FLAT = 1e-9  # relative size of a direction of J that counts as none
@@ -44,10 +49,10 @@ class Refit:
         Where the noise levels came from.
     levels : Levels
         Factors on them, re-estimated within limits.
-    paths : tuple of Along
-        Linearisation along every record.
-    whiteners : tuple of Whitener
-        One per record.
+    paths : tuple of Along or AlongResponse
+        Linearisation along every record; the modelled frequency response beside every measured one.
+    whiteners : tuple of Whitener or ResponseWhitener
+        One per record or frequency response.
     z : ndarray, shape (m,)
         Whitened residuals of all readings, then of the priors.
     J : ndarray, shape (m, p)
@@ -60,8 +65,8 @@ class Refit:
     v: Array
     floor: NoiseFloor
     levels: Levels
-    paths: tuple[Along, ...]
-    whiteners: tuple[Whitener, ...]
+    paths: tuple[Path, ...]
+    whiteners: tuple[White, ...]
     z: Array
     J: Array
     outcome: Outcome
@@ -109,8 +114,9 @@ class Refit:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Rows less directions fitted."""
-        return self.z.size - self.basis.shape[1]
+        """Rows less missing readings and directions fitted."""
+        return self.z.size - self.basis.shape[1] - sum(
+            int(path.one.missing.sum()) for path in self.along if path.one.missing is not None)
 
     @property
     def variance(self) -> float:
@@ -123,7 +129,7 @@ class Refit:
         Parameters
         ----------
         per_record : sequence of ndarray, shape (n, n_sensors, k)
-            One per record [K].
+            One per record [K]; (2 n_b, m, k) for a frequency response.
 
         Returns
         -------
@@ -143,13 +149,43 @@ class Refit:
 
     @cached_property
     def residuals(self) -> tuple[Array, ...]:
-        """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]."""
+        """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]; of a response (2 n_b, m)."""
         return tuple(path.one.readings - path.readings[:, path.one.columns] for path in self.paths)
 
     @property
     def rms(self) -> float:
-        """Root mean square of the free-run residual over all sensors [K]."""
-        return float(np.sqrt(np.mean(np.concatenate([r.ravel() for r in self.residuals]) ** 2)))
+        """Root mean square of the free-run residual over all sensors of the records [K].
+
+        Without any record: of the whitened residual of the responses, in standard deviations of their noise.
+        """
+        if not self.along:
+            return float(np.sqrt(np.mean(self.z[:self.n_readings] ** 2)))
+        own = [r.ravel() for path, r in zip(self.paths, self.residuals, strict=True) if isinstance(path, Along)]
+        return float(np.sqrt(np.mean(np.concatenate(own) ** 2)))
+
+    @property
+    def along(self) -> tuple[Along, ...]:
+        """Linearisations along the records, without the frequency responses."""
+        return tuple(path for path in self.paths if isinstance(path, Along))
+
+    @property
+    def unit(self) -> str:
+        """Unit of `rms`."""
+        return "K" if self.along else "standard deviations"
+
+    def testable(self, tested: Iterable[Candidate]) -> list[Candidate]:
+        """Candidates that these data may show.
+
+        Parameters
+        ----------
+        tested : iterable of Candidate
+            All.
+
+        Returns
+        -------
+        list of Candidate
+        """
+        return [candidate for candidate in tested if not self.structure.hides(candidate)]
 
     @cached_property
     def covariance(self) -> Array:
@@ -164,36 +200,45 @@ class Refit:
         ranges = self.structure.ranges
         values = ranges.values(self.v[:len(ranges.names)])
         lines = [f"{name} = {value:.6g}" for name, value in zip(ranges.names, values, strict=True)]
-        lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), free-run rms {self.rms:.4g} K")
+        labels = [path.one.label for path in self.along]
+        gains = [g for path, g in zip(self.paths, self.structure.gains(self.v), strict=True) if isinstance(path, Along)]
+        lines += session_table(self.structure.sessions, labels, gains)
+        lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), rms {self.rms:.4g} {self.unit}")
         return "\n".join([*lines, str(self.levels), str(self.outcome)])
 
     def plot(self) -> Any:
-        """Free-run residuals [K] of every sensor against time; returns the matplotlib axes."""
+        """Residuals of every record against time [K], of every response against frequency; returns the axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(len(self.paths), 1, squeeze=False, layout="constrained")
         for ax, path, r in zip(axes[:, 0], self.paths, self.residuals, strict=True):
-            ax.plot(path.time, r, linewidth=0.7, label=path.one.sensors)
-            ax.set(ylabel="measured − model [K]", title=path.one.label)
+            path.draw(ax, r)
+            ax.set(title=path.one.label)
             ax.legend(fontsize="small")
-        axes[-1, 0].set(xlabel="time [s]")
         return axes[:, 0]
 
 
-def refit(system: System, records: Record | Sequence[Record], floor: NoiseFloor | None = None, *,
-          parameters: Choice = None) -> Refit:
+def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFloor | None = None, *,
+          parameters: Choice = None, operating_point: Mapping[str, float] | None = None,
+          session_gain: SessionGain = False) -> Refit:
     """Refit the nominal parameters and the initial temperatures to the records, with their priors.
 
     Parameters
     ----------
     system : System
         Nominal. `sigma` in its fit table are the priors.
-    records : Record or list of Record
+    records : Record, FrequencyResponse, or list of them
         Measured.
     floor : NoiseFloor, optional
         From `noise_floor`.
     parameters : iterable or mapping, optional
         As in `rt.calibrate`. Default: the fit table; without one, all parameters are taken as known.
+    operating_point : mapping, optional
+        For frequency responses: mean heaters [unit], module currents [A] and ambients [K] of the experiment; default
+        off and nominal.
+    session_gain : bool or mapping
+        Whether every record has a gain of its own of every heater and module: True, with a prior of 5 %, or a mapping
+        from input to the standard deviation of its gain [-].
 
     Returns
     -------
@@ -220,11 +265,11 @@ def refit(system: System, records: Record | Sequence[Record], floor: NoiseFloor 
     True
     """
     floor = noise_floor(system, records) if floor is None else floor
-    data = as_data(system, records, "records")
+    data = without_glitches(system, as_measured(system, records, "records", operating_point), floor.noise)
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
-    starts = [initial_of(system, one, "free") for one in data]
-    structure = structure_of(system, ranges, data, starts)
-    n_unknown = structure.n_parameters + sum(start.n_free for start in starts)
+    starts = [start_of(system, one) for one in data]
+    structure = structure_of(system, ranges, data, starts, sessions_of(system, session_gain))
+    n_unknown = structure.n_parameters + structure.n_own
     if structure.n_readings <= 2 * n_unknown:
         raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
                          expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
@@ -241,8 +286,8 @@ def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) ->
         paths, whiteners = filters(structure, v, floor, levels)
         found = minimised(structure, v, whiteners)
         v = found.v
-        paths = tuple(along(system, one) for system, one in zip(structure.systems(v), structure.data, strict=True))
-        new = refined(paths, floor, levels)
+        paths = paths_of(structure, v)
+        new = _refined(paths, floor, levels)
         if new.close_to(levels):
             break
         levels = new
@@ -259,24 +304,39 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
 
 def relinearised(fit: Refit) -> Refit:
     """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
-    systems = fit.structure.systems(fit.v)
-    paths = tuple(along(system, one) for system, one in zip(systems, fit.structure.data, strict=True))
-    return replace(fit, paths=paths)
+    return replace(fit, paths=paths_of(fit.structure, fit.v))
 
 
 def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
-            ) -> tuple[tuple[Along, ...], tuple[Whitener, ...]]:
-    """Linearisation and filter of every record."""
-    paths = tuple(along(system, one) for system, one in zip(structure.systems(v), structure.data, strict=True))
-    return paths, tuple(whitener(path, *levels.of(path, floor)) for path in paths)
+            ) -> tuple[tuple[Path, ...], tuple[White, ...]]:
+    """Linearisation and filter of every record; whitener of every response."""
+    paths = paths_of(structure, v)
+    return paths, tuple(path.one.white if isinstance(path, AlongResponse) else
+                        whitener(path, *levels.of(path, floor)) for path in paths)
 
 
-def minimised(structure: Structure, v: Array, whiteners: Sequence[Whitener], limit: int = LIMIT) -> Descent:
+def paths_of(structure: Structure, v: Array) -> tuple[Path, ...]:
+    """Linearisation along every record; the modelled response beside every measured one."""
+    return tuple(along_response(system, one) if isinstance(one, ResponseData) else run.path or along(system, one)
+                 for system, one, run in zip(structure.systems(v), structure.data, structure.runs(v), strict=True))
+
+
+def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels:
+    """Noise levels of the records; those of responses come with them."""
+    records = [path for path in paths if isinstance(path, Along)]
+    if not records:
+        return levels
+    sensors = {name for path in records for name in path.one.sensors}
+    return refined(records, replace(floor, noise={name: floor.noise[name] for name in floor.noise if name in sensors}),
+                   levels)
+
+
+def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
     return descend(lambda v: whitened(structure, v, whiteners), v, structure.bounds, limit, _ENOUGH)
 
 
-def whitened(structure: Structure, v: Array, whiteners: Sequence[Whitener]) -> tuple[Array, Array]:
+def whitened(structure: Structure, v: Array, whiteners: Sequence[White]) -> tuple[Array, Array]:
     """Whitened residuals of all readings, then of the priors, and the derivative of the model."""
     z, J = [], []
     for run, w in zip(structure.runs(v), whiteners, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ..errors import InputError
 from ._decide import Decision, settled
 from ._effect import Candidate
 from ._refit import Refit, extended, relinearised
@@ -35,7 +36,10 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
         changed = False
         for place in range(len(decisions) - 1, -1, -1):
             others, values = _without(fit, place)
-            structure = nominal.structure.with_effects(others)
+            try:
+                structure = nominal.structure.with_effects(others)
+            except InputError:  # another effect acts on a part that this one adds
+                continue
             before = relinearised(extended(fit, structure, structure.carried(fit.structure, fit.v, values)))
             short = refit_short_list(before, score(before, names), length=_LENGTH)
             if not short.entries or short.entries[0].delta_bic < BIC_GAP:

@@ -18,6 +18,8 @@ from ..thermal import trajectory
 from ._along import Along, Response
 from ._catalogue import candidates
 from ._effect import Candidate
+from ._frequency_model import AlongResponse
+from ._frequency_tails import inflation, tail
 from ._refit import Refit
 
 Array = NDArray[np.float64]
@@ -169,13 +171,14 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     >>> scores.candidates[scores.order[0]].label
     'sensor_lag(T)'
     """
-    return score_candidates(fit, candidates(fit.system, effects))
+    return score_candidates(fit, fit.testable(candidates(fit.system, effects)))
 
 
 def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     """Score these candidates, each at the best of its trial values."""
     trials = [(number, trial) for number, candidate in enumerate(tested) for trial in candidate.trials(fit.paths[0])]
-    J = fit.whiten([columns(path, [trial for _, trial in trials]) for path in fit.paths])
+    J = (fit.whiten([columns(path, [trial for _, trial in trials]) for path in fit.paths]) if trials else
+         np.zeros((fit.z.size, 0)))
     trials, J, n_columns = turned(fit, trials, J)
     length = np.linalg.norm(J, axis=0)
     rest = fit.project(fit.project(J))
@@ -187,16 +190,17 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     nu = max(fit.degrees_of_freedom - 1, 1)
     power = float(fit.rest @ fit.rest)
     variance = np.maximum(power - along**2, 1e-12 * power) / nu
-    statistic = along**2 / variance
+    statistic = along**2 / variance / inflation(fit, unit)
     # the phase of a pair was chosen by the data: two degrees of freedom
-    p_value = np.minimum(f_distribution.sf(statistic / n_columns, n_columns, nu) * max(len(trials), 1), 1.0)
+    chance = f_distribution.sf(statistic / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
+    p_value = np.minimum(chance * max(len(trials), 1), 1.0)
     size, std = along / own_safe, np.sqrt(variance) / own_safe
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
     threshold = math.sqrt(max(norm.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
-    limit = np.where(visible, (threshold + norm.ppf(POWER)) * math.sqrt(max(fit.variance, 1.0)) / own_safe, np.inf)
+    limit = np.where(visible, (threshold + norm.ppf(POWER)) / own_safe, np.inf)  # z has unit noise, whatever is missing
     possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
                          in zip(trials, size, std, strict=True)], bool)
-    best = _best_of([number for number, _ in trials], statistic, possible, len(tested))
+    best = _best_of(trials, statistic, size, possible)
     return Scores(tuple(trials[i][1] for i in best), size[best], std[best], statistic[best], p_value[best],
                   possible[best] & visible[best], identifiability[best], limit[best], unit[:, best], len(trials))
 
@@ -224,14 +228,18 @@ def turned(fit: Refit, trials: list[tuple[int, Candidate]], J: Array
     return kept, np.column_stack(merged) if merged else J, np.array(count, np.intp)
 
 
-def _best_of(owner: list[int], statistic: Array, possible: NDArray[np.bool_], n: int) -> list[int]:
-    """Best trial of every candidate that has one: possible ones first."""
-    out = []
-    for number in range(n):
-        own = [i for i, who in enumerate(owner) if who == number]
-        if own:
-            out.append(max(own, key=lambda i: (bool(possible[i]), statistic[i])))
-    return out
+def _best_of(trials: Sequence[tuple[int, Candidate]], statistic: Array, size: Array, possible: NDArray[np.bool_]
+             ) -> NDArray[np.intp]:
+    """Best trial of every candidate that has one: possible ones first; of equals the one whose size was tried."""
+    best: dict[int, tuple[tuple[bool, float, float], int]] = {}
+    for i, (number, trial) in enumerate(trials):
+        tried = trial.shape.get(trial.effect.size.name)
+        off = abs(math.log(max(size[i], 1e-300) / tried)) if tried else 0.0
+        height = math.log(max(statistic[i], 1e-300))
+        rank = (bool(possible[i]), round(height, 1) if tried else height, -off)
+        if number not in best or rank > best[number][0]:
+            best[number] = rank, i
+    return np.array([best[number][1] for number in sorted(best)], np.intp)
 
 
 def _possible(trial: Candidate, size: float, std: float) -> bool:
@@ -240,8 +248,10 @@ def _possible(trial: Candidate, size: float, std: float) -> bool:
     return bounds.lower - 2 * std < size < bounds.upper + 2 * std and (size != 0)
 
 
-def columns(path: Along, trials: Sequence[Candidate]) -> Array:
-    """Change of the readings (n, n_sensors, k) per unit of size of every trial."""
+def columns(path: Along | AlongResponse, trials: Sequence[Candidate]) -> Array:
+    """Change of the readings (n, n_sensors, k) per unit of size of every trial; of a response (2 n_b, m, k)."""
+    if isinstance(path, AlongResponse):
+        return path.columns(trials)
     linear = [i for i, trial in enumerate(trials) if trial.effect.signature is not None]
     responses: list[Response] = []
     for i in linear:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..errors import Diverged, InputError
 from ._effect import Candidate
-from ._refit import LIMIT, Refit, extended
-from ._score import BIC_GAP, Scores, columns
-from ._structure import Structure
+from ._refit import Refit, extended
+from ._score import BIC_GAP, Scores
+from ._starts import Origin, started
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
@@ -22,7 +22,6 @@ LENGTH = 7
 _FIRST = 2  # evaluations before the hopeless ones are dropped
 _LAST = 15  # more evaluations, for the others
 _BEHIND = 60.0  # ΔBIC
-_WORSE = 1.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +51,7 @@ class Entry:
     @property
     def values(self) -> dict[str, tuple[float, float]]:
         """Value and standard deviation of every quantity."""
-        return quantities_of(self.fit, len(self.fit.structure.effects) - 1)
+        return quantities_of(self.fit, [c.key for c in self.fit.structure.effects].index(self.candidate.key))
 
     @property
     def converged(self) -> bool:
@@ -134,12 +133,12 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
     for i in scores.order:
         if len(picked) < length and not set(scores.aliases(i)) & set(picked):
             picked.append(i)
-    entries, failed = [], {}
+    origin, entries, failed = Origin(fit), [], {}
     for i in picked:
         aliases = tuple(scores.candidates[j] for j in scores.aliases(i))
         try:
-            entries.append(entry_of(fit, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]), aliases,
-                                    _FIRST))
+            entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
+                                    aliases))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
     return ShortList(fit, tuple(sorted(map(finished, hopeful(entries)), key=lambda e: -e.delta_bic)), failed)
@@ -160,23 +159,12 @@ def finished(entry: Entry) -> Entry:
     return Entry(entry.candidate, fit, before_bic - fit.n_readings * math.log(fit.rss), entry.p_value, entry.aliases)
 
 
-def entry_of(fit: Refit, candidate: Candidate, size: float, p_value: float,
-             aliases: tuple[Candidate, ...] = (), limit: int = LIMIT) -> Entry:
-    """Refit one candidate from its one-step estimate; `limit` evaluations at most."""
-    structure = fit.structure.with_effect(candidate)
-    bounds = candidate.effect.size
-    size = float(np.clip(size, bounds.lower, bounds.upper))
-    column = fit.whiten([columns(path, [candidate]) for path in fit.paths])[:, 0]
-    shift = np.linalg.lstsq(fit.J, fit.z - size * column, rcond=1e-9)[0]
-    new = _from(fit, structure, candidate, np.clip(fit.v + shift, *fit.structure.bounds), size, limit)
-    if new.rss > fit.rss * _WORSE:  # a strong effect is not linear: start again without it
-        new = _from(fit, structure, candidate, fit.v, float(np.sign(size)) * bounds.typical, limit)
-    return Entry(candidate, new, delta_bic(fit, new), p_value, aliases)
-
-
-def _from(fit: Refit, structure: Structure, candidate: Candidate, v: Array, size: float, limit: int) -> Refit:
-    values = [*fit.structure.quantities(v), {**candidate.shape, candidate.effect.size.name: size}]
-    return extended(fit, structure, structure.carried(fit.structure, v, values), limit)
+def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,
+             aliases: tuple[Candidate, ...] = ()) -> Entry:
+    """Refit one candidate from the better of its starts; not to the end yet."""
+    new = started(origin, candidate, size)
+    new = extended(new, new.structure, new.v, _FIRST)
+    return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, aliases)
 
 
 def delta_bic(before: Refit, after: Refit) -> float:

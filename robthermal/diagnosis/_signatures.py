@@ -128,6 +128,12 @@ def input_delay(path: Along, where: Where, values: Values) -> Response:
     return driven(path, where[0], late, delay)
 
 
+def input_clip(path: Along, where: Where, values: Values) -> Response:
+    """What a clip at the trial level cuts off, per unit of that level: the size is the level itself."""
+    u, level = path.u[:, path.system.exogenous_names.index(where[0])], values["clip"]
+    return driven(path, where[0], np.clip(u, -level, level), level)
+
+
 def reading(path: Along, sensor: str, change: Array) -> Response:
     """Change of one sensor's reading (n,) [K]."""
     out = np.zeros_like(path.readings)

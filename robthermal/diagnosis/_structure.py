@@ -1,30 +1,43 @@
-"""Unknowns of a refit: nominal parameters, quantities of the added effects, initial temperatures of every record."""
+"""Unknowns of a refit: nominal parameters, quantities of the added effects, and what is every record's own.
+
+A record's own are its initial temperatures and its session gains; a frequency response has none.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration._data import Data
 from ..calibration._ranges import Ranges
-from ..calibration._start import Initial, initial_of, start_values
+from ..calibration._start import Initial, Start, initial_of, start_values
 from ..errors import InputError
 from ..thermal import System, trajectory
+from ._along import Along, along
 from ._effect import Candidate
+from ._frequency_data import ResponseData
+from ._frequency_model import hidden_from_response, response_slopes
+from ._sessions import Sessions
 
 Array = NDArray[np.float64]
+_KEPT = 2
 _STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One record simulated: residual measured - modelled (n, n_sensors) [K] and derivatives of the model."""
+    """One record simulated: residual measured - modelled (n, n_sensors) [K] and derivatives of the model.
+
+    Of a frequency response: (2 n_b, m), see `ResponseData.readings`.
+    """
 
     residual: Array
     slopes: Array
+    path: Along | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +50,26 @@ class Structure:
         Nominal system with its starting values.
     ranges : Ranges
         Nominal parameters that may change.
-    data : tuple of Data
-        Records.
+    data : tuple of Data or ResponseData
+        Records and frequency responses.
     starts : tuple of Initial
         Prior of every record's initial temperatures.
     effects : tuple of Candidate
         What has been added.
     tolerance : float
         Of the simulation [K].
+    sessions : Sessions
+        Gains of their own that the records may have.
     """
 
     base: System
     ranges: Ranges
-    data: tuple[Data, ...]
+    data: tuple[Data | ResponseData, ...]
     starts: tuple[Initial, ...]
     effects: tuple[Candidate, ...] = ()
     tolerance: float = 1e-4
+    sessions: Sessions = Sessions()
+    _last: dict[bytes, list[Run]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def n_parameters(self) -> int:
@@ -66,8 +83,24 @@ class Structure:
 
     @property
     def n_readings(self) -> int:
-        """Readings in all records."""
+        """Readings in all records; a frequency response counts two per complex number."""
         return sum(one.readings.size for one in self.data)
+
+    @property
+    def certainty(self) -> float:
+        """Degrees of freedom of the sum of squares, per reading: below 1 where the noise is itself an estimate."""
+        sure = [one.readings.size * (one.certainty if isinstance(one, ResponseData) else 1.0) for one in self.data]
+        return sum(sure) / self.n_readings
+
+    @property
+    def n_starts(self) -> int:
+        """Number of unknown initial temperatures in all records."""
+        return sum(start.n_free for start in self.starts)
+
+    @property
+    def n_own(self) -> int:
+        """Number of unknowns that belong to one record each: initial temperatures, then session gains."""
+        return self.n_starts + self.sessions.n_free * sum(isinstance(one, Data) for one in self.data)
 
     def quantities(self, v: Array) -> list[dict[str, float]]:
         """Quantities of every effect by name."""
@@ -85,8 +118,7 @@ class Structure:
         coordinates = [np.log(q[quantity.name]) if quantity.lower > 0 else q[quantity.name]
                        for candidate, q in zip(self.effects, quantities, strict=True)
                        for quantity in candidate.effect.free]
-        return np.concatenate([self.ranges.coordinates(parameters), coordinates,
-                               np.zeros(sum(s.n_free for s in self.starts))])
+        return np.concatenate([self.ranges.coordinates(parameters), coordinates, np.zeros(self.n_own)])
 
     def carried(self, other: Structure, v: Array, quantities: Sequence[dict[str, float]]) -> Array:
         """Unknowns at the parameters and initial temperatures of another structure; a lump that it lacks starts at its
@@ -100,6 +132,8 @@ class Structure:
                 n = min(start.mean.size, T.size)
                 out[at:at + n] = (T[:n] - start.mean[:n]) / start.sigma
             at += start.n_free
+        n_gains = self.n_own - self.n_starts
+        out[out.size - n_gains:] = v[v.size - n_gains:]
         return out
 
     @property
@@ -111,7 +145,8 @@ class Structure:
                 log = quantity.lower > 0
                 lower.append(np.log(quantity.lower) if log else quantity.lower)
                 upper.append(np.log(quantity.upper) if log else quantity.upper)
-        reach = np.full(sum(s.n_free for s in self.starts), 20.0)
+        n_sessions = sum(isinstance(one, Data) for one in self.data)
+        reach = np.concatenate([np.full(self.n_starts, 20.0), np.tile(self.sessions.reach, n_sessions)])
         q = self.ranges.coordinates
         return (np.concatenate([q(self.ranges.lower), lower, -reach]),
                 np.concatenate([q(self.ranges.upper), upper, reach]))
@@ -125,7 +160,7 @@ class Structure:
         return system
 
     def temperatures(self, v: Array) -> list[Array]:
-        """Initial lump temperatures of every record [K]."""
+        """Initial lump temperatures of every record [K]; empty for a frequency response."""
         out, at = [], self.n_parameters + self.n_effects
         for start in self.starts:
             free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0
@@ -134,29 +169,71 @@ class Structure:
         return out
 
     def systems(self, v: Array) -> list[System]:
-        """System of every record, with its initial temperatures."""
+        """System of every record, with its initial temperatures and session gains; of a response, the common one."""
         system = self.system(v)
-        return [system.with_parameters(start_values(system, T)) for T in self.temperatures(v)]
+        return [system if isinstance(one, ResponseData) else
+                self.sessions.applied(system.with_parameters(start_values(system, T)), g)
+                for one, T, g in zip(self.data, self.temperatures(v), self.gains(v), strict=True)]
+
+    def gains(self, v: Array) -> list[Array]:
+        """Session gains of every record, in units of their priors; empty for a frequency response."""
+        out, at = [], v.size - (self.n_own - self.n_starts)
+        for one in self.data:
+            n = self.sessions.n_free if isinstance(one, Data) else 0
+            out.append(v[at:at + n])
+            at += n
+        return out
 
     def runs(self, v: Array) -> list[Run]:
-        """Residuals of all records and derivatives (n, n_sensors, n_unknowns) of the modelled readings."""
+        """Residuals of all records and derivatives (n, n_sensors, n_unknowns) of the modelled readings.
+
+        The last few are kept: filters and noise levels change more often than the unknowns.
+        """
+        key = v.tobytes()
+        if key not in self._last:
+            while len(self._last) >= _KEPT:
+                del self._last[next(iter(self._last))]
+            self._last[key] = self._simulated(v)
+        return self._last[key]
+
+    def _simulated(self, v: Array) -> list[Run]:
         names, chain = self._chain(v)
-        at, out = self.n_parameters + self.n_effects, []
+        at, gain_at, out = self.n_parameters + self.n_effects, v.size - (self.n_own - self.n_starts), []
+        own = [number for number in self.sessions.numbers if number not in names]
+        gains = [[*names, *own].index(number) for number in self.sessions.numbers]
         for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
+            if isinstance(one, ResponseData):
+                out.append(self._response_run(v, one))
+                continue
             initial = [f"lumps.{lump}.initial" for lump in system.lumps] if start.n_free else []
-            run = trajectory(system, one.record, tolerance=self.tolerance, sensitivities=[*names, *initial])
+            run = trajectory(system, one.record, tolerance=self.tolerance, sensitivities=[*names, *own, *initial])
             J = run.sensitivity[:, one.columns]
             slopes = np.zeros((*J.shape[:2], v.size))
             slopes[..., :chain.shape[1]] = J[..., :len(names)] @ chain
-            slopes[..., at:at + start.n_free] = J[..., len(names):] * start.sigma
-            out.append(Run(one.readings - run.readings[:, one.columns], slopes))
-            at += start.n_free
+            slopes[..., at:at + start.n_free] = J[..., len(names) + len(own):] * start.sigma
+            slopes[..., gain_at:gain_at + len(gains)] = J[..., gains] * self.sessions.sigma
+            out.append(Run(one.readings - run.readings[:, one.columns], slopes, along(system, one, run)))
+            at, gain_at = at + start.n_free, gain_at + len(gains)
         return out
+
+    def _response_run(self, v: Array, one: ResponseData) -> Run:
+        """A frequency response: derivatives by differences of second order."""
+        n = self.n_parameters + self.n_effects
+        steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
+        slopes = np.zeros((*one.readings.shape, v.size))
+        slopes[..., :n] = response_slopes(lambda moved: one.model(self.system(moved)), v, steps, self.bounds)
+        return Run(one.readings - one.model(self.system(v)), slopes)
+
+    @property
+    def _typical(self) -> Array:
+        """A small value of every effect's coordinate."""
+        return np.array([1.0 if quantity.lower > 0 else quantity.typical for candidate in self.effects
+                         for quantity in candidate.effect.free])
 
     def prior(self, v: Array) -> tuple[Array, Array]:
         """Distances from the priors' centres, in standard deviations, with the sign of `Run`, and their derivatives."""
         known = np.flatnonzero(np.isfinite(self.ranges.sigma))
-        n_free = sum(s.n_free for s in self.starts)
+        n_free = self.n_own
         first = self.n_parameters + self.n_effects
         values = self.ranges.values(v[:self.n_parameters])
         J = np.zeros((known.size + n_free, v.size))
@@ -173,11 +250,25 @@ class Structure:
         system = self.base
         for candidate in effects:
             system = candidate.add(system, candidate.effect.size.typical)
-        if len(system.lumps) == self.starts[0].mean.size:
-            return replace(self, effects=effects)
-        starts = tuple(initial_of(system, one, "free" if s.n_free else "measured")
-                       for one, s in zip(self.data, self.starts, strict=True))
+        starts = tuple(start if isinstance(one, ResponseData) or start.mean.size == len(system.lumps) else
+                       initial_of(system, one, "free" if start.n_free else "measured")
+                       for one, start in zip(self.data, self.starts, strict=True))
         return replace(self, effects=effects, starts=starts)
+
+    def hides(self, candidate: Candidate) -> str:
+        """Why these data cannot show an effect, known before they are looked at; empty if they may.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Any.
+
+        Returns
+        -------
+        str
+        """
+        responses = all(isinstance(one, ResponseData) for one in self.data)
+        return (responses and hidden_from_response(self.base, candidate)) or self.sessions.hides(candidate)
 
     def _chain(self, v: Array) -> tuple[list[str], Array]:
         """The system's numbers that depend on parameters and quantities, and their derivatives by these coordinates."""
@@ -217,9 +308,15 @@ def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], 
     return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
 
 
-def structure_of(system: System, ranges: Ranges, data: Sequence[Data], starts: Sequence[Initial]) -> Structure:
+def start_of(system: System, one: Data | ResponseData, start: Start = "free") -> Initial:
+    """Prior of the initial temperatures; a frequency response has none."""
+    return NO_START if isinstance(one, ResponseData) else initial_of(system, one, start)
+
+
+def structure_of(system: System, ranges: Ranges, data: Sequence[Data | ResponseData], starts: Sequence[Initial],
+                 sessions: Sessions) -> Structure:
     """Nominal structure, checked: the system must be small enough for derivatives."""
     if len(system.lumps) > 100:
         raise InputError(f"a network of {len(system.lumps)} lumps", where="argument system", expected="at most 100",
                          remedy="Reduce the model first (rt.thermal.reduce).")
-    return Structure(system, ranges, tuple(data), tuple(starts))
+    return Structure(system, ranges, tuple(data), tuple(starts), sessions=sessions)

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from ._along import Along
 
 Array = NDArray[np.float64]
+_IGNORED = 1e6  # K: standard deviation of a missing reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +64,17 @@ def whitener(path: Along, noise: Array, disturbance: Array) -> Whitener:
         Random heat of every lump [W/√Hz].
     """
     A, C = path.steps[0], path.C
-    n, R = len(A), np.diag(noise**2)
+    n, R = len(A), np.broadcast_to(np.diag(noise**2), (len(A), noise.size, noise.size))
+    if path.one.missing is not None:
+        R = R + _IGNORED**2 * path.one.missing[:, :, None] * np.eye(noise.size)
     gains, roots = np.zeros((n, A.shape[1], len(C))), np.zeros((n, len(C), len(C)))
     if not disturbance.any():
-        roots[:] = np.diag(1.0 / noise)
+        roots[:] = np.linalg.inv(np.linalg.cholesky(R))
         return Whitener(A, C, gains, roots)
     Q = gathered(path, disturbance)
     P = np.zeros(A.shape[1:])
     for k in range(n):
-        S = C @ P @ C.T + R
+        S = C @ P @ C.T + R[k]
         root = np.linalg.inv(np.linalg.cholesky(S))
         gain = P @ C.T @ (root.T @ root)
         gains[k], roots[k] = gain, root
@@ -82,7 +85,9 @@ def whitener(path: Along, noise: Array, disturbance: Array) -> Whitener:
 
 def gathered(path: Along, disturbance: Array, M: Array | None = None) -> Array:
     """Noise gathered in every sample, ∫ e^{Ms} q e^{Mᵀs} ds: Simpson over an eighth, doubled three times."""
-    M = path.M if M is None else M
+    kinds, kind = path.kinds
+    one_by_one = M is None
+    M = kinds if M is None else M
     q = np.zeros(M.shape[-1])
     q[:disturbance.size] = (disturbance / path.equations.capacity) ** 2
     half = expm(M * (path.h / 16))
@@ -90,7 +95,7 @@ def gathered(path: Along, disturbance: Array, M: Array | None = None) -> Array:
     Q = (path.h / 48) * (np.diag(q) + 4.0 * (half * q) @ half.swapaxes(-1, -2) + (step * q) @ step.swapaxes(-1, -2))
     for _ in range(3):
         Q, step = Q + step @ Q @ step.swapaxes(-1, -2), step @ step
-    return Q
+    return Q[kind] if one_by_one else Q
 
 
 def settled_cost(path: Along, r: Array, noise: Array, disturbance: Array) -> float:

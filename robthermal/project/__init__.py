@@ -2,6 +2,9 @@
 
 from ._arguments import boxes_from_text as boxes_from_text
 from ._arguments import certificate_files as certificate_files
+from ._check_files import FileCheck as FileCheck
+from ._check_files import verify_files as verify_files
+from ._check_files import write_checks as write_checks
 from ._claims import Certification as Certification
 from ._claims import Checked as Checked
 from ._claims import certify_system as certify_system
@@ -20,6 +23,9 @@ from ._diagnose import Diagnosed as Diagnosed
 from ._diagnose import Residuals as Residuals
 from ._diagnose import diagnose_records as diagnose_records
 from ._diagnose_report import write_diagnosis as write_diagnosis
+from ._explain import Explanation as Explanation
+from ._explain import explain as explain
+from ._explain import explainable as explainable
 from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
 from ._frequency import design_excitation as design_excitation
@@ -32,15 +38,18 @@ from ._map import MapRequest as MapRequest
 from ._map import map_from_text as map_from_text
 from ._map import map_system as map_system
 from ._map import write_map as write_map
+from ._rebuild import rebuild_report as rebuild_report
 from ._schema import Boxes as Boxes
 from ._schema import Project as Project
 from ._schema import read_project as read_project
+from ._starter import new_project as new_project
 from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
-           "DesignRequest", "Diagnosed", "JobResult", "MapRequest", "Project", "Residuals", "boxes_from_text",
-           "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
-           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response",
-           "map_from_text", "map_system", "output_folder", "read_coupling", "read_project", "run_job", "write_certify",
+           "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project", "Residuals",
+           "boxes_from_text", "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
+           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response", "explain",
+           "explainable", "map_from_text", "map_system", "new_project", "output_folder", "read_coupling",
+           "read_project", "rebuild_report", "run_job", "verify_files", "write_certify", "write_checks",
            "write_coupling", "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]

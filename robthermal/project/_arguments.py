@@ -69,7 +69,7 @@ def certificate_files(paths: Sequence[Path]) -> list[Path]:
     Parameters
     ----------
     paths : sequence of Path
-        Files, or folders with certificates in them or in their ``certificates`` folder.
+        Files, or folders: every file of every ``certificates`` folder below, or else the folder's own JSON files.
 
     Returns
     -------
@@ -90,9 +90,10 @@ def certificate_files(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted((path / "certificates").glob("*.json")) or sorted(path.glob("*.json"))
+            inside = sorted(path.rglob("certificates/*.json")) or sorted(path.glob("*.json"))
             if not inside:
-                raise InputError("holds no certificates", where=str(path), expected="*.json, or certificates/*.json")
+                raise InputError("holds no certificates", where=str(path),
+                                 expected="*.json, or folders called certificates below it")
             found += inside
         else:
             found.append(path)

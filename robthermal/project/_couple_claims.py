@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..report import Claim
+from ._assumptions import ARITHMETIC
 from ._claims import Checked
 from ._couple import LIMITS, Coupling
 
@@ -51,6 +52,7 @@ def coupling_assumptions(result: Coupling) -> Iterator[str]:
     if result.job.measured:
         yield ("Between two measured frequencies the larger of the two envelope values holds, below the first and "
                "above the last the end value; the measured plants have as many unstable poles as the model.")
+    yield ARITHMETIC
 
 
 def _claim(one: Checked, result: Coupling) -> Claim:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import control
 import numpy as np
@@ -28,6 +28,7 @@ class CouplingTable(Table):
 
     name: str
     sample_time: Annotated[Number, Field(ge=0)]
+    export: list[Literal["mat", "c", "h"]] = []
 
 
 class SubsystemTable(Table):
@@ -105,6 +106,8 @@ class CouplingJob:
         Keyword arguments of `rt.coupling.synthesize`, or of `evaluate` for given filters; frequencies in rad/s.
     files : tuple of Path
         The coupling file and every file it names.
+    exports : tuple of str
+        Endings of further files with the filters: "mat", "c", "h".
     """
 
     name: str
@@ -117,6 +120,7 @@ class CouplingJob:
     manual: bool
     options: dict[str, Any]
     files: tuple[Path, ...]
+    exports: tuple[str, ...] = ()
 
 
 def read_coupling(path: str | Path) -> CouplingJob:
@@ -161,7 +165,14 @@ def read_coupling(path: str | Path) -> CouplingJob:
         data.coupling.name, (halves[0].name or "subsystem 1", halves[1].name or "subsystem 2"),
         (plants[0], plants[1]), (controllers[0], controllers[1]), _disturbances(halves, dt, path), measured,
         tuple(", ".join(file.name for file in group) for group in groups), manual,
-        dict(_options(data.design, manual, dt, path)), files)
+        dict(_options(data.design, manual, dt, path)), files, _exports(data.coupling.export, dt, path))
+
+
+def _exports(endings: Sequence[str], dt: float, path: Path) -> tuple[str, ...]:
+    if not dt and {"c", "h"} & set(endings):
+        raise InputError("a continuous-time coupling has no C source", where=f"{path} [coupling] export",
+                         expected='["mat"]', remedy="Give a sample_time.")
+    return tuple(dict.fromkeys(endings))
 
 
 def _disturbances(halves: tuple[SubsystemTable, SubsystemTable], dt: float, path: Path) -> tuple[Any, Any]:

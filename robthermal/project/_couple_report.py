@@ -13,9 +13,10 @@ from ..report import Report, Section, Table
 from ._couple import Coupling
 from ._couple_claims import coupling_assumptions, coupling_claims
 from ._couple_figures import envelope_figure, robust_figure, spectrum_figures, time_figure
+from ._evidence import write_certification
 from ._folder import output_folder
-from ._sections import certificate_section
-from ._write import now, provenance, write_certification
+from ._now import now
+from ._write import provenance
 
 _NORMS = {  # key: what it is, key of its certificate or "" where it is computed
     "robust": ("robust number ρ(|Δk| R)", "robust"),
@@ -37,8 +38,8 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
     result : Coupling
         From `couple_subsystems`.
     out : str or Path
-        Output folder: coupling.json with the filters, report.html, junit.xml, summary.json,
-        ``certificates/*.json``.
+        Output folder: coupling.json with the filters (coupling.c, .h, .mat if the job says so), report.html,
+        junit.xml, summary.json, ``certificates/*.json``.
 
     Returns
     -------
@@ -60,15 +61,17 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
     >>> rt.project.write_coupling(done, "coupled").holds
     True
     >>> sorted(path.name for path in Path("coupled").iterdir())
-    ['certificates', 'coupling.json', 'junit.xml', 'report.html', 'summary.json']
+    ['certificates', 'coupling.json', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
     job = result.job
     report = Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
                     claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
                     provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now())
     with output_folder(out) as folder:
-        write_certification(result.checked, report, folder)
+        report = write_certification(result.checked, report, folder)
         result.filters.save(folder / "coupling.json", job.name)
+        for ending in job.exports:
+            result.filters.export(folder / f"coupling.{ending}", job.name)
     return report
 
 
@@ -83,7 +86,6 @@ def _subtitle(result: Coupling) -> str:
 def _sections(result: Coupling) -> Iterator[Section]:
     yield _performance_section(result)
     if not result.found:
-        yield certificate_section(result.checked)
         return
     yield _norm_section(result)
     yield Section("Over frequency", "Computed at frequencies; corners, resonances and the measured frequencies are "
@@ -95,9 +97,6 @@ def _sections(result: Coupling) -> Iterator[Section]:
                       "from rest; the first half is not shown. Both traces have the same noise.",
                       figures=(time_figure(result.simulation),), anchor="time")
     yield _filter_section(result.filters)
-    yield certificate_section(result.checked)
-    exact = (f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required)
-    yield Section("Exact claims", "\n\n".join(exact), anchor="exact")
 
 
 def _performance_section(result: Coupling) -> Section:

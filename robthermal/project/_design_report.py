@@ -12,12 +12,15 @@ import pandas as pd
 from ..design import ClosedLoop, GainObserver
 from ..report import Figure, Report, Section, Table, house_style
 from ..thermal import System
+from ._assumptions import machine_assumptions
 from ._design import ControllerDesign
 from ._design_file import write_design_file
 from ._design_limits import BELOW_FOLD
+from ._evidence import write_certification
 from ._folder import output_folder
-from ._sections import assumptions, certification_sections
-from ._write import claims, now, provenance, subtitle, write_certification
+from ._now import now
+from ._sections import certification_sections
+from ._write import claims, provenance, subtitle
 
 _ZERO = 273.15
 _LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
@@ -59,14 +62,15 @@ def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | P
     >>> rt.project.write_design(done, (), "design").holds
     True
     >>> sorted(path.name for path in Path("design").iterdir())
-    ['certificates', 'design.json', 'junit.xml', 'report.html', 'summary.json']
+    ['certificates', 'design.json', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
     system = result.certification.system
     report = Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
                     claims=claims(system, result.certification.checked), sections=tuple(_sections(result)),
-                    provenance=provenance(files), assumptions=(*assumptions(system), *_ASSUMPTIONS), generated=now())
+                    provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
+                    generated=now())
     with output_folder(out) as folder:
-        write_certification(result.certification.checked, report, folder)
+        report = write_certification(result.certification.checked, report, folder)
         write_design_file(result, folder / "design.json")
     return report
 

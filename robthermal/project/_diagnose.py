@@ -105,9 +105,8 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     >>> found.holds, found.diagnosis.effects[0].label, found.residuals[0].kind
     (True, 'sensor_lag(T)', 'train')
     """
-    progress(f"trying every effect of the catalogue on {sum(len(record) for record in train)} samples")
     try:
-        found = diagnose(system, list(train), validation=list(validation) or None)
+        found = diagnose(system, list(train), validation=list(validation) or None, progress=progress)
     except InputError as error:
         where = error.where.replace("argument records", "training records")
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")

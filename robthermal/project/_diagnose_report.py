@@ -10,24 +10,16 @@ import numpy as np
 import pandas as pd
 
 from ..diagnosis import Diagnosis, effects
-from ..report import (
-    Figure,
-    Report,
-    Section,
-    Table,
-    house_style,
-    residuals_before_after,
-    write_html,
-    write_json,
-    write_junit,
-)
+from ..report import Figure, Report, Section, Table, house_style, residuals_before_after
 from ..signals import Record
 from ..thermal import write_system
 from ._diagnose import Diagnosed, Residuals
 from ._diagnose_claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose_ranking import ranking
+from ._evidence import write_report
 from ._folder import output_folder
-from ._write import now, provenance, subtitle
+from ._now import now
+from ._write import provenance, subtitle
 
 _DRAWN = 6  # sensors: as many as there are colours
 
@@ -40,8 +32,8 @@ def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
     result : Diagnosed
         From `diagnose_records`.
     out : str or Path
-        Output folder: diagnosis.json, augmented.toml, report.html, junit.xml, summary.json; next_experiment.csv if one
-        was found.
+        Output folder: diagnosis.json, augmented.toml, report.html, report.json, junit.xml, summary.json;
+        next_experiment.csv if one was found.
 
     Returns
     -------
@@ -74,9 +66,7 @@ def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
         found.save(folder / "diagnosis.json")
         write_system(found.system, folder / "augmented.toml")
         _write_experiment(found, folder / "next_experiment.csv")
-        write_html(report, folder / "report.html")
-        write_junit(report, folder / "junit.xml")
-        write_json(report, folder / "summary.json")
+        write_report(report, folder)
     return report
 
 
@@ -157,8 +147,12 @@ def _located_section(found: Diagnosis) -> Section:
     text = ("Of the nominal system, refitted. An extra heat into a lump stands for anything that acts there. The "
             "misfit over operating conditions:\n\n" + "\n\n".join(where.conditions))
     with house_style():
-        figure = _from_axes(where.plot(), "Evidence of an extra heat by lump.", "F statistic of an extra heat.")
-    return Section("Where the misfit sits", text, figures=(figure,),
+        figures = [_from_axes(where.plot(), "Evidence of an extra heat by lump.", "F statistic of an extra heat.")]
+        if found.unknown_heat is not None:
+            caption = (f"Heat into {found.unknown_heat.lump} that would explain the residual, smoothed: mean and 95 % "
+                       "band. It is located, not named.")
+            figures.append(_from_axes(found.unknown_heat.plot(), caption, caption))
+    return Section("Where the misfit sits", text, figures=tuple(figures),
                    tables=(Table(lumps, "Lumps.", digits=3), Table(sensors, "Sensors.", digits=3)), anchor="located")
 
 

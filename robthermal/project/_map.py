@@ -16,11 +16,13 @@ from ..report import Figure, Report, Section, Table, house_style
 from ..thermal import System
 from ..verification import verify
 from ._arguments import boxes_from_text
+from ._assumptions import machine_assumptions
 from ._claims import Checked
+from ._evidence import write_certification
 from ._folder import output_folder
+from ._now import now
 from ._schema import Method, in_kelvin
-from ._sections import assumptions, certificate_section
-from ._write import claims, now, provenance, subtitle, write_certification
+from ._write import claims, provenance, subtitle
 
 _MOST = 2000  # conditions: hours beyond
 _LOADS = 6
@@ -181,10 +183,11 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
                        verify(certificate) if certificate.holds else None, True),)
     data = in_unit(result.data, system.temperature_unit)
     report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system), label="",
-                    claims=claims(system, checked), sections=(_section(result, data), certificate_section(checked)),
-                    provenance=provenance(files), assumptions=(*assumptions(system), *_ASSUMPTIONS), generated=now())
+                    claims=claims(system, checked), sections=(_section(result, data),),
+                    provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
+                    generated=now())
     with output_folder(out) as folder:
-        write_certification(checked, report, folder)
+        report = write_certification(checked, report, folder)
         data.to_csv(folder / "map.csv", index=False)
     return report
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 
 from ..calibration import Fit
-from ..report import Figure, Section, Table, box_ranges, current_limits, measured_against_model
-from ..thermal import System
-from ._claims import Certification, Checked
+from ..report import Figure, Section, Table, box_ranges, current_limits, house_style, measured_against_model
+from ._claims import Certification
 from ._job import Comparison
 
 _ZERO = 273.15
@@ -80,9 +79,11 @@ def runaway_section(result: Certification) -> Section | None:
     """Load curve of regulated modules."""
     if result.runaway is None:
         return None
-    ax = result.runaway.plot()
-    figure = Figure.draw(ax.figure, alt="Load taken from the cold face against current, with the fold marked.",
-                         caption="More current takes more heat only up to the fold.")
+    with house_style():
+        ax = result.runaway.plot()
+        ax.set_title("")
+        figure = Figure.draw(ax.figure, alt="Load taken from the cold face against current, with the fold marked.",
+                             caption="More current takes more heat only up to the fold.")
     text = ("With its cold face regulated, a module takes more heat with more current only up to I*; a load above q* "
             "has no equilibrium and the hot side runs away. Limit the controller's current below I*, also where "
             "the closed form for constant properties is larger. "
@@ -108,23 +109,6 @@ def box_section(result: Certification) -> Section | None:
                    tables=(Table(result.safe.table().reset_index(names="lump"), "The box."),), anchor="box")
 
 
-def certificate_section(checked: Sequence[Checked]) -> Section:
-    """Every certificate with its verdict."""
-    table = pd.DataFrame([_certificate_row(c) for c in checked])
-    text = ("Each file holds every number its claim depends on. robthermal verify re-derives the claim from the file "
-            "alone, in ball arithmetic, without any solver.")
-    return Section("Certificates", text, tables=(Table(table, "Certificates and their independent check."),),
-                   anchor="certificates")
-
-
-def _certificate_row(c: Checked) -> dict[str, object]:
-    margins = c.verdict.margins if c.verdict else {}
-    return {"certificate": f"certificates/{c.key}.json", "claim": c.title,
-            "proven": "yes" if c.certificate.holds else "no", "verified": "yes" if c.good else "no",
-            "margin": ", ".join(f"{key} {value:.3g}" for key, value in margins.items()),
-            "check [s]": c.verdict.seconds if c.verdict else float("nan")}
-
-
 def certification_sections(result: Certification) -> Iterator[Section]:
     """Sections about one certification, in order."""
     if result.limits:
@@ -132,27 +116,3 @@ def certification_sections(result: Certification) -> Iterator[Section]:
     for section in (runaway_section(result), box_section(result)):
         if section is not None:
             yield section
-    yield certificate_section(result.checked)
-    claims = (f"{c.title}: {c.certificate.claim}" for c in result.checked if c.required)
-    yield Section("Exact claims", "\n\n".join(claims), anchor="exact")
-
-
-def assumptions(system: System) -> tuple[str, ...]:
-    """What the claims about a system rest on."""
-    return tuple(text for text in _ASSUMPTIONS if system.modules or text not in _OF_MODULES)
-
-
-_OF_MODULES = (
-    "Module properties vary linearly with the mean of the two face temperatures; half of the Joule heat goes to each "
-    "face.",
-    "Currents are imposed (current drive).",
-)
-_ASSUMPTIONS = (
-    "The machine is the lumped network in the certificate files: each lump has one temperature (Biot number below "
-    "0.1).",
-    *_OF_MODULES,
-    "Heats not in the network stay within the stated ranges.",
-    "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of "
-    "them.",
-    "Temperatures, currents and heats stay in the stated ranges; for the box that is never left this is itself proven.",
-)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from math import log
 from pathlib import Path
 
-from ..report import Claim, Report, file_hash, versions, write_html, write_json, write_junit
+from ..report import Claim, Report, file_hash, versions
 from ..thermal import System, write_system
+from ._assumptions import machine_assumptions
 from ._claims import Certification, Checked
+from ._evidence import write_certification
 from ._folder import output_folder
 from ._job import JobResult
-from ._sections import assumptions, certification_sections, comparison_section, parameter_section
+from ._now import now
+from ._sections import certification_sections, comparison_section, parameter_section
 
 _ZERO = 273.15
 
@@ -48,7 +50,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     >>> result = rt.project.run_job(replace(demo, system=bar, train=(), validation=(), boxes=rt.project.Boxes()))
     >>> report = rt.project.write_job(result, "results")
     >>> sorted(path.name for path in Path("results").iterdir())
-    ['calibrated.toml', 'certificates', 'junit.xml', 'report.html', 'summary.json']
+    ['calibrated.toml', 'certificates', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
     project = result.project
     sections = [comparison_section(result.comparisons, result.fit)] if result.comparisons else []
@@ -57,9 +59,10 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     sections.extend(certification_sections(result.certification))
     report = Report(title=project.name, subtitle=subtitle(result.system), label=project.label,
                     claims=claims(result.system, result.certification.checked), sections=tuple(sections),
-                    provenance=provenance(project.files), assumptions=assumptions(result.system), generated=now())
+                    provenance=provenance(project.files), assumptions=machine_assumptions(result.system),
+                    generated=now())
     with output_folder(out) as folder:
-        write_certification(result.certification.checked, report, folder)
+        report = write_certification(result.certification.checked, report, folder)
         write_system(result.system, folder / "calibrated.toml")
         if result.fit is not None:
             result.fit.table().to_csv(folder / "parameters.csv", index_label="parameter")
@@ -91,30 +94,10 @@ def write_certify(result: Certification, files: tuple[Path, ...], out: str | Pat
     """
     report = Report(title=result.system.name, subtitle=subtitle(result.system), label="",
                     claims=claims(result.system, result.checked), sections=tuple(certification_sections(result)),
-                    provenance=provenance(files), assumptions=assumptions(result.system), generated=now())
+                    provenance=provenance(files), assumptions=machine_assumptions(result.system), generated=now())
     with output_folder(out) as folder:
-        write_certification(result.checked, report, folder)
+        report = write_certification(result.checked, report, folder)
     return report
-
-
-def write_certification(checked: Sequence[Checked], report: Report, folder: Path) -> None:
-    """Certificates, report.html, junit.xml and summary.json into an existing folder.
-
-    Parameters
-    ----------
-    checked : sequence of Checked
-        Certificates.
-    report : Report
-        What to show.
-    folder : Path
-        Where.
-    """
-    (folder / "certificates").mkdir()
-    for one in checked:
-        one.certificate.save(folder / "certificates" / f"{one.key}.json")
-    write_html(report, folder / "report.html")
-    write_junit(report, folder / "junit.xml")
-    write_json(report, folder / "summary.json")
 
 
 def claims(system: System, checked: Sequence[Checked]) -> tuple[Claim, ...]:
@@ -138,7 +121,7 @@ def _claim(checked: Checked, system: System) -> Claim:
                  file=f"certificates/{checked.key}.json", kind=cert.kind, seconds=verdict.seconds if verdict else 0.0)
 
 
-_SENTENCES = {  # the exact sentences, with all numbers, are in the section "Exact claims"
+_SENTENCES = {  # the exact sentences, with all numbers, are in the appendix, "Exact claims"
     "contraction": "For every lump temperature and module current in the box, however the currents change, any two "
                    "temperature histories approach each other: no thermal runaway inside this box.",
     "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the currents, heats and "
@@ -198,8 +181,3 @@ def subtitle(system: System) -> str:
     counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
               "sensor": len(system.sensors)}
     return f"{system.name}: " + ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
-
-
-def now() -> str:
-    """Date and time for the report."""
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

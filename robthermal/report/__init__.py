@@ -3,20 +3,24 @@
 from ._content import Claim as Claim
 from ._content import Report as Report
 from ._content import Section as Section
-from ._content import Table as Table
 from ._drawings import box_ranges as box_ranges
 from ._drawings import current_limits as current_limits
 from ._drawings import load_curve as load_curve
+from ._evidence import Evidence as Evidence
 from ._figure import Figure as Figure
 from ._html import write_html as write_html
 from ._provenance import file_hash as file_hash
 from ._provenance import versions as versions
 from ._residuals import residuals_before_after as residuals_before_after
+from ._store import read_content as read_content
+from ._store import write_content as write_content
 from ._style import house_style as house_style
 from ._summaries import write_json as write_json
 from ._summaries import write_junit as write_junit
+from ._table import Printed as Printed
+from ._table import Table as Table
 from ._traces import measured_against_model as measured_against_model
 
-__all__ = ["Claim", "Figure", "Report", "Section", "Table", "box_ranges", "current_limits", "file_hash", "house_style",
-           "load_curve", "measured_against_model", "residuals_before_after", "versions", "write_html", "write_json",
-           "write_junit"]
+__all__ = ["Claim", "Evidence", "Figure", "Printed", "Report", "Section", "Table", "box_ranges", "current_limits",
+           "file_hash", "house_style", "load_curve", "measured_against_model", "read_content",
+           "residuals_before_after", "versions", "write_content", "write_html", "write_json", "write_junit"]

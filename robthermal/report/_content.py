@@ -1,4 +1,4 @@
-"""What a report is made of: claims, sections, tables. All text is plain; layout is done elsewhere."""
+"""What a report is made of: claims, sections, the whole. All text is plain; layout is done elsewhere."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-import pandas as pd
 
 from ..errors import InputError
+from ._evidence import Evidence
 from ._figure import Figure
-
-MAX_ROWS = 200  # of a table on the page; a network may have 100 000 lumps, a reader has less time
+from ._table import Printed, Table
 
 
 @dataclass(frozen=True)
@@ -111,76 +110,6 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table with a caption.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        Contents. A default index is not shown.
-    caption : str
-        What it shows.
-    digits : int, optional
-        Significant digits of numbers that are not integers.
-
-    Raises
-    ------
-    InputError
-        Not a DataFrame, or no digits.
-
-    Examples
-    --------
-    >>> import pandas as pd, robthermal as rt
-    >>> rt.report.Table(pd.DataFrame({"module": ["m1"], "I* [A]": [2.30149]}), "Runaway limits.").rows
-    [['m1', '2.301']]
-    """
-
-    frame: pd.DataFrame
-    caption: str
-    digits: int = 4
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.frame, pd.DataFrame):
-            raise InputError(f"frame is a {type(self.frame).__name__}", where=f"table {self.caption!r}",
-                             expected="a pandas DataFrame")
-        if self.digits < 1:
-            raise InputError(f"digits is {self.digits!r}", where=f"table {self.caption!r}",
-                             expected="a whole number ≥ 1")
-
-    @property
-    def header(self) -> list[str]:
-        """Column titles."""
-        return [str(name) for name in self._shown().columns]
-
-    @property
-    def rows(self) -> list[list[str]]:
-        """Cells as text, at most the first 200 rows."""
-        shown = self._shown().head(MAX_ROWS)
-        columns = [[_cell(value, self.digits) for value in shown.iloc[:, j]] for j in range(shown.shape[1])]
-        return [list(row) for row in zip(*columns, strict=True)]
-
-    @property
-    def numeric(self) -> list[bool]:
-        """Which columns hold numbers, and are set flush right."""
-        shown = self._shown()
-        types = [shown.iloc[:, j].dtype for j in range(shown.shape[1])]
-        return [pd.api.types.is_numeric_dtype(kind) and not pd.api.types.is_bool_dtype(kind) for kind in types]
-
-    @property
-    def left_out(self) -> int:
-        """Rows that are not shown."""
-        return max(len(self.frame) - MAX_ROWS, 0)
-
-    def _shown(self) -> pd.DataFrame:
-        plain = isinstance(self.frame.index, pd.RangeIndex) and self.frame.index.name is None
-        if plain:
-            return self.frame
-        index = self.frame.index
-        levels = [pd.Series(index.get_level_values(i), name=name or "") for i, name in enumerate(index.names)]
-        return pd.concat([*levels, self.frame.reset_index(drop=True)], axis=1)
-
-
-@dataclass(frozen=True)
 class Section:
     """A part of the report.
 
@@ -192,7 +121,7 @@ class Section:
         Plain paragraphs separated by blank lines.
     figures : sequence of Figure, optional
         Drawn below the text.
-    tables : sequence of Table, optional
+    tables : sequence of Table or Printed, optional
         Set below the figures.
     anchor : str, optional
         Address within the page; default from the title.
@@ -207,7 +136,7 @@ class Section:
     title: str
     text: str
     figures: Sequence[Figure] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[Table | Printed] = ()
     anchor: str = ""
 
     @property
@@ -236,11 +165,15 @@ class Report:
     provenance : mapping
         Versions and SHA-256 of inputs, by name.
     assumptions : sequence of str
-        Everything the claims rest on.
+        What every claim rests on; what only one rests on stands with its evidence.
     generated : str
         When, as text.
     answer : str, optional
         In a word, for the badge of a report whose claims are tests on data; nothing is called certified then.
+    evidence : sequence of Evidence, optional
+        Every certificate file with what the independent check said.
+    checker : str, optional
+        Which version of what made that check.
 
     Examples
     --------
@@ -258,6 +191,8 @@ class Report:
     assumptions: Sequence[str]
     generated: str
     answer: str = ""
+    evidence: Sequence[Evidence] = ()
+    checker: str = ""
 
     @property
     def holds(self) -> bool:
@@ -270,19 +205,3 @@ class Report:
         if not self.claims:
             return ["nothing is claimed"]
         return [f"{claim.title}: {claim.why}" for claim in self.claims if not claim.good]
-
-
-def _cell(value: object, digits: int) -> str:
-    if isinstance(value, (bool, np.bool_)):
-        return "yes" if value else "no"
-    if isinstance(value, (float, np.floating)):
-        return _number(float(value), digits)
-    return "–" if value is None or value is pd.NaT or value is pd.NA else str(value)
-
-
-def _number(value: float, digits: int) -> str:
-    if np.isnan(value):
-        return "–"
-    if isfinite(value) and 10.0 ** digits <= abs(value) < 1e9:
-        return f"{value:.0f}"  # 86400, not 8.64e+04
-    return f"{value:.{digits}g}"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
+from ._appendix import margins, numbered_assumptions, resting
 from ._content import Claim, Report, Section
 from ._figure import Figure, inline
 from ._save import printable, save_text
@@ -48,9 +49,16 @@ def write_html(report: Report, path: str | Path) -> Path:
     def drawing(figure: Figure) -> str:  # not escaped: Figure has refused scripts and outside resources
         return inline(figure, f"f{next(counter)}-")
 
-    page = _template("report.html").render(report=report, sections=_anchored(report.sections), drawing=drawing,
-                                           ranges=_ranges, style=_template("report.css").render())
+    files = {claim.file for claim in report.claims}
+    page = _template("report.html").render(
+        report=report, sections=_anchored(report.sections), drawing=drawing, ranges=_ranges, margins=margins,
+        assumptions=numbered_assumptions(report), resting=resting(report),
+        claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
     return save_text(printable(page), path)
+
+
+_OWN = ("top", "claims", "claims-title", "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
+        "provenance", "check")
 
 
 @cache
@@ -72,12 +80,12 @@ def _together(text: str) -> str:
 
 def _anchored(sections: Sequence[Section]) -> list[tuple[str, Section]]:
     """Sections with addresses that are valid, and unique in the page."""
-    taken = {"top", "claims", "contents", "appendix", "assumptions", "provenance", "check"}
+    taken = set(_OWN)
     pairs = []
     for section in sections:
         plain = re.sub(r"[^a-z0-9]+", "-", (section.anchor or section.title).lower()).strip("-")
-        # No address of ours may begin like the ids of a drawing, f1-…
-        base = plain if plain and not re.match(r"f\d", plain) else f"section-{plain}".strip("-")
+        # No address of ours may begin like the ids of a drawing, f1-…, or of an assumption, assumption-1
+        base = plain if plain and not re.match(r"(f|assumption-)\d", plain) else f"section-{plain}".strip("-")
         names = chain([base], (f"{base}-{i}" for i in count(2)))
         anchor = next(name for name in names if name not in taken)
         taken.add(anchor)

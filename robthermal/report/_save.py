@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 
@@ -23,3 +25,8 @@ def save_text(text: str, path: str | Path) -> Path:
         raise InputError(f"cannot be written ({error.strerror})", where=str(path),
                          remedy="Choose another place.") from None
     return Path(path)
+
+
+def save_json(content: Any, path: str | Path) -> Path:
+    """Write JSON in UTF-8; half surrogate pairs, which no other program could read, become visible marks."""
+    return save_text(printable(json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)) + "\n", path)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
 
+from ._appendix import numbered_assumptions
 from ._content import Claim, Report
-from ._save import printable, save_text
+from ._evidence import Evidence
+from ._save import printable, save_json, save_text
 
 FORMAT = "robthermal-report/1"
 
@@ -86,15 +87,23 @@ def write_json(report: Report, path: str | Path) -> Path:
     """
     summary = {"format": FORMAT, "title": report.title, "label": report.label, "holds": report.holds,
                "reasons": report.reasons, "claims": [_claim(claim) for claim in report.claims],
-               "assumptions": list(report.assumptions), "provenance": dict(report.provenance),
+               "certificates": [_certificate(one) for one in report.evidence], "checker": report.checker,
+               "version": report.provenance.get("robthermal", ""),
+               "assumptions": numbered_assumptions(report), "provenance": dict(report.provenance),
                "generated": report.generated}
-    return save_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", path)
+    return save_json(summary, path)
+
+
+def _certificate(one: Evidence) -> dict[str, object]:
+    return {"title": one.title, "file": one.file, "sha256": one.sha256, "kind": one.kind, "claim": one.claim,
+            "proven": one.proven, "valid": one.valid, "margins": dict(one.margins), "reason": one.reason,
+            "seconds": one.seconds}
 
 
 def _claim(claim: Claim) -> dict[str, object]:
     verified = None if claim.verified is None else bool(claim.verified)
-    return {**asdict(claim), "holds": bool(claim.holds), "verified": verified, "seconds": float(claim.seconds),
-            "reason": claim.why}
+    return {**asdict(claim), "valid": claim.good, "holds": bool(claim.holds), "verified": verified,
+            "seconds": float(claim.seconds), "reason": claim.why}
 
 
 def _cases(report: Report) -> list[ElementTree.Element]:

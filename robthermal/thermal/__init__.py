@@ -23,6 +23,8 @@ from ._materials import materials as materials
 from ._matrices import MatrixImport as MatrixImport
 from ._matrices import system_from_matrices as system_from_matrices
 from ._matrix_files import read_matrices as read_matrices
+from ._modelica import format_modelica as format_modelica
+from ._modelica import write_modelica as write_modelica
 from ._parts import Ambient as Ambient
 from ._parts import Condensation as Condensation
 from ._parts import Drive as Drive
@@ -59,9 +61,9 @@ from ._system import System as System
 
 __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
            "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
-           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
-           "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
-           "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_system", "hinf_error",
-           "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials", "parse_system",
-           "read_matrices", "read_system", "reduce", "simulate", "steady_state", "system_from_matrices",
-           "time_constants", "trajectory", "write_system"]
+           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural", "Periodic",
+           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper", "System",
+           "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica", "format_system",
+           "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials",
+           "parse_system", "read_matrices", "read_system", "reduce", "simulate", "steady_state", "system_from_matrices",
+           "time_constants", "trajectory", "write_modelica", "write_system"]

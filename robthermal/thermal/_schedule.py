@@ -57,7 +57,8 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
     delays = {column: drive.delay / h for column, drive in eq.drives.of.items() if drive.delay}
     steps = {column: (link.step.time - start) / h for link in eq.system.links if link.step
              for column in [eq.drives.steps[link.name]]}
-    cuts = [np.arange(n) + (delay % 1.0) for delay in delays.values()] + [np.array(list(steps.values()))]
+    jumps = {column: 1 + np.flatnonzero(np.diff(u[:, column])) for column in delays}  # elsewhere nothing happens
+    cuts = [jumps[column] + delay for column, delay in delays.items()] + [np.array(list(steps.values()))]
     at = _distinct(np.concatenate([np.arange(n, dtype=float), *cuts]), n)
     lengths, kind = _kinds(np.append(np.diff(at), 1.0))
     held = u[np.floor(at + _SAME).astype(np.intp)]

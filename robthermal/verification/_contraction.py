@@ -8,21 +8,13 @@ from typing import Any
 
 from flint import fmpq
 
-from robthermal.errors import InputError
-
 from . import _energy, _lyapunov, _weighted
-from ._fields import get, mapping, margin_of, not_negative, numbers, sequence, text
+from ._fields import margin_of
 from ._kind import Kind, Proof, working_precision
-from ._numbers import name_of, round_down, show
+from ._norm import NORMS, read_norm, say_rate
+from ._numbers import round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
 from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
-
-NORMS = {
-    "sum": "the weighted sum of absolute differences",
-    "max": "the weighted largest difference",
-    "energy": "the capacity-weighted sum of squared differences",
-    "lyapunov": "the quadratic form e'Pe of the differences",
-}
 
 
 @dataclass(frozen=True)
@@ -45,33 +37,17 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
     box = read_region(region, nominal)
     parameters = read_parameters(region)
     network = worst_system(nominal, system, parameters)
-    table = mapping(evidence, "evidence")
-    method = text(get(table, "method", "evidence"), "evidence.method")
-    if method not in NORMS:
-        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(NORMS)}")
-    rate = not_negative(get(table, "rate", "evidence"), "evidence.rate")
-    n = len(network.lumps)
-    weights: list[fmpq] = []
-    matrix: list[list[fmpq]] = []
-    if method in ("sum", "max"):
-        weights = numbers(get(table, "weights", "evidence"), n, "evidence.weights")
-    if method == "lyapunov":
-        rows = sequence(get(table, "matrix", "evidence"), "evidence.matrix")
-        if len(rows) != n:
-            raise InputError(f"{len(rows)} rows", where="evidence.matrix", expected=f"{n}, one per lump")
-        matrix = [numbers(row, n, f"evidence.matrix[{k}]") for k, row in enumerate(rows)]
-    return Contraction(network, box, method, rate, margin_of(margin, "rate"), tuple(weights),
-                       tuple(tuple(row) for row in matrix), parameters)
+    norm = read_norm(evidence, len(network.lumps))
+    return Contraction(network, box, norm.method, norm.rate, margin_of(margin, "rate"), norm.weights, norm.matrix,
+                       parameters)
 
 
 def claim(problem: Contraction) -> str:
     """Return the one sentence the data give."""
-    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
-             else "decays strictly")
     return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}"
             f"{say_parameters(problem.parameters)}: "
             f"between any two trajectories in this box under the same inputs, {NORMS[problem.method]} "
-            f"(method {problem.method}) {speed}.")
+            f"(method {problem.method}) {say_rate(problem.rate)}.")
 
 
 def prove(problem: Contraction) -> Proof:

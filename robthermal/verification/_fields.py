@@ -13,6 +13,9 @@ from robthermal.errors import InputError
 from ._numbers import exact, name_of, show
 
 Interval = tuple[fmpq, fmpq]
+# effects of a system file beyond the plain network: no claim knows them, whatever stands under these names
+_EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "thomson", "joule_split", "hysteresis",
+            "drive", "power_slope", "feedthrough", "self_heating")
 
 
 def get(table: Mapping[str, Any], key: str, where: str) -> Any:
@@ -110,3 +113,11 @@ def no_other(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
     for name in table:
         if name not in keys:
             raise InputError(f"unknown key {name_of(name)}", where=where, expected=f"{list(keys)}")
+
+
+def only_notes(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+    """Refuse unknown keys but for text and null: a number or table may be physics that no claim takes into account."""
+    for key, value in table.items():
+        if key not in known and (key in _EFFECTS or not (value is None or isinstance(value, str))):
+            raise InputError(f"unknown key {name_of(key)}: nothing that this claim takes into account", where=where,
+                             expected=f"{list(known)}, and notes as text", remedy="Certify the system without it.")

@@ -69,7 +69,7 @@ def claim(problem: Invariance) -> str:
     inputs += [f"heat load on {name_of(lumps[k])} in {say_interval(value)} W" for k, value in problem.heat.items()]
     words = (f", for all {', '.join(inputs)}" if inputs else "") + say_parameters(problem.parameters)
     return (f"The {say_system(problem.system)} never leaves the box of {say_region(problem.system, problem.region)}, "
-            f"once its temperatures are in it{words}.")
+            f"once its temperatures are in it{words}, with no other heat.")
 
 
 def prove(problem: Invariance) -> Proof:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from robthermal.errors import InputError
 
-from ._fields import get, mapping, margin_of, not_negative, text
+from ._fields import get, mapping, margin_of, not_negative, only_notes, text
 from ._kind import Kind, Proof
+from ._norm import say_rate
 from ._numbers import as_float, exact, name_of, round_down, show
 
 Floats = NDArray[np.float64]
@@ -56,7 +57,9 @@ class Network:
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     """Return the problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
-    uncertainty = not_negative(mapping(region, "region").get("uncertainty", 0), "region.uncertainty")
+    only_notes(table, ("capacity", "rows", "cols", "values"), "system")
+    only_notes(mapping(region, "region"), ("uncertainty",), "region")
+    uncertainty = not_negative(region.get("uncertainty", 0), "region.uncertainty")
     capacity = _numbers(get(table, "capacity", "system"), "system.capacity")
     n = len(capacity.nearest)
     if n == 0 or not bool(np.all(capacity.nearest > 0)):
@@ -85,14 +88,12 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
 def claim(problem: Network) -> str:
     """Return the one sentence the data give."""
     norm = "largest" if problem.method == "max" else "summed"
-    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
-             else "decays strictly")
     spread = (f" for all conductances within {show(100 * problem.uncertainty)} % of the given ones, those between two "
               "lumps and the row sums each on their own" if problem.uncertainty > 0 else "")
     return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries is stable"
             f"{spread}: "
             f"the weighted {norm} absolute temperature difference (method {problem.method}) between any two of its "
-            f"trajectories under the same inputs {speed}.")
+            f"trajectories under the same inputs {say_rate(problem.rate)}.")
 
 
 def prove(problem: Network) -> Proof:

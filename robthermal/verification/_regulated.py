@@ -17,12 +17,13 @@ from flint import arb, fmpq
 
 from robthermal.errors import InputError
 
-from ._contraction import NORMS, search, shorten
+from ._contraction import search, shorten
 from ._definite import eliminate, is_positive
-from ._fields import get, kelvin_interval, mapping, margin_of, not_negative, numbers, sequence, text
+from ._fields import get, kelvin_interval, mapping, margin_of
 from ._held import Alternative, Groups, HeldNetwork, lost_grip, shares
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import asymmetry
+from ._norm import NORMS, read_norm, say_rate
 from ._numbers import name_of, round_down, show
 from ._system import ThermalSystem, read_region, read_system, say_interval, say_system
 from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
@@ -48,24 +49,11 @@ class Regulated:
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Regulated:
     """Return the exact problem, or raise InputError."""
-    nominal, table, found = read_system(system), mapping(region, "region"), mapping(evidence, "evidence")
+    nominal, table = read_system(system), mapping(region, "region")
     parameters = read_parameters(table)
     network = _held_network(worst_system(nominal, system, parameters), table)
-    method = text(get(found, "method", "evidence"), "evidence.method")
-    if method not in NORMS:
-        raise InputError(f"method {name_of(method)}", where="evidence.method", expected=f"one of {sorted(NORMS)}")
-    n = len(network.free)
-    weights: list[fmpq] = []
-    matrix: list[list[fmpq]] = []
-    if method in ("sum", "max"):
-        weights = numbers(get(found, "weights", "evidence"), n, "evidence.weights")
-    if method == "lyapunov":
-        rows = sequence(get(found, "matrix", "evidence"), "evidence.matrix")
-        if len(rows) != n:
-            raise InputError(f"{len(rows)} rows", where="evidence.matrix", expected=f"{n}, one per free lump")
-        matrix = [numbers(row, n, f"evidence.matrix[{k}]") for k, row in enumerate(rows)]
-    return Regulated(network, method, not_negative(get(found, "rate", "evidence"), "evidence.rate"),
-                     margin_of(margin, "rate"), tuple(weights), tuple(tuple(row) for row in matrix), parameters)
+    norm = read_norm(evidence, len(network.free))
+    return Regulated(network, norm.method, norm.rate, margin_of(margin, "rate"), norm.weights, norm.matrix, parameters)
 
 
 def claim(problem: Regulated) -> str:
@@ -78,12 +66,11 @@ def claim(problem: Regulated) -> str:
     others = "".join(f" and current of {name_of(module.name)} in {say_interval(current)} A"
                      for k, (module, current) in enumerate(zip(system.modules, network.region.current, strict=True))
                      if k not in network.holder.values())
-    speed = (f"decays at least as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
-             else "decays strictly")
     return (f"The {say_system(system)} with {held}, contracts for all {_say_temperatures(network)}{others}"
             f"{say_parameters(problem.parameters)}: between any two trajectories that stay in these ranges under the "
             f"same set-points, ambients, heat loads and other currents, {NORMS[problem.method]} of the lumps that are "
-            f"not held (method {problem.method}) {speed}; more current takes more heat from every held lump.")
+            f"not held (method {problem.method}) {say_rate(problem.rate)}; more current takes more heat from every "
+            "held lump.")
 
 
 def prove(problem: Regulated) -> Proof:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +10,25 @@ from flint import fmpq
 
 from robthermal.errors import InputError
 
-from ._fields import Interval, get, intervals, kelvin_interval, mapping, not_negative, positive, sequence, text
+from ._fields import (
+    Interval,
+    get,
+    intervals,
+    kelvin_interval,
+    mapping,
+    not_negative,
+    only_notes,
+    positive,
+    sequence,
+    text,
+)
 from ._numbers import exact, name_of, show
 
 Quadratic = tuple[fmpq, fmpq, fmpq]  # a + b I + c I²
 _EXPONENT_LIMIT = 10
+_PROPERTIES = ("seebeck", "resistance", "conductance")
+_TABLES = ("lumps", "ambients", "links", "modules", "inputs", "sensors", "fit", "gain", "controller")
+_BOX = ("temperature", "current", "parameters", "ambient", "heat", "setpoint", "sample_time", "plant", "drift")
 
 
 @dataclass(frozen=True)
@@ -87,7 +101,7 @@ class Region:
 def read_system(value: Any) -> ThermalSystem:
     """Return the exact system of a certificate; InputError for anything missing, of another type or impossible."""
     table = mapping(value, "system")
-    _no_effects(table, ("leads",), "system")
+    _only_known(table)
     lumps = mapping(get(table, "lumps", "system"), "system.lumps")
     if not lumps:
         raise InputError("no lumps", where="system.lumps", expected="at least one")
@@ -107,6 +121,7 @@ def read_system(value: Any) -> ThermalSystem:
 def read_region(value: Any, system: ThermalSystem) -> Region:
     """Return the exact box of a certificate."""
     table = mapping(value, "region")
+    only_notes(table, _BOX, "region")
     temperature = get(table, "temperature", "region")
     names = [module.name for module in system.modules]
     current = intervals(get(table, "current", "region"), names, "region.current")
@@ -160,7 +175,7 @@ def _temperatures(value: Any, lumps: tuple[str, ...]) -> tuple[Interval, ...]:
 
 def _capacity(value: Any, where: str) -> fmpq:
     table = mapping(value, where)
-    _no_effects(table, ("heat", "gradient", "periodic", "condensation"), where)
+    only_notes(table, ("capacity", "initial", "disturbance"), where)
     return positive(get(table, "capacity", where), f"{where}.capacity")
 
 
@@ -178,7 +193,7 @@ def _ambients(value: Any, lumps: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     table = mapping(value, where)
-    _no_effects(table, ("step",), where)
+    only_notes(table, ("name", "between", "conductance", "natural", "radiation"), where)
     ends = sequence(get(table, "between", where), f"{where}.between")
     if len(ends) != 2:
         raise InputError(f"{len(ends)} names", where=f"{where}.between", expected="two")
@@ -188,6 +203,7 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     gain = exponent = radiation = fmpq(0)
     if "natural" in table:
         natural = mapping(table["natural"], f"{where}.natural")
+        only_notes(natural, ("gain", "exponent"), f"{where}.natural")
         gain = not_negative(get(natural, "gain", f"{where}.natural"), f"{where}.natural.gain")
         exponent = not_negative(get(natural, "exponent", f"{where}.natural"), f"{where}.natural.exponent")
         if exponent > _EXPONENT_LIMIT:
@@ -199,12 +215,18 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     return Link((first, second), conductance, gain, exponent, radiation)
 
 
-def _no_effects(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
-    """Refuse effects of a system file that no claim takes into account: other keys are free, these are physics."""
-    for key in keys:
-        if key in table:
-            raise InputError(f"{key!r} is an effect that no claim takes into account", where=where,
-                             remedy="Certify the network without it.")
+def _only_known(table: Mapping[str, Any]) -> None:
+    """Refuse what may be physics of another machine: unknown tables, heaters that are not just heat, Celsius."""
+    only_notes(table, _TABLES, "system")
+    if table.get("temperature_unit", "K") != "K":
+        raise InputError(f"temperature_unit {name_of(table['temperature_unit'])}", where="system", expected="'K'")
+    for name, heater in mapping(table.get("inputs", {}), "system.inputs").items():
+        place = f"system.inputs[{name_of(name)}]"
+        only_notes(mapping(heater, place), ("gain", "limits"), place)
+    sensors = table.get("sensors", ())
+    for sensor in sensors.values() if isinstance(sensors, Mapping) else sequence(sensors, "system.sensors"):
+        if isinstance(sensor, Mapping):  # what a sensor reads matters to an observer only, which looks closer
+            only_notes(sensor, ("noise", "time_constant", "offset", "gain", "delay"), "system.sensors")
 
 
 def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
@@ -217,7 +239,7 @@ def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
 def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
     where = f"system.modules[{name_of(name)}]"
     table = mapping(value, where)
-    _no_effects(table, ("thomson", "joule_split", "hysteresis", "drive"), where)
+    only_notes(table, ("hot", "cold", *_PROPERTIES, "reference_temperature", "current_limits"), where)
     faces = []
     for face in ("hot", "cold"):
         node = _node(get(table, face, where), nodes, f"{where}.{face}")
@@ -226,12 +248,13 @@ def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
         faces.append(node)
     if faces[0] == faces[1]:
         raise InputError("hot and cold are the same lump", where=where)
-    return Module(name, faces[0], faces[1], _affine(table, "seebeck", where), _affine(table, "resistance", where),
-                  _affine(table, "conductance", where),
+    seebeck, resistance, conductance = (_affine(table, key, where) for key in _PROPERTIES)
+    return Module(name, faces[0], faces[1], seebeck, resistance, conductance,
                   exact(get(table, "reference_temperature", where), f"{where}.reference_temperature"))
 
 
 def _affine(table: Mapping[str, Any], key: str, where: str) -> tuple[fmpq, fmpq]:
     place = f"{where}.{key}"
     item = mapping(get(table, key, where), place)
+    only_notes(item, ("value", "slope"), place)
     return exact(get(item, "value", place), f"{place}.value"), exact(get(item, "slope", place), f"{place}.slope")

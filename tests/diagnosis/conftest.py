@@ -93,3 +93,18 @@ def hide() -> Callable[..., tuple[rt.Record, rt.Record]]:
 @pytest.fixture(scope="session")
 def rate() -> Callable[..., Array]:
     return two_lump_rate
+
+
+@pytest.fixture(scope="session")
+def inputs_of() -> Callable[..., Array]:
+    return inputs
+
+
+@pytest.fixture(scope="session")
+def integrated() -> Callable[..., Array]:
+    return integrate
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Callable[..., rt.Record]:
+    return measured

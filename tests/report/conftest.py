@@ -9,7 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from robthermal.report import Claim, Figure, Report, Section, Table, box_ranges, current_limits, measured_against_model
+from robthermal.report import (
+    Claim,
+    Evidence,
+    Figure,
+    Report,
+    Section,
+    Table,
+    box_ranges,
+    current_limits,
+    measured_against_model,
+)
 
 ODD = '<script>alert("&\x00\x1b\ud800")</script> Æ €'
 
@@ -36,9 +46,14 @@ def report(claim: Claim) -> Report:
                 Section("Limits", "Text.", figures=(bars,), anchor="model"),
                 Section("Æ", "Text.", figures=(ranges,)), Section("f1 x", "A drawing's ids begin so."))
     claims = (claim, replace(claim, title="Never left"))
+    evidence = (Evidence("Contraction " + ODD, "certificates/contraction.json", "ab" * 32, "contraction",
+                         "It contracts " + ODD, True, True, margins={"rate": 0.00123}, seconds=0.03,
+                         assumptions=("Stays in the box " + ODD,)),
+                Evidence("Never left", "certificates/box.json", "cd" * 32, "invariance", "It stays.", True, True,
+                         assumptions=("Starts in the box.",)))
     provenance = {"robthermal": "0.1.0", "SHA-256 of " + ODD: "9f" * 32}
     return Report("Set-up " + ODD, "10 lumps", "SIMULATED DATA", claims, sections, provenance,
-                  ("One temperature per lump " + ODD,), "today")
+                  ("One temperature per lump " + ODD,), "today", evidence=evidence, checker="robthermal 0.1.0")
 
 
 @pytest.fixture(scope="session")

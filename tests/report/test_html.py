@@ -80,7 +80,7 @@ def test_all_text_is_escaped_and_printable(page: Page, path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]", text)
     # title, h1, claim, section, paragraph, caption, cell, provenance, assumption: shown as typed, half pairs marked
-    assert page.text.count('<script>alert("&\ufffd\ufffd\ufffd")</script> Æ €') >= 9
+    assert page.text.count('<script>alert("&\ufffd\ufffd\ufffd")</script> Æ €') >= 14
     assert {a["aria-label"] for a in page.all("svg")} >= {'Time plot <script>alert("&\ufffd\ufffd\ufffd")</script> Æ €'}
 
 
@@ -105,7 +105,7 @@ def test_page_is_accessible(page: Page) -> None:
     assert len(page.all("svg")) == 4
     assert all(svg["role"] == "img" and svg["aria-label"] for svg in page.all("svg"))
     assert page.all("th") and all(th["scope"] in {"col", "row"} for th in page.all("th"))
-    assert len(page.all("caption")) == len(page.all("table")) == 2
+    assert len(page.all("caption")) == len(page.all("table")) == 3
     assert [a["href"] for a in page.all("a")][0] == "#claims", "skip link comes first"
 
 
@@ -162,7 +162,8 @@ def test_nothing_claimed_is_not_certified(report: Report, tmp_path: Path) -> Non
 def test_first_screen_comes_before_contents_and_appendix_last(page: Page) -> None:
     text = page.text
     words = ("SIMULATED DATA", "CERTIFIED & VERIFIED", "What is claimed", "m1: 0 to 1.2\u00a0A",
-             "rate 0.00123\u00a01/s", "Contents", "Two ", "Assumptions", "Provenance")
+             "rate 0.00123\u00a01/s", "Contents", "Two ", "Assumptions", "What each claim rests on",
+             "Exact claims", "Provenance")
     order = [text.index(word) for word in words]
     assert order == sorted(order)
 

@@ -55,7 +55,12 @@ def test_json_summary(report: Report, claim: Claim, tmp_path: Path) -> None:
     assert summary["holds"] is False
     assert [(c["holds"], c["verified"]) for c in summary["claims"]] == [(True, True), (True, None)]
     assert summary["claims"][1]["reason"] == "the independent check was not run"
-    assert summary["provenance"] == dict(report.provenance)
+    assert summary["provenance"] == {name.replace("\ud800", "\ufffd"): v for name, v in report.provenance.items()}
+    assert [c["valid"] for c in summary["claims"]] == [True, False]
+    one = summary["certificates"][0]
+    assert (one["file"], one["valid"], one["margins"]) == ("certificates/contraction.json", True, {"rate": 0.00123})
+    assert summary["version"] == "0.1.0" and summary["checker"] == "robthermal 0.1.0"
+    assert "Starts in the box." in summary["assumptions"]
     assert json.loads(write_json(report, tmp_path / "t.json").read_text())["holds"] is True
 
 

@@ -116,21 +116,22 @@ def _scaled(M: np.ndarray, left: np.ndarray | float, right: np.ndarray | float) 
 def make_hinf(rng: np.random.Generator) -> Document:
     system = random_linear(rng)
     A, B, C, D = matrices(system)
-    bound = (_norm(system) + 1e-3) * (1 + 10 ** float(rng.uniform(-2.5, -1)))
+    (p, m), scalings = D.shape, {}
+    if rng.random() < 0.3:
+        scalings = {"left": np.diag(rng.uniform(0.5, 1, p).round(3)), "right": np.diag(rng.uniform(1, 2, m).round(3))}
+        B, C, D = B / np.diag(scalings["right"]), scalings["left"] @ C, _scaled(D, *scalings.values())
+    bound = (_norm(system, *scalings.values()) + 1e-3) * (1 + 10 ** float(rng.uniform(-2.5, -1)))
     evidence: Document = {"method": "polynomial"}
     if rng.random() < 0.6:
         solve = solve_discrete_are if system["sample_time"] else solve_continuous_are
         level = bound * (1 - 1e-4)
         try:
-            P = solve(A, B, C.T @ C + 1e-6 * np.eye(len(A)), D.T @ D - level**2 * np.eye(B.shape[1]), s=C.T @ D)
+            P = solve(A, B, C.T @ C + 1e-6 * np.eye(len(A)), D.T @ D - level**2 * np.eye(m), s=C.T @ D)
             evidence = {"method": "bounded_real", "matrix": np.round((P + P.T) / 2, 9).tolist()}
         except (np.linalg.LinAlgError, ValueError):
             pass
-    document = {"system": system, "region": {"bound": bound}, "evidence": evidence}
-    if rng.random() < 0.3 and evidence["method"] == "polynomial":
-        p, m = D.shape
-        document["region"] |= {"left": np.diag(rng.uniform(0.5, 1, p).round(3)).tolist(),
-                               "right": np.diag(rng.uniform(1, 2, m).round(3)).tolist()}
+    region = {"bound": bound, **{key: scaling.tolist() for key, scaling in scalings.items()}}
+    document = {"system": system, "region": region, "evidence": evidence}
     return document if holds("hinf", document) else make_hinf(rng)
 
 
@@ -162,9 +163,20 @@ def make_frequency(rng: np.random.Generator) -> Document:
                 region[key] = [[[[s.real, s.imag] if i == j else 0.0 for j in range(size)] for i in range(size)]
                                for s in scale]
             region["blocks"] = [["full", m, p]]
+            if p == m == 2:
+                region |= _two_blocks(count, rng)
         region["bounds"] = [1.02 * value + 1e-3 for value in _largest(system, region)]
     document = {"system": system, "region": region, "evidence": {}}
     return document if holds("frequency", document) else make_frequency(rng)
+
+
+def _two_blocks(count: int, rng: np.random.Generator) -> Document:
+    """Return two scalar blocks with diagonal scalings, or a repeated scalar with full complex ones, L = R."""
+    entries = np.round(rng.standard_normal((count, 2, 2, 2)) + 2 * np.eye(2)[:, :, None], 3)
+    blocks: list = [["repeated", 2]]
+    if rng.random() < 0.5:
+        entries, blocks = entries * np.eye(2)[:, :, None], [["full", 1, 1], ["full", 1, 1]]
+    return {"left": entries.tolist(), "right": entries.tolist(), "blocks": blocks}
 
 
 def _largest(system: Document, region: Document) -> list[float]:

@@ -6,8 +6,8 @@ import copy
 
 import certificate_truth as truth
 import held_truth
+import loop_truth
 import numpy as np
-import test_loop
 from mutants import Document, Subject, holds
 from scipy.linalg import solve_discrete_lyapunov
 from test_observer import error_matrix, machine
@@ -135,7 +135,7 @@ def make_runaway(rng: np.random.Generator) -> Document:
 def _modules(document: Document, rng: np.random.Generator, count: int) -> list[list[float]]:
     spans_, found = ranges(document), []
     for _ in range(count if spans_ else 1):
-        at = {name: pair[int(rng.integers(2))] if rng.random() < 0.7 else float(rng.uniform(*pair))
+        at = {name: pair[int(rng.integers(2))] if rng.random() < 0.7 else pair[0] + rng.random() * (pair[1] - pair[0])
               for name, pair in spans_.items()}
         found.append([at.get(key, truth.number(document["system"][key])) for key in _CONSTANTS])
     return found
@@ -322,6 +322,8 @@ def make_regulated(rng: np.random.Generator) -> Document:
     if method == "lyapunov":
         document["system"]["links"][0].pop("natural", None)
     document["evidence"] = candidate(document, method, 1e-6, rng)
+    if rng.random() < 0.3:
+        document["region"]["parameters"] = spans(document["system"], names_of(document["system"]), rng, 2, 0.98, 1.02)
     if not holds("regulated", document):
         return make_regulated(rng)
     good = establish("regulated", **document, made_by={})
@@ -338,10 +340,7 @@ def break_regulated(document: Document, rng: np.random.Generator) -> float:
 
 
 def make_loop(rng: np.random.Generator) -> Document:
-    document = test_loop.document()
-    good = establish("loop", **document, made_by={})
-    document["evidence"]["contraction"] = 0.996 - 0.99 * good.margin["contraction"]
-    return {"kind": "loop", **document}
+    return {"kind": "loop", **loop_truth.variant(str(rng.choice(list(loop_truth.VARIANTS))))}
 
 
 def break_loop(document: Document, rng: np.random.Generator) -> float:
@@ -352,7 +351,7 @@ def break_loop(document: Document, rng: np.random.Generator) -> float:
                 claimed = truth.replaced(claimed, path, truth.number)
             except ValueError:
                 continue  # a name
-    return test_loop.growth(claimed, rng, 6) - 1
+    return loop_truth.violation(claimed, rng)
 
 
 SUBJECTS = (Subject("contraction", make_contraction, break_contraction),

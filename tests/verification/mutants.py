@@ -22,6 +22,7 @@ Document = dict[str, Any]
 SECTIONS = ("system", "region", "evidence")
 FALSE, CLAIM = "ACCEPTED THOUGH FALSE", "ACCEPTED WITH A WRONG SENTENCE"
 ALARMS = (FALSE, CLAIM)
+PUSHED = (4, 9)  # which of ten mutants are bisected to the edge of what the checker accepts
 
 
 @dataclass(frozen=True)
@@ -40,14 +41,42 @@ def holds(kind: str, document: Document) -> bool:
     return establish(kind, **{key: document[key] for key in SECTIONS}, made_by={}, margin={}).holds
 
 
-def run(subject: Subject, rng: np.random.Generator, count: int, per_document: int = 10) -> Counter[str]:
-    """Judge ``count`` mutants of one kind."""
+def run(subject: Subject, rng: np.random.Generator, count: int, per_document: int = 10,
+        edges: tuple[int, ...] = PUSHED) -> Counter[str]:
+    """Judge ``count`` mutants of one kind; ``edges``: which of those of one document are pushed to the edge."""
     table: Counter[str] = Counter()
     for k in range(count):
         if k % per_document == 0:
             document = {"margin": {}, **subject.make(rng)}
-        table[judge(subject, document if k % per_document == 0 else mutate(document, rng), rng)] += 1
+        changed = document if k % per_document == 0 else (
+            pushed(subject, document, rng) if k % per_document in edges else mutate(document, rng))
+        table[judge(subject, changed, rng)] += 1
     return table
+
+
+def pushed(subject: Subject, document: Document, rng: np.random.Generator) -> Document:
+    """Return a copy with one number as far away as the checker still accepts, to 1e-6 of the way."""
+    path = _pick(_numeric(document), rng)
+    start = truth.number(_at(document, path))
+    way = float(rng.choice([-1, 1])) * 10 ** float(rng.uniform(-3, 1)) * (abs(start) or 1.0)
+
+    def at(share: float) -> Document:
+        return _set(copy.deepcopy(document), path, start + share * way)
+
+    low, high = 0.0, 1.0
+    if _accepted(subject.kind, at(high)):
+        return at(high)
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _accepted(subject.kind, at(middle)) else (low, middle)
+    return at(low)
+
+
+def _accepted(kind: str, document: Document) -> bool:
+    try:
+        return holds(kind, document)
+    except InputError:
+        return False
 
 
 def judge(subject: Subject, document: Document, rng: np.random.Generator) -> str:

@@ -44,6 +44,58 @@ def test_effects_that_no_claim_takes_into_account_are_refused(place, key, value)
         contraction(system)
 
 
+UNKNOWN = [("system",), ("system", "lumps", "a"), ("system", "links", 0), ("system", "links", 0, "natural"),
+           ("system", "modules", "m"), ("system", "modules", "m", "seebeck"), ("region",)]
+
+
+@pytest.mark.parametrize("place", UNKNOWN, ids=lambda place: str(place[-1]))
+@pytest.mark.parametrize("value", [0.5, {"gain": 2.0}, [1.0, 2.0], True])
+def test_numbers_and_tables_under_unknown_names_are_refused_but_notes_are_free(place, value):
+    """An effect that was added after this checker would be left out in silence."""
+    document = {"system": copy.deepcopy(PAIR), "region": copy.deepcopy(BOX)}
+    document["system"]["links"][0]["natural"] = {"gain": 0.1, "exponent": 0.25}
+    part = document
+    for name in place:
+        part = part[name]
+    part["note"], part["source"] = "measured in May", None
+    assert contraction(**document).holds
+    part["quadratic"] = value
+    with pytest.raises(InputError, match="unknown key 'quadratic'"):
+        contraction(**document)
+
+
+@pytest.mark.parametrize(("key", "value", "message"), [
+    ("temperature_unit", "degC", "temperature_unit"), ("inputs", {"foil": {"lump": "a", "power_slope": 0.5}}, "slope"),
+    ("inputs", {"foil": {"lump": "a", "drive": {"gain": 0.1}}}, "drive"), ("inputs", [1.0], "not an object"),
+    ("sensors", {"T": {"lump": "a", "self_heating": 0.1}}, "self_heating")])
+def test_heaters_and_sensors_that_heat_otherwise_are_refused(key, value, message):
+    """A heater whose power grows with its temperature is part of the Jacobian."""
+    plain = {"temperature_unit": "K", "inputs": {"foil": {"lump": "a", "gain": 2.0, "limits": [0.0, 1.0]}},
+             "sensors": {"T": {"lump": "a", "noise": 0.01, "time_constant": 5.0}}}
+    assert contraction({**PAIR, **plain}).holds
+    with pytest.raises(InputError, match=message):
+        contraction({**PAIR, **plain, key: value})
+
+
+def test_large_networks_and_single_modules_have_no_unknown_numbers_either():
+    rod = {"capacity": [10.0], "rows": [0], "cols": [0], "values": [-0.5]}
+    evidence = {"rate": 0.0, "weights": [1.0]}
+    assert establish("network", system=rod, region={"note": "x"}, evidence=evidence, made_by={}, margin={}).holds
+    for system, region in (({**rod, "uncertainty": 0.1}, {}), (rod, {"parameters": {}})):
+        with pytest.raises(InputError, match="unknown key"):
+            establish("network", system=system, region=region, evidence=evidence, made_by={}, margin={})
+    module = {"seebeck": 0.05, "resistance": 4.6, "conductance": 0.3, "sink_conductance": 0.7,
+              "sink_temperature": 298.0, "setpoint": 278.0, "thomson": 1e-3}
+    with pytest.raises(InputError, match="'thomson'"):
+        establish("runaway", system=module, region={}, evidence={"current": [1, 2], "load": [0, 9]}, made_by={})
+
+
+def test_the_claim_of_a_box_that_is_never_left_says_that_there_is_no_other_heat():
+    region = {**BOX, "ambient": {"room": [290.0, 300.0]}, "heat": {"a": [0.0, 1.0]}}
+    claim = establish("invariance", system=PAIR, region=region, evidence={}, made_by={}).claim
+    assert "heat load on 'a' in [0, 1] W" in claim and "with no other heat" in claim
+
+
 @pytest.mark.parametrize("key", ["time_constant", "delay", "offset"])
 def test_a_sensor_that_does_more_than_read_is_refused(key):
     document = observed_rod(0.2, 0.9)

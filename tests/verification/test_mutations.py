@@ -20,13 +20,14 @@ def test_every_kind_has_a_falsifier():
 @pytest.mark.parametrize("kind", sorted(SUBJECTS))
 def test_no_mutant_is_accepted_though_false(kind):
     count = 6 if kind == "loop" else 30
-    table = run(SUBJECTS[kind], np.random.default_rng(3), count, per_document=15)
+    slow = kind in ("loop", "observer", "regulated")  # seconds to push one of them to the edge
+    table = run(SUBJECTS[kind], np.random.default_rng(3), count, per_document=15, edges=() if slow else (4, 9))
     assert not any(table[alarm] for alarm in ALARMS), table
     assert table["accepted, no sample violates it"] >= 1, table
     assert kind == "loop" or sum(number for what, number in table.items() if "accepted" not in what) > 3, table
 
 
-@pytest.mark.parametrize("kind", sorted(set(SUBJECTS) - {"loop"}))
+@pytest.mark.parametrize("kind", sorted(SUBJECTS))
 def test_falsifiers_find_what_is_false(kind):
     """A claim of twice the rate, half the bound or a quarter of the interval is caught by the samples."""
     rng = np.random.default_rng(5)
@@ -43,7 +44,7 @@ def test_falsifiers_find_what_is_false(kind):
         region["heat"] = {name: [100 * low, 100 * high] for name, (low, high) in region["heat"].items()}
     elif kind == "runaway":
         evidence["load"] = [value + 1 for value in evidence["load"]]
-    elif kind == "observer":
+    elif kind in ("observer", "loop"):
         evidence["contraction"] *= 0.8
     elif kind == "gain":
         evidence["gains"] = {source: {name: [0.5 * value for value in values] for name, values in part.items()}

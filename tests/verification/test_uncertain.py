@@ -41,12 +41,13 @@ def machines(system, ranges, rng, count):
     for _ in range(count):
         other = copy.deepcopy(system)
         for name, pair in ranges.items():
-            value = float(rng.choice(pair)) if rng.random() < 0.8 else float(rng.uniform(*pair))
+            value = float(rng.choice(pair) if rng.random() < 0.8 else pair[0] + rng.random() * (pair[1] - pair[0]))
             table, rest = name.split(".", 1)
             if table == "lumps":
                 other["lumps"][rest.removesuffix(".capacity")]["capacity"] = value
             elif table == "links":
-                link = next(li for li in other["links"] if "-".join(li["between"]) == rest.removesuffix(".conductance"))
+                link = next(li for li in other["links"] if li.get("name", "-".join(li["between"]))
+                            == rest.removesuffix(".conductance"))
                 link["conductance"] = value
             else:
                 part, prop, key = rest.split(".")

@@ -1,0 +1,44 @@
+"""Commands about finished results: build a report again, check certificates again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import robthermal as rt
+
+from ._terminal import Json, answer, place, progress_bar, say, show_report
+
+_WORDS = {True: "valid     ", False: "NOT VALID ", None: "unreadable"}
+
+
+def report(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of any command.")],
+           as_json: Json = False) -> None:
+    """Build report.html, junit.xml and summary.json of a results folder again; every certificate is checked anew.
+
+    Example: robthermal report results
+    """
+    with progress_bar("certificates") as done:
+        rebuilt = rt.project.rebuild_report(folder, done)
+    show_report(rebuilt, folder, as_json)
+
+
+def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")],
+           junit: Annotated[Path | None, typer.Option("--junit", help="JUnit file to write, for a pipeline.",
+                                                      callback=place)] = None,
+           as_json: Json = False) -> None:
+    """Re-derive certificates from their files alone, in ball arithmetic. Exit 0 valid, 1 not valid, 2 unreadable.
+
+    Example: robthermal verify certified --junit junit.xml
+    """
+    files = rt.project.certificate_files(certificates)
+    with progress_bar("certificates") as done:
+        checks = rt.project.verify_files(files, done)
+    if junit is not None:
+        rt.project.write_checks(checks, junit)
+    rows = [{"file": str(one.file), "valid": one.valid, "reason": one.reason, "claim": one.claim, "kind": one.kind,
+             "margins": one.margins, "seconds": one.seconds} for one in checks]
+    answer(rows, as_json, lambda: say(*(f"{_WORDS[one.valid]}  {one.file}: {one.reason}" for one in checks)))
+    raise typer.Exit(max(one.status for one in checks))

@@ -1,0 +1,110 @@
+"""A symmetric matrix that makes linear functions of it definite."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, vstack
+
+from ._solver import LOOSE, Array, semidefinite, solved
+from ._stacked import stack, strictly
+
+
+@dataclass(frozen=True)
+class Form:
+    """The linear function Q -> Σ LᵀQR + RᵀQL of a symmetric matrix Q.
+
+    Parameters
+    ----------
+    terms : tuple of (ndarray, ndarray)
+        Pairs (L, R), each (n, k), Q being (n, n) and the value (k, k).
+    """
+
+    terms: tuple[tuple[Array, Array], ...]
+
+    def at(self, Q: Array) -> Array:
+        """Value at a matrix."""
+        side = self.terms[0][0].shape[1]
+        half = sum((L.T @ Q @ R for L, R in self.terms), np.zeros((side, side)))
+        return half + half.T
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What the solver returned, believed by nobody.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (n, n)
+        Q, symmetric.
+    margin : float
+        t for which the solver claims every form >= t I; nan where it returned nothing.
+    status : str
+        Its own word.
+    """
+
+    matrix: Array
+    margin: float
+    status: str
+
+
+def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: float = 1e-5) -> Candidate:
+    """Find Q with least I <= Q <= I and every form >= t I, t as large as possible.
+
+    Parameters
+    ----------
+    forms : sequence of Form
+        Linear functions of Q.
+    pattern : ndarray of bool, shape (n, n)
+        Entries of Q that may differ from zero.
+    least : float
+        Smallest eigenvalue of Q allowed [-].
+
+    Returns
+    -------
+    Candidate
+
+    Examples
+    --------
+    >>> A = np.array([[-1.0, 3.0], [0.0, -1.0]])  # stable, but V = x'x grows
+    >>> found = largest_margin([Form(((np.eye(2), -A),))], np.ones((2, 2), bool))
+    >>> bool(np.linalg.eigvalsh(Form(((np.eye(2), -A),)).at(found.matrix)).min() > 0)
+    True
+    """
+    n = len(pattern)
+    rows, columns = np.nonzero(np.triu(pattern))
+    identity = Form(((0.5 * np.eye(n), np.eye(n)),))
+    own = _columns(identity, rows, columns)
+    # s = b - A y >= 0 with y = (free entries of Q, t)
+    blocks = [strictly(_columns(form, rows, columns), 1.0) for form in forms]
+    still = np.zeros((len(own), 1))
+    blocks += [np.hstack([own, still]), np.hstack([-own, still])]
+    unit = stack(np.eye(n)[None])[0]
+    offset = np.concatenate([np.zeros(sum(map(len, blocks[:-2]))), -least * unit, unit])
+    A = vstack([csc_matrix(-block) for block in blocks], format="csc")
+    cost = np.zeros(len(rows) + 1)
+    cost[-1] = -1.0
+    sides = [form.terms[0][0].shape[1] for form in forms] + [n, n]
+    cones = [semidefinite(side) for side in sides]
+    found = solved(cost, A, offset, cones, tolerance=LOOSE)
+    y = found.x
+    Q = np.zeros((n, n))
+    if not np.isfinite(y).all():
+        return Candidate(np.eye(n), np.nan, found.status)
+    Q[rows, columns] = y[:-1]
+    Q = Q + np.triu(Q, 1).T
+    return Candidate(Q, float(y[-1]), found.status)
+
+
+def _columns(form: Form, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+    """Stacked values of a form at every symmetric unit matrix, one per column."""
+    side = form.terms[0][0].shape[1]
+    total = np.zeros((len(rows), side, side))
+    for L, R in form.terms:
+        total += L[rows][:, :, None] * R[columns][:, None, :]
+        other = L[columns][:, :, None] * R[rows][:, None, :]
+        total += other * (rows != columns)[:, None, None]
+    return stack(total + total.transpose(0, 2, 1)).T

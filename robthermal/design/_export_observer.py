@@ -1,0 +1,200 @@
+"""Observers for other programs: C99, MATLAB and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._export import by_suffix, comment, doubles, identifier, json_bytes, matlab_bytes, number, rows, self_test
+from ..thermal import format_system
+from ._export_heats import DRIVE, HEATS, INTEGERS, Heat, Row
+from ._observer_recursion import ObserverRecursion
+
+if TYPE_CHECKING:
+    from ._observer import GainObserver
+
+FORMAT = "robthermal-observer/1"
+_TEST_SAMPLES = 64
+
+_TEXT = """\
+/* Observer of all lumps ({method}), written by robthermal. C99, no allocation, no library but math.h.
+ *
+ * Sample time {h:.17g} s. All temperatures in kelvin. Once, with a first guess of the lumps, then in every sample:
+ *
+ *     {p}_init(&state, lumps);
+ *     state.x is the estimate now;
+ *     lost = {p}_step(&state, readings, inputs);  readings of this sample, inputs held until the next one
+ *
+ * lumps: {lumps}
+ * readings: {sensors}
+ * inputs: {inputs} (heaters in their unit, currents [A], ambients [K])
+ * A reading that is not finite corrects nothing; the step returns how many there were. Inputs must be finite.
+ *
+ * Numbers are hexadecimal: exact. Sums run from the left. Test: cc -std=c99 -ffp-contract=off -DOBSERVER_TEST this.c
+ * -lm && ./a.out prints the largest difference from the vector at the end, relative to the largest value: 0 without
+ * fused multiply-add. Exit status 1 above 1e-9.
+ */
+#ifndef {p}_included
+#define {p}_included
+
+#include <math.h>
+
+typedef struct {{
+    double x[{n}];
+}} {p}_state;
+
+/* State of the next sample: A x + G (heats) + L (errors). */
+static const double {p}_A[{n}][{n}] = {{
+{A}
+}};
+static const double {p}_G[{n}][{n}] = {{
+{G}
+}};
+static const double {p}_L[{n}][{n_y}] = {{
+{L}
+}};
+/* Heat of the inputs and, last, constant heat. */
+static const double {p}_D[{n}][{n_w}] = {{
+{D}
+}};
+/* Every sensor: its lump, offset [K], gain. */
+static const struct {{ int lump; double offset, gain; }} {p}_sensors[{n_y}] = {{
+{sensor_rows}
+}};
+{tables}
+/* All heat that the linear network does not hold [W]. N: lumps, then ambients. */
+static inline void {p}_heat(const double x[{n}], const double u[{n_u}], double q[{nodes}])
+{{
+    double w[{n_w}], N[{nodes}];
+    for (int k = 0; k < {n_u}; k++)
+        w[k] = u[k];
+    w[{n_u}] = 1.0;
+    for (int k = 0; k < {n}; k++)
+        N[k] = x[k];
+    for (int k = {n}; k < {nodes}; k++)
+        N[k] = u[{first_ambient} + k - {n}];
+{drives}    for (int i = 0; i < {nodes}; i++)
+        q[i] = 0.0; /* heat into ambients is not used */
+    for (int i = 0; i < {n}; i++)
+        for (int k = 0; k < {n_w}; k++)
+            q[i] += {p}_D[i][k] * w[k];
+{heats}}}
+
+static inline void {p}_init({p}_state *s, const double lumps[{n}])
+{{
+    for (int i = 0; i < {n}; i++)
+        s->x[i] = lumps[i];
+}}
+
+static inline int {p}_step({p}_state *s, const double readings[{n_y}], const double inputs[{n_u}])
+{{
+    double q[{nodes}], e[{n_y}], next[{n}];
+    int lost = 0;
+    {p}_heat(s->x, inputs, q);
+    for (int k = 0; k < {n_y}; k++) {{
+        int off = !isfinite(readings[k]);
+        lost += off;
+        e[k] = off ? 0.0 : {T_ref} + (readings[k] - {p}_sensors[k].offset - {T_ref}) / {p}_sensors[k].gain
+            - s->x[{p}_sensors[k].lump];
+    }}
+    for (int i = 0; i < {n}; i++) {{
+        double total = 0.0;
+        for (int k = 0; k < {n}; k++)
+            total += {p}_A[i][k] * s->x[k];
+        for (int k = 0; k < {n}; k++)
+            total += {p}_G[i][k] * q[k];
+        for (int k = 0; k < {n_y}; k++)
+            total += {p}_L[i][k] * e[k];
+        next[i] = total;
+    }}
+    for (int i = 0; i < {n}; i++)
+        s->x[i] = next[i];
+    return lost;
+}}
+
+{main}
+#endif
+"""
+
+
+def export(observer: GainObserver, path: str | Path, name: str) -> None:
+    """Write a .c, .h, .mat or .json file."""
+    def c() -> bytes:
+        return _source(observer, name).encode("ascii")
+
+    def json_file() -> bytes:
+        content = _document(observer, name)
+        return json_bytes({key: value.tolist() if isinstance(value, np.ndarray) else value
+                           for key, value in content.items()})
+
+    by_suffix(path, {".c": c, ".h": c, ".mat": lambda: matlab_bytes(_document(observer, name)), ".json": json_file})
+
+
+def _document(observer: GainObserver, name: str) -> dict[str, Any]:
+    """x⁺ = A x + G f + L (y - C x); f follows from the system, given as the text of its file."""
+    model = observer.model
+    return {"format": FORMAT, "name": name, "method": observer.method, "sample_time": model.sample_time,
+            "lumps": list(model.system.lump_names), "sensors": list(model.sensors),
+            "inputs": list(model.system.exogenous_names), "A": model.A_d, "G": model.Gamma, "C": model.C,
+            "L": observer.gain, "system": format_system(model.system)}
+
+
+def _source(observer: GainObserver, name: str) -> str:
+    p, system, recursion = identifier(name, "observer"), observer.model.system, ObserverRecursion.of(observer)
+    n, n_u = len(system.lumps), len(system.exogenous_names)
+    kinds = [(HEATS[kind], kind.removesuffix("Term").lower(), table) for kind, table in recursion.heats.items()]
+    shaped = [(DRIVE, "drive", recursion.drives)] if recursion.drives else []
+    return _TEXT.format(
+        p=p, method=observer.method, h=observer.sample_time, n=n, n_y=len(observer.sensors), n_u=n_u, n_w=n_u + 1,
+        nodes=n + recursion.n_ambients, first_ambient=n_u - recursion.n_ambients, T_ref=number(recursion.T_ref),
+        lumps=comment(", ".join(system.lump_names)), sensors=comment(", ".join(observer.sensors)),
+        inputs=comment(", ".join(system.exogenous_names)),
+        A=rows(recursion.A_d), G=rows(recursion.Gamma), L=rows(recursion.L), D=rows(recursion.D),
+        sensor_rows=",\n".join(f"    {{{int(lump)}, {number(offset)}, {number(gain)}}}"
+                               for lump, offset, gain in recursion.sensors),
+        tables="".join(_table(p, *kind) for kind in [*shaped, *kinds]),
+        drives="".join(_loop(p, *kind) for kind in shaped), heats="".join(_loop(p, *kind) for kind in kinds),
+        main=_main(p, observer, recursion))
+
+
+def _table(p: str, heat: Heat, kind: str, table: list[Row]) -> str:
+    numbers = [column for column in heat.columns if column in INTEGERS]
+    values = [column for column in heat.columns if column not in INTEGERS]
+    lines = [f"    {{{', '.join(str(int(v)) for v in row[:len(numbers)])}, {doubles(row[len(numbers):])[1:]}"
+             for row in table]
+    return (f"struct {p}_{kind} {{\n    int {', '.join(numbers)};\n    double {', '.join(values)};\n}};\n"
+            f"static const struct {p}_{kind} {p}_{kind}_rows[{len(table)}] = {{\n" + ",\n".join(lines) + "\n};\n")
+
+
+def _loop(p: str, heat: Heat, kind: str, table: list[Row]) -> str:
+    body = "\n".join(f"        {line}" for line in heat.c)
+    return (f"    for (int k = 0; k < {len(table)}; k++) {{\n"
+            f"        const struct {p}_{kind} *p = &{p}_{kind}_rows[k];\n{body}\n    }}\n")
+
+
+def _main(p: str, observer: GainObserver, recursion: ObserverRecursion) -> str:
+    """Inputs: readings, inputs; outputs: the estimate after the step. The first row starts at the readings' mean."""
+    n, n_y = len(recursion.A_d), len(observer.sensors)
+    n_in = n_y + len(recursion.D[0]) - 1
+    call = (f"        if (t == 0)\n            for (int k = 0; k < {n}; k++)\n                state.x[k] = in[0];\n"
+            f"        {p}_step(&state, in, in + {n_y});\n        for (int k = 0; k < {n}; k++)\n"
+            f"            out[k] = state.x[k];")
+    return self_test(p, "OBSERVER_TEST", list(_test_vector(observer, recursion)), n_in,
+                     f"    {p}_state state = {{{{0}}}};", call)
+
+
+def _test_vector(observer: GainObserver, recursion: ObserverRecursion) -> Iterator[list[float]]:
+    """Inputs within their ranges, readings that follow the estimate."""
+    system, rng = observer.model.system, np.random.default_rng(0)
+    ranges = [limits or (-1.0, 1.0) for limits in (*system.input_limits.values(), *system.current_limits.values())]
+    x: Row = []
+    for t in range(_TEST_SAMPLES):
+        y = rng.uniform(295.0, 301.0, len(observer.sensors)).tolist()
+        x = x or [y[0]] * len(recursion.A_d)
+        u = [float(rng.uniform(*pair)) * (t % 8 > 0) for pair in ranges]
+        u += [float(part.temperature + rng.standard_normal()) for part in system.ambients.values()]
+        x = recursion.step(x, y, u)
+        yield [*y, *u, *x]

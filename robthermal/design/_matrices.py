@@ -1,0 +1,150 @@
+"""A controller as three matrices: start, heat and advance are linear in the memory and in what is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ._modules import Array
+from ._seen import Seen
+
+if TYPE_CHECKING:
+    from ._controller import Controller
+
+_LINEAR = 1e-9  # relative: a controller whose matrices miss it by more is not linear
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """start = M_s [seen; heat], heat = M_h [memory; seen], memory⁺ = M_a [memory; seen; wanted; achieved].
+
+    seen = [reference; cold; temperatures of `lumps`; around]. Entries are zero where nothing acts.
+
+    Parameters
+    ----------
+    sample_time : float
+        [s].
+    modules : int
+        Number of modules.
+    lumps : tuple of str
+        Lumps whose temperatures are used.
+    indices : tuple of int
+        Their positions among all lumps of the system.
+    n_lumps : int
+        Number of lumps of the system; 0 where none is used.
+    around : tuple of str
+        Measured surroundings that are used.
+    start, heat, advance : ndarray
+        (n, n_seen + modules), (modules, n + n_seen) and (n, n + n_seen + 2 modules).
+    """
+
+    sample_time: float
+    modules: int
+    lumps: tuple[str, ...]
+    indices: tuple[int, ...]
+    n_lumps: int
+    around: tuple[str, ...]
+    start: Array
+    heat: Array
+    advance: Array
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Length of every part of what is seen."""
+        return {"reference": self.modules, "cold": self.modules, "temperatures": len(self.lumps),
+                "around": len(self.around)}
+
+    def vector(self, seen: Seen) -> list[float]:
+        """What is seen, in one list.
+
+        Parameters
+        ----------
+        seen : Seen
+            At a sample.
+        """
+        parts = [seen.reference, seen.cold, seen.temperatures[list(self.indices)]]
+        return [float(value) for part in [*parts, *([seen.around] if self.around else [])] for value in part]
+
+
+def dot(row: Array, values: list[float]) -> float:
+    """Sum of products over the entries that are not zero, from the left: as the C source computes it."""
+    terms = [float(a) * value for a, value in zip(row, values, strict=True) if a != 0]
+    total = terms[0] if terms else 0.0
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def matrices(controller: Controller) -> Matrices:
+    """Matrices of a controller, from its answers to unit vectors, without memory that nothing reads.
+
+    Parameters
+    ----------
+    controller : Controller
+        Linear in its memory and in what it sees.
+    """
+    own = getattr(controller, "matrices", None)
+    if isinstance(own, Matrices):
+        return own
+    plant: Any = getattr(controller, "plant", None)
+    m = len(plant.law.names) if plant else getattr(controller, "count", None)
+    if m is None:
+        raise InputError(f"a {type(controller).__name__} does not tell its number of modules",
+                         where="argument controller", expected="what rt.design.pid, state_feedback, linear_controller, "
+                         "feed_forward or disturbance_observer returned")
+    names = plant.law.system.lump_names if plant else ()
+    around = plant.around if plant else ()
+    sizes = np.cumsum([m, m, len(names), len(around)])
+
+    def seen(z: Array) -> Seen:
+        return Seen(*np.split(z, sizes[:-1]))
+
+    def start(z: Array) -> Array:
+        return controller.start(seen(z[:k]), z[k:])
+
+    def heat(z: Array) -> Array:
+        return controller.heat(z[:n], seen(z[n:]))
+
+    def advance(z: Array) -> Array:
+        return controller.advance(z[:n], seen(z[n:n + k]), z[n + k:n + k + m], z[n + k + m:])
+
+    k = int(sizes[-1])
+    n = len(start(np.zeros(k + m)))
+    s, h, a = (_matrix(f, size, type(controller).__name__)
+               for f, size in ((start, k + m), (heat, n + k), (advance, n + k + 2 * m)))
+    kept = _read(h[:, :n], a[:, :n])
+    s, h, a = s[kept], h[:, [*kept, *range(n, n + k)]], a[np.ix_(kept, [*kept, *range(n, n + k + 2 * m)])]
+    used = np.abs(np.concatenate([s[:, :k], h[:, len(kept):], a[:, len(kept):len(kept) + k]])).sum(axis=0)
+    lumps = [i for i in range(len(names)) if used[2 * m + i]]
+    beside = [*range(len(around))] if used[2 * m + len(names):].any() else []
+    columns = [*range(2 * m), *(2 * m + i for i in lumps), *(2 * m + len(names) + i for i in beside)]
+    memory = [*range(len(kept))]
+    return Matrices(controller.sample_time, m, tuple(names[i] for i in lumps), tuple(lumps), len(names) if lumps else 0,
+                    tuple(around) if beside else (), s[:, [*columns, *range(k, k + m)]],
+                    h[:, [*memory, *(len(kept) + c for c in columns)]],
+                    a[:, [*memory, *(len(kept) + c for c in [*columns, *range(k, k + 2 * m)])]])
+
+
+def _matrix(function: Callable[[Array], Array], size: int, kind: str) -> Array:
+    """Matrix of a linear function; refuses one that is not."""
+    probe = np.random.default_rng(0).standard_normal(size)
+    M = np.column_stack([function(unit) for unit in np.eye(size)])
+    off = np.abs(function(probe) - M @ probe).max(initial=0.0)
+    if not off <= _LINEAR * max(1.0, np.abs(M).max(initial=0.0)):
+        raise InputError(f"a {kind} is not linear in its memory and in what it sees", where="argument controller",
+                         expected="a linear controller", remedy="Write its step in C by hand.")
+    return M
+
+
+def _read(heat: Array, advance: Array) -> list[int]:
+    """Memory that reaches a heat, directly or through other memory."""
+    found: set[int] = set()
+    more = set(np.flatnonzero(heat.any(axis=0)).tolist())
+    while more - found:
+        found |= more
+        more = set(np.flatnonzero(advance[sorted(found)].any(axis=0)).tolist())
+    return sorted(found)

@@ -1,0 +1,111 @@
+"""How far apart a record would put candidates, with everything refitted and the present records kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from ..calibration._data import Data
+from ..signals import Record
+from ._refit import Refit, filters, whitened
+from ._short_list import Entry
+from ._structure import Structure
+
+Array = NDArray[np.float64]
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A candidate as the present records left it.
+
+    Parameters
+    ----------
+    label : str
+        Of the candidate.
+    structure : Structure
+        With all accepted effects.
+    v : ndarray
+        Unknowns.
+    present : ndarray, shape (p, p)
+        Triangular factor of the present records' whitened derivatives, priors included: what they know.
+    """
+
+    label: str
+    structure: Structure
+    v: Array
+    present: Array
+
+    def on(self, trial: Data, place: int) -> tuple[Structure, Array]:
+        """The structure and its unknowns on one new record, which starts as the present one of that place did."""
+        own = replace(self.structure, data=(trial,), starts=(self.structure.starts[place],))
+        values = own.ranges.values(self.v[:own.n_parameters])
+        return own, own.start(values, self.structure.quantities(self.v))
+
+
+def hypotheses_of(entries: Sequence[Entry]) -> tuple[Hypothesis, ...]:
+    """Every entry with what the present records say about its unknowns, by the filters of the first."""
+    out = []
+    for entry in entries:
+        J = whitened(entry.fit.structure, entry.fit.v, entries[0].fit.whiteners)[1]
+        out.append(Hypothesis(entry.candidate.label, entry.fit.structure, entry.fit.v, qr(J, mode="r")[0][:J.shape[1]]))
+    return tuple(out)
+
+
+def separations(hypotheses: Sequence[Hypothesis], best: Refit, place: int, record: Record) -> dict[Pair, float]:
+    """Expected gain of ΔBIC between every two candidates from one more record.
+
+    If j is true, k has to explain y_j - y_k on the new record with its own unknowns, which the present records and the
+    priors hold: λ_jk = min over δ of |R δ|² + |L⁻¹(y_j - y_k) - J_k δ|². The smaller of λ_jk and λ_kj is returned.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+        Two or more.
+    best : Refit
+        Whose noise levels hold.
+    place : int
+        Of the present record whose beginning the new one shares.
+    record : Record
+        Inputs to apply.
+    """
+    one = best.structure.data[place]
+    assert isinstance(one, Data)
+    trial = Data(record, one.sensors, one.columns, one.readings)
+    own, v = hypotheses[0].on(trial, place)
+    _, whiteners = filters(own, v, best.floor, best.levels)
+    n, z, rows = trial.readings.size, [], []
+    for hypothesis in hypotheses:
+        own, v = hypothesis.on(trial, place)
+        residual, J = whitened(own, v, whiteners)
+        z.append(residual[:n])
+        rows.append(_stacked(hypothesis, own, J, n))
+    out: dict[Pair, float] = {}
+    for j, k in permutations(range(len(hypotheses)), 2):
+        pair = (hypotheses[min(j, k)].label, hypotheses[max(j, k)].label)
+        out[pair] = min(out.get(pair, np.inf), _unexplained(rows[k], z[k] - z[j]))
+    return out
+
+
+def _stacked(hypothesis: Hypothesis, own: Structure, J: Array, n: int) -> Array:
+    """Derivatives of the new readings, of what the present records know, and of the new start's prior."""
+    common = own.n_parameters + own.n_effects
+    fresh, old = J.shape[1] - common, hypothesis.present.shape[1] - common
+    readings = np.hstack([J[:n, :common], np.zeros((n, old)), J[:n, common:]])
+    known = np.hstack([hypothesis.present, np.zeros((len(hypothesis.present), fresh))])
+    start = np.hstack([np.zeros((fresh, common + old)), np.eye(fresh)])
+    return np.vstack([readings, known, start])
+
+
+def _unexplained(J: Array, difference: Array) -> float:
+    """Squared length of what is left of a difference of the new readings."""
+    target = np.concatenate([difference, np.zeros(len(J) - difference.size)])
+    scale = np.linalg.norm(J, axis=0)
+    J = J[:, scale > 0] / scale[scale > 0]
+    left = target - J @ np.linalg.lstsq(J, target, rcond=1e-10)[0]
+    return float(left @ left)

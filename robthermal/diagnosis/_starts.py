@@ -1,0 +1,104 @@
+"""Where the refit of a candidate starts: from the nominal fit, or from the declared parameters.
+
+A strong effect that is missing pulls the nominal parameters far away; the linearisation there knows little of the truth.
+The declared parameters are wrong by their priors only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import Diverged, InputError
+from ._effect import Candidate
+from ._refit import Refit, extended, paths_of, whitened
+from ._score import columns
+
+Array = NDArray[np.float64]
+_FEW = 3  # evaluations of every start
+_KEPT = 0.7  # share of the predicted decrease that a good start keeps
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """A fit and, where needed, its structure at the declared parameters.
+
+    Parameters
+    ----------
+    fit : Refit
+        Without the candidate.
+    """
+
+    fit: Refit
+
+    @cached_property
+    def declared(self) -> Refit:
+        """The structure at the declared parameters, with the filters of the fit and its effects as they are."""
+        structure = self.fit.structure
+        v = structure.start(structure.ranges.start, structure.quantities(self.fit.v))
+        z, J = whitened(structure, v, self.fit.whiteners)
+        return replace(self.fit, v=v, z=z, J=J, paths=paths_of(structure, v))
+
+
+def started(origin: Origin, candidate: Candidate, size: float) -> Refit:
+    """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best."""
+    fit, tried = origin.fit, []
+    for at, trial, v, beta, promise in _starts(origin, candidate, size):
+        if at is fit and tried and min(new.rss for new in tried) < fit.rss:
+            break  # from nothing is the last resort
+        structure = at.structure.with_effect(trial)
+        values = [*at.structure.quantities(v), {**trial.shape, trial.effect.size.name: beta}]
+        try:
+            new = extended(fit, structure, structure.carried(at.structure, v, values), _FEW)
+        except (Diverged, InputError):
+            continue
+        tried.append(new)
+        if promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - promise):
+            return new
+    if not tried:
+        raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
+    return min(tried, key=lambda new: new.rss)
+
+
+def _starts(origin: Origin, candidate: Candidate, size: float) -> Iterator[tuple[Refit, Candidate, Array, float, float]]:
+    """Linearised at, trial, unknowns, size, and the sum of squares that the linearisation promises."""
+    fit = origin.fit
+    yield fit, candidate, *_linear(fit, candidate, size)
+    try:
+        declared = origin.declared
+    except (Diverged, InputError):
+        declared = fit
+    trial, best = _best_trial(declared, candidate)
+    yield declared, trial, *_linear(declared, trial, best)
+    yield fit, candidate, fit.v, float(np.sign(size)) * candidate.effect.size.typical, fit.rss
+
+
+def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
+    """Optimum of the linearised problem for a size within its bounds, and its sum of squares."""
+    size = _believable(candidate, size)
+    target = fit.z - size * fit.whiten([columns(path, [candidate]) for path in fit.paths])[:, 0]
+    shift = np.linalg.lstsq(fit.J, target, rcond=1e-9)[0]
+    left = target - fit.J @ shift
+    return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
+
+
+def _believable(candidate: Candidate, size: float) -> float:
+    """Within the bounds; near the trial value, if the signature holds only there."""
+    bounds, trial = candidate.effect.size, candidate.shape.get(candidate.effect.size.name)
+    low, high = (bounds.lower, bounds.upper) if trial is None else (0.7 * trial, 1.4 * trial)
+    return float(np.clip(size, low, high))
+
+
+def _best_trial(fit: Refit, candidate: Candidate) -> tuple[Candidate, float]:
+    """Trial values and size that explain most."""
+    trials = [candidate] if candidate.effect.paired else candidate.trials(fit.paths[0])
+    J = fit.project(fit.whiten([columns(path, trials) for path in fit.paths]))
+    power, along = np.sum(J**2, axis=0), J.T @ fit.rest
+    sizes = np.array([_believable(trial, size) for trial, size in zip(trials, along / np.maximum(power, 1e-300),
+                                                                      strict=True)])
+    best = int(np.argmax(2 * sizes * along - sizes**2 * power))
+    return trials[best], float(sizes[best])

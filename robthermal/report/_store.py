@@ -1,0 +1,138 @@
+"""A report as JSON beside its page, so that the page can be built again: text, drawings and tables as they stand."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from ..errors import InputError
+from ._content import Claim, Report, Section
+from ._evidence import Evidence
+from ._figure import Figure
+from ._save import save_json
+from ._table import Printed, Table
+
+STORE = "robthermal-report-content/1"
+_LARGEST = 50_000_000  # bytes
+_REMEDY = "Is this the report.json of a results folder? Run the job again."
+
+
+class _Strict(BaseModel):
+    # Strict: "yes" and 1 are not true here, a badge depends on it.
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _Section(_Strict):
+    title: str
+    text: str
+    figures: list[Figure]
+    tables: list[Printed]
+    anchor: str
+
+
+class _Stored(_Strict):
+    format: Literal["robthermal-report-content/1"]
+    title: str
+    subtitle: str
+    label: str
+    claims: list[Claim]
+    sections: list[_Section]
+    provenance: dict[str, str]
+    assumptions: list[str]
+    generated: str
+    answer: str
+    evidence: list[Evidence]
+    checker: str
+
+
+def write_content(report: Report, path: str | Path) -> Path:
+    """Write everything a report says as JSON, for `read_content`.
+
+    Parameters
+    ----------
+    report : Report
+        What to keep. Of a table it keeps what is printed.
+    path : str or Path
+        File to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, robthermal as rt
+    >>> report = rt.report.Report("Set-up", "", "", (), (), {}, ("One temperature per lump.",), "today")
+    >>> path = rt.report.write_content(report, tempfile.mkdtemp() + "/report.json")
+    >>> rt.report.read_content(path).assumptions
+    ['One temperature per lump.']
+    """
+    sections = [{"title": one.title, "text": one.text, "figures": [asdict(figure) for figure in one.figures],
+                 "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor}
+                for one in report.sections]
+    content = {"format": STORE, "title": report.title, "subtitle": report.subtitle, "label": report.label,
+               "claims": [_claim(claim) for claim in report.claims], "sections": sections,
+               "provenance": dict(report.provenance), "assumptions": list(report.assumptions),
+               "generated": report.generated, "answer": report.answer,
+               "evidence": [asdict(one) for one in report.evidence], "checker": report.checker}
+    return save_json(content, path)
+
+
+def read_content(path: str | Path) -> Report:
+    """Read a report that `write_content` wrote. Nothing it says is checked: that is the caller's work.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to read.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is no such report; drawings with scripts or outside resources are refused.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, robthermal as rt
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "report.json"
+    >>> _ = path.write_text("{}")
+    >>> rt.report.read_content(path)
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: ...report.json: is not a stored report: format, Field required. ...
+    """
+    file = Path(path)
+    try:
+        if file.stat().st_size > _LARGEST:
+            raise InputError(f"is larger than {_LARGEST / 1e6:g} MB", where=str(file), remedy=_REMEDY)
+        stored = _Stored.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(file), remedy=_REMEDY) from None
+    except ValidationError as error:
+        fault: Any = error.errors(include_url=False)[0]
+        place = ".".join(map(str, fault["loc"])) or "the file"
+        raise InputError(f"is not a stored report: {place}, {fault['msg']}", where=str(file), remedy=_REMEDY) from None
+    sections = tuple(Section(one.title, one.text, one.figures, one.tables, one.anchor) for one in stored.sections)
+    return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
+                  stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker)
+
+
+def _printed(table: Table | Printed) -> Printed:
+    return table.printed if isinstance(table, Table) else table
+
+
+def _claim(claim: Claim) -> dict[str, object]:
+    verified = None if claim.verified is None else bool(claim.verified)
+    return {**asdict(claim), "holds": bool(claim.holds), "verified": verified, "seconds": float(claim.seconds)}

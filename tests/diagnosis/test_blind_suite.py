@@ -1,0 +1,135 @@
+"""The blind suite's generator agrees with the contract as the package has it, and one case of each plant is scored."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from blind.cases import Case, made  # noqa: E402 - beside the benchmarks, not on the path before
+from blind.hidden import with_effects  # noqa: E402
+from blind.integrate import Hidden, integrate  # noqa: E402
+from blind.judge import all_named, answer, has_truth, same, stray, wrong  # noqa: E402
+from blind.plants import PLANTS, H, excitation, nominal  # noqa: E402
+from blind.rates import interval, print_matrix, print_rates  # noqa: E402
+from blind.run import judged, rows_in, run  # noqa: E402
+from blind.sizes import SIZES, drawn  # noqa: E402
+
+KINDS = {effect: topology for topology in "BAC" for effect in SIZES[topology]}  # each once, in the quickest plant
+
+
+@pytest.mark.parametrize("effect", KINDS)
+def test_the_generator_and_the_package_mean_the_same(effect):
+    """Largest size, no noise, a short record: another integrator, the same readings to a hundredth of the effect."""
+    rng, topology = np.random.default_rng(7), KINDS[effect]
+    n = 120 if topology == "C" else 40
+    plant = replace(PLANTS[topology](), disturbance={})
+    _, where, values = drawn(topology, effect, 1, rng)
+    size = next(iter(values))
+    values[size] = SIZES[topology][effect][3]
+    if effect == "conductance_step":
+        values["time"] = 60.0
+    if effect == "input_delay":
+        values[size] = 4.0
+    true, hidden = with_effects(plant, [(effect, where, values)])
+    U = excitation(plant, n, rng)
+    T0 = 295.0 + 8.0 * np.arange(len(true.capacity)) / len(true.capacity)
+    changed = _readings(true, plant, hidden, U, T0)
+    plain = _readings(plant, plant, Hidden(), U, T0[:len(plant.capacity)])
+    system = nominal(plant, dict.fromkeys(plant.sensors, 0.01), {})
+    candidate = rt.diagnosis.Candidate(rt.diagnosis.effects()[effect], where, values)
+    added = candidate.add(system, values[size])
+    record = rt.Record(sample_time=H, inputs=U, outputs=np.zeros((n, 0)), input_names=plant.columns,
+                       output_names=[])
+    theirs = rt.thermal.simulate(added, record, initial=dict(zip(added.lumps, T0, strict=True))).outputs
+    scale = np.abs(changed - plain).max()
+    assert scale > 1e-4
+    assert np.abs(theirs - changed).max() < 0.01 * scale
+
+
+def _readings(true, plant, hidden, U, T0):
+    T, m = integrate(true, U[None], np.zeros(1), T0[None], hidden, np.random.default_rng(0))
+    names = list(true.capacity)
+    Y = T[..., [names.index(lump) for lump in plant.sensors.values()]]
+    for reading in hidden.readings:
+        Y = reading(Y, m)
+    return Y[0]
+
+
+@pytest.mark.parametrize("case", [Case("A", "hidden", "sensor_gain", 5), Case("B", "nothing", "nothing", 0),
+                                  Case("C", "nothing", "nothing", 0)], ids=lambda case: case.topology)
+def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
+    """Short records and a short catalogue: the suite's own take minutes."""
+    monkeypatch.setattr(rt, "diagnose", partial(rt.diagnose, effects=["sensor_gain", "sensor_lag", "heat_source"]))
+    monkeypatch.setattr("blind.cases.N_TRAIN", 150)
+    monkeypatch.setattr("blind.cases.N_UNSEEN", 100)
+    row = judged(case, "test", compare=True)
+    assert row["verdict"] != "crashed", row
+    assert answer(row) in ("unique", "in the set", "not detected", "unexplained"), row
+    print_rates([row])
+    print_matrix([row])
+    assert "CPU seconds" in capsys.readouterr().out
+
+
+def test_the_workflow_gets_no_answer():
+    given, truth = made(Case("C", "hidden", "sensor_lag", 3))
+    assert not any(sensor.time_constant for sensor in given.system.sensors.values())
+    assert truth.effects[0][0] == "sensor_lag"
+    again, _ = made(Case("C", "hidden", "sensor_lag", 3))
+    assert np.array_equal(given.train.outputs, again.train.outputs)
+
+
+def _row(names, others, truth, verdict="named", topology="C"):
+    return {"topology": topology, "verdict": verdict, "names": names, "others": others,
+            "truth": [[name, where, {"size": 1.0}] for name, where in truth]}
+
+
+LAG, GAIN, MASS = ["sensor_lag", ["Tl"]], ["sensor_gain", ["Tr"]], ["hidden_mass", ["left"]]
+
+
+@pytest.mark.parametrize(("row", "expected"), [
+    (_row([LAG], [[]], [LAG]), "unique"),
+    (_row([GAIN], [[]], [LAG]), "WRONG"),
+    (_row([LAG, GAIN], [[], []], [LAG]), "WRONG"),
+    (_row([GAIN], [[LAG]], [LAG], "ambiguous"), "in the set"),
+    (_row([GAIN], [[MASS]], [LAG], "ambiguous"), "set without"),
+    (_row([LAG], [[]], [LAG, GAIN]), "one of two"),
+    (_row([LAG, GAIN], [[], []], [GAIN, LAG]), "unique"),
+    (_row([LAG], [[]], []), "WRONG"),
+    (_row([LAG], [[GAIN]], [], "ambiguous"), "set without"),
+    (_row([], [], [LAG], "consistent"), "not detected"),
+    (_row([], [], [], "unexplained"), "unexplained"),
+    (_row([["ambient_gradient", ["frame"]]], [[["heat_source", ["frame"]]]], [["heat_source", ["frame"]]]), "unique"),
+    (_row([["ambient_gradient", ["frame"]]], [[["heat_source", ["left"]]]], [["heat_source", ["left"]]]), "in the set"),
+])
+def test_answers_are_judged(row, expected):
+    assert answer(row) == expected
+    assert wrong(row) == (expected == "WRONG")
+    assert not (all_named(row) and expected != "unique" and row["truth"])
+    assert has_truth(row) or expected not in ("unique", "in the set")
+    assert stray(row) == (expected in ("WRONG", "set without"))
+
+
+def test_order_of_two_lumps_does_not_matter():
+    assert same(["missing_link", ["a", "b"]], ["missing_link", ["b", "a"]])
+    assert not same(["missing_link", ["a", "b"]], ["missing_link", ["a", "c"]])
+
+
+def test_interval_is_clopper_and_pearsons():
+    assert interval(0, 100)[1] == pytest.approx(1 - 0.025 ** (1 / 100))
+    assert interval(100, 100) == (pytest.approx(0.025 ** (1 / 100)), 1.0)
+
+
+def test_a_second_run_skips_what_is_done_and_survives_a_cut_line(tmp_path, monkeypatch):
+    out, case = tmp_path / "rows.jsonl", Case("C", "nothing", "nothing", 0)
+    monkeypatch.setattr("blind.run.judged", lambda case, version, compare: {"key": case.key, "version": version})
+    first = run([case], out, 1, 1)
+    out.write_text(out.read_text() + '{"key": "C/no')
+    assert run([case], out, 1, 1) == first == rows_in(out)

@@ -1,0 +1,156 @@
+"""The recommended experiment: its promise against refits, and ambiguous records that it makes unique."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis._next_experiment import rivals
+from robthermal.diagnosis._trial_inputs import limits_of
+
+Array = np.ndarray
+H, ROOM = 5.0, 298.15
+
+
+@pytest.fixture(scope="module")
+def bench() -> rt.System:
+    """A heated block on a plate, the block well insulated."""
+    return rt.System(
+        ambients={"room": {"temperature": ROOM}}, lumps={"plate": {"capacity": 120.0}, "block": {"capacity": 40.0}},
+        links=[{"between": ("plate", "room"), "conductance": 0.6}, {"between": ("plate", "block"), "conductance": 1.5}],
+        inputs={"heater": {"lump": "block", "limits": (0.0, 12.0)}},
+        sensors={"Tp": {"lump": "plate", "noise": 0.01}, "Tb": {"lump": "block", "noise": 0.01}},
+        fit={name: {"lower": value / 4, "upper": value * 4, "sigma": 0.1 * value} for name, value in {
+            "lumps.plate.capacity": 120.0, "lumps.block.capacity": 40.0, "links.plate-room.conductance": 0.6,
+            "links.plate-block.conductance": 1.5}.items()})
+
+
+def truth(heat: Callable[[Array, float], tuple[float, float]] = lambda T, q: (0.0, q), delay: float = 0.0
+          ) -> Callable[[Array], Array]:
+    """The bench with other numbers, Runge-Kutta in steps of 0.25 s; `heat` goes into plate and block."""
+    def rate(T: Array, q: float) -> Array:
+        plate, block = heat(T, q)
+        across = 1.45 * (T[1] - T[0])
+        return np.array([(across - 0.62 * (T[0] - ROOM) + plate) / 123.0, (block - across) / 39.0])
+
+    def run(heater: Array) -> Array:
+        T, out, dt = np.full(2, ROOM), np.empty((heater.size, 2)), H / 20
+        for k in range(heater.size):
+            out[k] = T
+            for s in range(20):
+                late = int(np.floor(k + (s + 0.5) / 20 - delay / H))
+                q = float(heater[max(late, 0)])
+                a = rate(T, q)
+                b = rate(T + dt / 2 * a, q)
+                c = rate(T + dt / 2 * b, q)
+                T = T + dt / 6 * (a + 2 * b + 2 * c + rate(T + dt * c, q))
+        return out
+
+    return run
+
+
+def measured(run: Callable[[Array], Array], heater: Array, seed: int) -> rt.Record:
+    y = run(heater) + 0.01 * np.random.default_rng(1000 + seed).standard_normal((heater.size, 2))
+    return rt.Record(sample_time=H, inputs=np.column_stack([heater, np.full(heater.size, ROOM)]), outputs=y,
+                     input_names=["heater", "room"], output_names=["Tp", "Tb"])
+
+
+def timid(seed: int, n: int = 300) -> Array:
+    """Two levels, held long: an experiment that shows little."""
+    return np.repeat(np.random.default_rng(seed).choice([2.0, 5.0], n // 50), 50)
+
+
+def convection(T: Array, q: float) -> tuple[float, float]:
+    d = ROOM - T[0]
+    return 0.0105 * abs(d) ** 0.25 * d, q
+
+
+def radiation(T: Array, q: float) -> tuple[float, float]:
+    return 0.0, q + 1.1e-10 * (ROOM**4 - T[1] ** 4)
+
+
+def allowed(found: rt.diagnosis.Diagnosis) -> set[str]:
+    others = {f"{effect}({', '.join(where)})" for group in found.alternatives for effect, where in group}
+    return {effect.label for effect in found.effects} | others
+
+
+CASES = {
+    "delay or lag": (truth(delay=2.0), 101, "input_delay(heater)", {"input_lag(heater)"}),
+    "convection or a constant": (truth(convection), 106, "natural_convection(plate, room)", {"heat_source(plate)"}),
+    "radiation or a link": (truth(radiation), 105, "radiation(block, room)", {"missing_ambient_link(block, room)"}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_recommended_experiment_makes_the_name_unique(bench: rt.System, case: str) -> None:
+    run, seed, name, confused = CASES[case]
+    first = measured(run, timid(seed), seed)
+    found = rt.diagnose(bench, first)
+    assert found.verdict == "ambiguous" and {name} | confused <= allowed(found)
+    plan = found.next_experiment
+    assert plan is not None and plan.expected > 10.0 * max(plan.present, 1.0)
+    heater = plan.record["heater"]
+    assert heater.min() >= 0.0 and heater.max() <= 12.0
+    again = rt.diagnose(bench, [first, measured(run, heater, 500 + seed)])
+    assert again.verdict == "named"
+    assert [effect.label for effect in again.effects] == [name]
+
+
+def test_promise_is_the_gain_that_refits_find(bench: rt.System) -> None:
+    # λ is the noise-free gain of ΔBIC: mean over noises of what refitting both candidates to both records gives.
+    run = truth(delay=2.0)
+    first = measured(run, timid(101), 101)
+    fit = rt.diagnosis.refit(bench, first)
+    names = ["input_delay", "input_lag"]
+    entries = rt.diagnosis.decide(rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit, names)))
+    plan = rt.diagnosis.next_experiment(rivals(entries), trials=2)
+    gains = []
+    for seed in range(3):
+        both = rt.diagnosis.refit(bench, [first, measured(run, plan.record["heater"], seed)])
+        short = rt.diagnosis.refit_short_list(both, rt.diagnosis.score(both, names))
+        bic = {entry.candidate.effect.name: entry.delta_bic for entry in short.entries}
+        gains.append(bic["input_delay"] - bic["input_lag"])
+    assert np.mean(gains) == pytest.approx(plan.expected, rel=0.5)
+
+
+def test_exact_aliases_need_another_measurement(bench: rt.System) -> None:
+    run = truth(lambda T, q: (0.3, q))
+    found = rt.diagnose(bench, measured(run, np.repeat([2.0, 8.0, 0.0, 11.0, 4.0, 7.0], 50), 3))
+    assert found.verdict == "ambiguous"
+    plan = found.next_experiment
+    assert plan is not None
+    pairs = {frozenset(pair) for pair in plan.inseparable}
+    assert frozenset({"heat_source(plate)", "ambient_gradient(plate)"}) in pairs
+    assert "No input within the limits tells" in plan.advice
+    assert "a second ambient sensor beside plate" in plan.advice and "Tp with another excitation" in plan.advice
+    assert found.to_dict()["next_experiment"]["advice"] == plan.advice
+
+
+@pytest.fixture(scope="module")
+def convective(bench: rt.System) -> tuple[rt.diagnosis.Entry, ...]:
+    fit = rt.diagnosis.refit(bench, measured(truth(convection), timid(106), 106))
+    short = rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit, ["natural_convection", "heat_source"]), length=2)
+    return short.entries
+
+
+def test_temperature_limits_are_kept(bench: rt.System, convective: tuple[rt.diagnosis.Entry, ...]) -> None:
+    free = rt.diagnosis.next_experiment(convective, trials=3)
+    kept = rt.diagnosis.next_experiment(convective, trials=3, temperature=(290.0, 312.0))
+    assert max(free.record["Tp"].max(), free.record["Tb"].max()) > 312.0  # otherwise the test could not fail
+    assert 0.0 < kept.expected < free.expected
+    assert max(kept.record["Tp"].max(), kept.record["Tb"].max()) <= 312.0
+
+
+def test_inputs_without_limits_stay_within_the_record(bench: rt.System) -> None:
+    record = measured(truth(), timid(1), 1)
+    unlimited = bench.model_copy(update={"inputs": {"heater": rt.thermal.Input(lump="block")}})
+    assert limits_of(unlimited, record) == {"heater": (2.0, 5.0)}
+    assert limits_of(bench, record) == {"heater": (0.0, 12.0)}
+
+
+def test_one_candidate_is_refused(convective: tuple[rt.diagnosis.Entry, ...]) -> None:
+    with pytest.raises(rt.InputError, match="two or more to tell apart"):
+        rt.diagnosis.next_experiment(convective[:1])

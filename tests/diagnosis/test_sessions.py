@@ -1,0 +1,145 @@
+"""Several days with a gain of their own; records from a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+import robthermal as rt
+
+Array = NDArray[np.float64]
+FEW = ["natural_convection", "sensor_gain", "hidden_mass", "input_gain"]
+H = 5.0
+
+
+@pytest.fixture(scope="module")
+def day(inputs_of: Callable, integrated: Callable, recorded: Callable, rate: Callable) -> Callable[..., rt.Record]:
+    """A day on which the heater gives `gain` times what the record says."""
+
+    def measure(seed: int, gain: float, convection: float = 0.0, n: int = 200) -> rt.Record:
+        def law(t: float, T: Array, u: Array) -> Array:
+            dT = u[1] - T[0]
+            return rate(T, u, np.array([convection * abs(dT) ** 0.25 * dT, 0.0]))
+
+        u = inputs_of(n, seed)
+        T = integrated(law, np.full(2, 298.15), u * np.array([gain, 1.0]))
+        return recorded(T, u, ["heater", "room"], ["Tp", "Tb"], seed)
+
+    return measure
+
+
+def days(day: Callable[..., rt.Record], convection: float = 0.0) -> list[rt.Record]:
+    return [day(seed, gain, convection) for seed, gain in ((1, 0.95), (2, 1.0), (3, 1.06))]
+
+
+def test_days_with_gains_are_consistent_only_if_they_may_have_them(plant: rt.System, day: Callable) -> None:
+    records = days(day)
+    without = rt.diagnose(plant, records, effects=FEW)
+    assert without.verdict != "consistent"
+    found = rt.diagnose(plant, records, validation=day(4, 1.03), effects=FEW, session_gain=True)
+    assert found.verdict == "consistent"
+    assert found.not_testable["input_gain", ("heater",)] == "every session has a gain of its own for this input"
+    gains = 1.0 + 0.05 * np.concatenate(found.nominal.structure.gains(found.nominal.v))
+    assert np.allclose(gains / gains[1], [0.95, 1.0, 1.06], rtol=2e-3)
+    assert found.gap["validation"].after == pytest.approx(0.01, rel=0.15)  # the unseen day's own gain is estimated
+    assert "session" in str(found.nominal)
+
+
+def test_hidden_convection_is_named_beside_the_days_gains(plant: rt.System, day: Callable) -> None:
+    found = rt.diagnose(plant, days(day, 0.08), effects=FEW, session_gain={"heater": 0.08})
+    assert found.verdict == "named"
+    assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
+    gain, std, _ = found.effects[0].values["gain"]
+    assert abs(gain - 0.08) < 4 * std
+
+
+def test_derivatives_by_session_gains_are_those_of_the_simulation(plant: rt.System, day: Callable) -> None:
+    fit = rt.diagnosis.refit(plant, days(day)[:2], session_gain=True)
+    structure, step = fit.structure, 1e-3
+    v = fit.v
+    for k, own in ((v.size - 2, 0), (v.size - 1, 1)):
+        moved = v.copy()
+        moved[k] += step
+        before, after = structure.runs(v), structure.runs(moved)
+        change = -(after[own].residual - before[own].residual) / step
+        assert np.allclose(before[own].slopes[..., k], change, rtol=1e-2, atol=1e-3 * np.abs(change).max())
+        assert not before[1 - own].slopes[..., k].any()
+
+
+@pytest.mark.parametrize("wrong", ["yes", {"fan": 0.05}, {"heater": -0.1}, {"heater": True}])
+def test_bad_session_gain_is_refused(plant: rt.System, day: Callable, wrong: object) -> None:
+    with pytest.raises(rt.InputError, match="session_gain|gain of 'heater'|no input 'fan'"):
+        rt.diagnose(plant, day(1, 1.0, n=100), session_gain=wrong)
+
+
+def closed_loop(seed: int, mass: float = 0.0, n: int = 150) -> rt.Record:
+    """A PI controller holds the block on set-points; random heat acts on both lumps. Exact discretisation by Van Loan.
+
+    A hidden mass [J/K] sits behind the plate with a time constant of 60 s.
+    """
+    rng = np.random.default_rng(seed)
+    C = np.array([123.0, 39.0, max(mass, 1e-3)])
+    behind = mass / 60.0
+    A = np.array([[-1.45 - 0.62 - behind, 1.45, behind], [1.45, -1.45 - 0.105, 0.0],
+                  [behind, 0.0, -behind]]) / C[:, None]
+    B = np.array([[0.0, 0.62], [1.0, 0.105], [0.0, 0.0]]) / C[:, None]
+    q = np.diag((0.3 / C) ** 2 * np.array([1.0, 1.0, 0.0]))
+    F = expm(np.block([[-A, q], [np.zeros((3, 3)), A.T]]) * H)
+    Ad, Q = F[3:, 3:].T, F[3:, 3:].T @ F[:3, 3:]
+    Bd = expm(np.block([[A, B], [np.zeros((2, 5))]]) * H)[:3, 3:]
+    root = np.linalg.cholesky(Q + 1e-18 * np.eye(3))
+    room = 298.15 + np.repeat(rng.normal(0.0, 2.0, n // 20 + 1), 20)[:n]
+    setpoint = np.repeat(rng.uniform(300.0, 312.0, n // 30 + 1), 30)[:n]
+    x, integral = np.full(3, 298.15), 0.0
+    U, Y = np.zeros((n, 2)), np.zeros((n, 2))
+    for k in range(n):
+        Y[k] = x[:2] + 0.01 * rng.standard_normal(2)
+        error = setpoint[k] - Y[k, 1]
+        integral += 0.004 * H * error
+        U[k] = np.clip(1.2 * error + integral, 0.0, 30.0), room[k]
+        x = Ad @ x + Bd @ U[k] + root @ rng.standard_normal(3)
+    return rt.Record(sample_time=H, inputs=U, outputs=Y, input_names=["heater", "room"], output_names=["Tp", "Tb"])
+
+
+@pytest.fixture(scope="module")
+def shaken(plant: rt.System) -> rt.System:
+    return plant.with_parameters({"lumps.plate.disturbance": 0.3, "lumps.block.disturbance": 0.3})
+
+
+@pytest.mark.parametrize("first", [0, 5, 10, 15])
+def test_feedback_makes_no_names(shaken: rt.System, first: int) -> None:
+    # The stated rate of false names is 1 %: of 20 loops with nothing hidden none is expected.
+    for seed in range(first, first + 5):
+        found = rt.diagnose(shaken, closed_loop(seed, n=100), effects=["sensor_lag", "missing_ambient_link"])
+        assert found.verdict == "consistent", seed
+
+
+def test_scores_under_feedback_follow_their_distribution(shaken: rt.System) -> None:
+    # Where the sensitivities depend on past noise, the score at the true parameters is a martingale: mean 0, and T of
+    # mean 1 over many loops.
+    true = shaken.with_parameters({"lumps.plate.capacity": 123.0, "lumps.block.capacity": 39.0,
+                                   "links.plate-room.conductance": 0.62, "links.plate-block.conductance": 1.45,
+                                   "links.block-room.conductance": 0.105})
+    names = ["sensor_lag", "sensor_gain", "hidden_mass"]
+    T, means = [], []
+    for seed in range(40, 80):
+        fit = rt.diagnosis.refit(true, closed_loop(seed, n=120), parameters={"lumps.block.capacity": (20.0, 80.0)})
+        scores = rt.diagnosis.score(fit, names)
+        T.append(scores.statistic)
+        means.append(scores.size / scores.std)
+    assert np.mean(np.min(T, axis=1) < 0.5) > 0.3  # otherwise nothing was tested
+    assert abs(np.mean(means)) < 0.35
+    assert np.mean(T) < 2.2  # the best of a few trial values each
+
+
+def test_hidden_mass_is_named_under_feedback(shaken: rt.System) -> None:
+    found = rt.diagnose(shaken, closed_loop(1, mass=25.0, n=300), effects=["hidden_mass", "sensor_lag", "input_gain",
+                                                                           "missing_ambient_link"])
+    assert found.verdict == "named"
+    assert [effect.label for effect in found.effects] == ["hidden_mass(plate)"]
+    capacity, std, _ = found.effects[0].values["capacity"]
+    assert abs(capacity - 25.0) < 4 * std

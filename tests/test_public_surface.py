@@ -1,0 +1,125 @@
+"""Every public name, listed: none appears or goes without this list, the changelog and the docs saying so."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+import robthermal as rt
+
+SURFACE = {
+    "robthermal": """
+        Certificate Diverged FleetRun InputError Outcome Record System Verdict __version__ calibrate calibration
+        certify coupling design diagnose diagnosis errors fleet identify project read_record read_system report
+        signals systems thermal verification verify
+    """,
+    "calibration": """
+        ConvectionLaw Estimates Fit ModuleProperties ResponseFit Score VaryingModel Whiteness calibrate
+        convection_law join_models module_properties
+    """,
+    "certify": """
+        CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds contraction frequency_norm
+        frequency_radius gains heater_heat hinf invariance largest_current largest_regulated_current limit_map
+        loop network observer peak regulated runaway runaway_free stability thesis_bounds
+    """,
+    "coupling": """
+        CoprimeFactors Destabilising Filters FixedPoint Joint MuBound NormalizedFactors Performance ScaledPath
+        Simulation Spectra Uncertainty WorstCase coprime destabilising discretize dual_youla evaluate
+        inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
+    """,
+    "design": """
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain DisturbanceObserver Estimate
+        ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
+        MatrixController ObserverModel PID Placement Polarity Reach Reachable Seen StateFeedback certify_loop
+        check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
+        feedback_linearization linear_controller load_controller loop_poles observer pid place_sensors reachable
+        simulate_loop state_feedback unobservable
+    """,
+    "diagnosis": """
+        Adequacy Along Candidate Decision Diagnosis Effect EffectSet Entry Found Gap HoldOut JointCheck
+        JointSelection Levels Location NextExperiment NoiseFloor Quantity Refit Response Scores ShortList
+        UnknownHeat adequacy candidates decide diagnose effects forget_effect hold_out locate next_experiment
+        noise_floor refit refit_short_list register_effect score select_jointly unknown_heat
+    """,
+    "errors": """
+        Diverged InputError Outcome RobthermalError
+    """,
+    "identify": """
+        FrequencyResponse bla closed_loop etfe lpm lrm lrmp spectral
+    """,
+    "project": """
+        Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
+        Explanation FileCheck JobResult MapRequest Project Residuals boxes_from_text certificate_files
+        certify_system check_free couple_subsystems demo_project design_excitation design_from_text
+        design_system diagnose_records estimate_response explain explainable map_from_text map_system
+        new_project output_folder read_coupling read_project rebuild_report run_job verify_files write_certify
+        write_checks write_coupling write_design write_diagnosis write_excitation write_job write_map
+    """,
+    "report": """
+        Claim Evidence Figure Printed Report Section Table box_ranges current_limits file_hash house_style
+        load_curve measured_against_model read_content residuals_before_after versions write_content write_html
+        write_json write_junit
+    """,
+    "signals": """
+        DesignCheck Excitation Record celsius_to_kelvin crest_factor design_check find_glitches
+        kelvin_to_celsius median_filter multisine multisines noise prbs read_record staircase
+    """,
+    "systems": """
+        Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module
+    """,
+    "thermal": """
+        AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
+        Feedthrough FitRange Hysteresis Input Layer Lead Linear Link LoadCurve Lump Material MatrixImport Module
+        ModuleParameters Natural Periodic PolynomialFit Polynomials Reduction Sensor SteadyState Step Stepper
+        System Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error
+        linearize load_curve materials module_from_datasheet module_from_polynomials parse_system read_matrices
+        read_system reduce simulate steady_state system_from_matrices time_constants trajectory write_modelica
+        write_system
+    """,
+    "verification": """
+        Certificate Verdict claim_sentence establish not_certified verify
+    """,
+}
+
+
+@pytest.mark.parametrize("room", SURFACE)
+def test_public_names_are_the_listed_ones(room: str) -> None:
+    found, listed = set(public_names(room)), set(SURFACE[room].split())
+    gone, new = sorted(listed - found), sorted(found - listed)
+    assert not gone, f"{room}: a public name went. A script may use it: keep it, or say so in the changelog: {gone}"
+    assert not new, f"{room}: list the new public names here, and in the changelog: {new}"
+
+
+def test_every_room_is_listed() -> None:
+    assert set(SURFACE) == {"robthermal", *rt._ROOMS}
+
+
+def public_names(room: str) -> list[str]:
+    """What a room exports."""
+    module = rt if room == "robthermal" else import_module(f"robthermal.{room}")
+    if room == "errors":  # one file, no export list: everything it defines
+        return [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
+    return list(module.__all__)
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    """What makes `import robthermal` slow must wait for the room that needs it, down to single submodules."""
+    heavy = ("scipy", "matplotlib", "cvxpy", "clarabel", "pandas", "control", "joblib", "flint", "pydantic", "numpy")
+    code = "import sys, robthermal, robthermal as rt; rt.InputError, dir(rt); print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "robthermal.errors" in loaded
+    assert [name for name in loaded if name.split(".")[0] in heavy] == []
+
+
+@pytest.mark.parametrize(("room", "unused"), [
+    ("errors", ("numpy", "scipy", "pandas")), ("verification", ("scipy", "pandas", "control", "cvxpy", "matplotlib")),
+    ("signals", ("cvxpy", "control", "matplotlib")), ("thermal", ("cvxpy", "clarabel")),
+    ("identify", ("cvxpy", "clarabel"))])
+def test_rooms_load_no_more_than_they_need(room: str, unused: tuple[str, ...]) -> None:
+    code = f"import sys, robthermal.{room}; print(*sys.modules)"
+    loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True
+                                ).stdout.split())
+    assert not loaded & set(unused)
