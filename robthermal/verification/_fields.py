@@ -115,9 +115,10 @@ def no_other(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
             raise InputError(f"unknown key {name_of(name)}", where=where, expected=f"{list(keys)}")
 
 
-def only_notes(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    """Refuse unknown keys but for text and null: a number or table may be physics that no claim takes into account."""
-    for key, value in table.items():
-        if key not in known and (key in _EFFECTS or not (value is None or isinstance(value, str))):
-            raise InputError(f"unknown key {name_of(key)}: nothing that this claim takes into account", where=where,
-                             expected=f"{list(known)}, and notes as text", remedy="Certify the system without it.")
+def no_effects(table: Mapping[str, Any], where: str) -> None:
+    """Refuse effects of a system file that no claim takes into account: other unknown keys are free, these are physics.
+    """
+    for key in table:
+        if key in _EFFECTS:
+            raise InputError(f"{key!r} is an effect that no claim takes into account", where=where,
+                             remedy="Certify the system without it.")

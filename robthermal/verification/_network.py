@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from robthermal.errors import InputError
 
-from ._fields import get, mapping, margin_of, not_negative, only_notes, text
+from ._fields import get, mapping, margin_of, not_negative, text
 from ._kind import Kind, Proof
 from ._norm import say_rate
 from ._numbers import as_float, exact, name_of, round_down, show
@@ -57,9 +57,7 @@ class Network:
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     """Return the problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
-    only_notes(table, ("capacity", "rows", "cols", "values"), "system")
-    only_notes(mapping(region, "region"), ("uncertainty",), "region")
-    uncertainty = not_negative(region.get("uncertainty", 0), "region.uncertainty")
+    uncertainty = not_negative(mapping(region, "region").get("uncertainty", 0), "region.uncertainty")
     capacity = _numbers(get(table, "capacity", "system"), "system.capacity")
     n = len(capacity.nearest)
     if n == 0 or not bool(np.all(capacity.nearest > 0)):

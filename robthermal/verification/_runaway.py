@@ -15,7 +15,7 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx
 from robthermal.errors import InputError
 
 from ._box_sign import Terms, positive_on
-from ._fields import Interval, get, interval, mapping, no_other, only_notes, positive, text
+from ._fields import Interval, get, interval, mapping, no_other, positive, text
 from ._kind import Kind, Proof
 from ._numbers import as_float, name_of, show
 from ._system import say_interval
@@ -42,10 +42,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Runaway:
     """Return the exact problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
     no_other(mapping(margin, "margin"), [], "margin")
-    only_notes(table, list(_CONSTANTS), "system")
-    only_notes(mapping(region, "region"), ("parameters",), "region")
     constants = {key: positive(get(table, key, "system"), f"system.{key}") for key in _CONSTANTS}
-    parameters = read_parameters(region)
+    parameters = read_parameters(mapping(region, "region"))
     given = dict(parameters)
     no_other(given, list(_CONSTANTS), "region.parameters")
     for key, (low, _) in parameters:

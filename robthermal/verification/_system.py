@@ -16,8 +16,8 @@ from ._fields import (
     intervals,
     kelvin_interval,
     mapping,
+    no_effects,
     not_negative,
-    only_notes,
     positive,
     sequence,
     text,
@@ -27,8 +27,6 @@ from ._numbers import exact, name_of, show
 Quadratic = tuple[fmpq, fmpq, fmpq]  # a + b I + c I²
 _EXPONENT_LIMIT = 10
 _PROPERTIES = ("seebeck", "resistance", "conductance")
-_TABLES = ("lumps", "ambients", "links", "modules", "inputs", "sensors", "fit", "gain", "controller")
-_BOX = ("temperature", "current", "parameters", "ambient", "heat", "setpoint", "sample_time", "plant", "drift")
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,6 @@ def read_system(value: Any) -> ThermalSystem:
 def read_region(value: Any, system: ThermalSystem) -> Region:
     """Return the exact box of a certificate."""
     table = mapping(value, "region")
-    only_notes(table, _BOX, "region")
     temperature = get(table, "temperature", "region")
     names = [module.name for module in system.modules]
     current = intervals(get(table, "current", "region"), names, "region.current")
@@ -175,7 +172,7 @@ def _temperatures(value: Any, lumps: tuple[str, ...]) -> tuple[Interval, ...]:
 
 def _capacity(value: Any, where: str) -> fmpq:
     table = mapping(value, where)
-    only_notes(table, ("capacity", "initial", "disturbance"), where)
+    no_effects(table, where)
     return positive(get(table, "capacity", where), f"{where}.capacity")
 
 
@@ -193,7 +190,7 @@ def _ambients(value: Any, lumps: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     table = mapping(value, where)
-    only_notes(table, ("name", "between", "conductance", "natural", "radiation"), where)
+    no_effects(table, where)
     ends = sequence(get(table, "between", where), f"{where}.between")
     if len(ends) != 2:
         raise InputError(f"{len(ends)} names", where=f"{where}.between", expected="two")
@@ -203,7 +200,6 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     gain = exponent = radiation = fmpq(0)
     if "natural" in table:
         natural = mapping(table["natural"], f"{where}.natural")
-        only_notes(natural, ("gain", "exponent"), f"{where}.natural")
         gain = not_negative(get(natural, "gain", f"{where}.natural"), f"{where}.natural.gain")
         exponent = not_negative(get(natural, "exponent", f"{where}.natural"), f"{where}.natural.exponent")
         if exponent > _EXPONENT_LIMIT:
@@ -216,17 +212,17 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
 
 
 def _only_known(table: Mapping[str, Any]) -> None:
-    """Refuse what may be physics of another machine: unknown tables, heaters that are not just heat, Celsius."""
-    only_notes(table, _TABLES, "system")
+    """Refuse physics that no claim knows: heaters that are not just heat, sensors that heat; and Celsius."""
+    no_effects(table, "system")
     if table.get("temperature_unit", "K") != "K":
         raise InputError(f"temperature_unit {name_of(table['temperature_unit'])}", where="system", expected="'K'")
     for name, heater in mapping(table.get("inputs", {}), "system.inputs").items():
         place = f"system.inputs[{name_of(name)}]"
-        only_notes(mapping(heater, place), ("gain", "limits"), place)
+        no_effects(mapping(heater, place), place)
     sensors = table.get("sensors", ())
     for sensor in sensors.values() if isinstance(sensors, Mapping) else sequence(sensors, "system.sensors"):
         if isinstance(sensor, Mapping):  # what a sensor reads matters to an observer only, which looks closer
-            only_notes(sensor, ("noise", "time_constant", "offset", "gain", "delay"), "system.sensors")
+            no_effects(sensor, "system.sensors")
 
 
 def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
@@ -239,7 +235,7 @@ def _node(value: Any, nodes: Mapping[str, int | str], where: str) -> int | str:
 def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
     where = f"system.modules[{name_of(name)}]"
     table = mapping(value, where)
-    only_notes(table, ("hot", "cold", *_PROPERTIES, "reference_temperature", "current_limits"), where)
+    no_effects(table, where)
     faces = []
     for face in ("hot", "cold"):
         node = _node(get(table, face, where), nodes, f"{where}.{face}")
@@ -256,5 +252,4 @@ def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
 def _affine(table: Mapping[str, Any], key: str, where: str) -> tuple[fmpq, fmpq]:
     place = f"{where}.{key}"
     item = mapping(get(table, key, where), place)
-    only_notes(item, ("value", "slope"), place)
     return exact(get(item, "value", place), f"{place}.value"), exact(get(item, "slope", place), f"{place}.slope")

@@ -360,5 +360,5 @@ SUBJECTS = (Subject("contraction", make_contraction, break_contraction),
             Subject("network", make_network, break_network),
             Subject("observer", make_observer, break_observer, 0.6),
             Subject("gain", make_gain, break_gain),
-            Subject("regulated", make_regulated, break_regulated),
-            Subject("loop", make_loop, break_loop, 0.1, tolerance=1e-6))
+            Subject("regulated", make_regulated, break_regulated, 0.4, edges=(9,)),
+            Subject("loop", make_loop, break_loop, 0.1, tolerance=1e-6, edges=(9,)))

@@ -22,7 +22,6 @@ Document = dict[str, Any]
 SECTIONS = ("system", "region", "evidence")
 FALSE, CLAIM = "ACCEPTED THOUGH FALSE", "ACCEPTED WITH A WRONG SENTENCE"
 ALARMS = (FALSE, CLAIM)
-PUSHED = (4, 9)  # which of ten mutants are bisected to the edge of what the checker accepts
 
 
 @dataclass(frozen=True)
@@ -34,6 +33,7 @@ class Subject:
     violation: Callable[[Document, np.random.Generator], float]
     share: float = 1.0  # of the mutants of the run
     tolerance: float = 1e-9  # rounding of the falsifier
+    edges: tuple[int, ...] = (4, 9)  # which of ten mutants are bisected to the edge of what the checker accepts
 
 
 def holds(kind: str, document: Document) -> bool:
@@ -42,8 +42,9 @@ def holds(kind: str, document: Document) -> bool:
 
 
 def run(subject: Subject, rng: np.random.Generator, count: int, per_document: int = 10,
-        edges: tuple[int, ...] = PUSHED) -> Counter[str]:
-    """Judge ``count`` mutants of one kind; ``edges``: which of those of one document are pushed to the edge."""
+        edges: tuple[int, ...] | None = None) -> Counter[str]:
+    """Judge ``count`` mutants of one kind; ``edges``: which of those of one document are pushed, else the subject's."""
+    edges = subject.edges if edges is None else edges
     table: Counter[str] = Counter()
     for k in range(count):
         if k % per_document == 0:

@@ -21,7 +21,7 @@ def test_every_kind_has_a_falsifier():
 def test_no_mutant_is_accepted_though_false(kind):
     count = 6 if kind == "loop" else 30
     slow = kind in ("loop", "observer", "regulated")  # seconds to push one of them to the edge
-    table = run(SUBJECTS[kind], np.random.default_rng(3), count, per_document=15, edges=() if slow else (4, 9))
+    table = run(SUBJECTS[kind], np.random.default_rng(3), count, per_document=15, edges=() if slow else None)
     assert not any(table[alarm] for alarm in ALARMS), table
     assert table["accepted, no sample violates it"] >= 1, table
     assert kind == "loop" or sum(number for what, number in table.items() if "accepted" not in what) > 3, table
