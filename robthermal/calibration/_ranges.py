@@ -195,8 +195,8 @@ def _check(system: System, name: str, limits: FitRange) -> None:
     if name.endswith(".time_constant") and value == 0:
         raise InputError(f"{name!r} starts at 0, where the lag does not exist and has no derivative",
                          where="argument parameters",
-                         remedy=f'Start it at what you expect, system.with_parameters({{"{name}": 5.0}}) or in the file; '
-                                "or leave it out of the fit table: rt.diagnose tests for a lag that starts at 0.")
+                         remedy=f'Start it at what you expect, in the file or by system.with_parameters({{"{name}": '
+                                '5.0}); or leave it out of the fit table: rt.diagnose tests for a lag from 0.')
     inside = 1e-9 * (limits.upper - limits.lower)
     for bound in (limits.lower + inside, limits.upper - inside):
         try:

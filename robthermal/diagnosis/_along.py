@@ -137,7 +137,8 @@ class Along:
         n, nl = self.x.shape
         nz = nl + len(self.lags)
         M = np.zeros((n, nz, nz))
-        M[:, :nl, :nl] = _heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u) / self.equations.capacity[:, None]
+        slopes = _heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u)
+        M[:, :nl, :nl] = slopes / self.equations.capacity[:, None]
         for row, name in enumerate(self.lags, start=nl):
             sensor = self.system.sensors[name]
             M[:, row, row] = -1.0 / sensor.time_constant

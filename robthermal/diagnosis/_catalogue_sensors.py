@@ -36,8 +36,8 @@ def _leaks(system: System) -> list[Where]:
 
 def _unclipped(system: System) -> list[Where]:
     """Inputs and modules without a clip."""
-    parts = {**system.inputs, **system.modules}
-    return [(name,) for name, part in parts.items() if part.drive.clip is None]
+    return [*((name,) for name, part in system.inputs.items() if part.drive.clip is None),
+            *((name,) for name, part in system.modules.items() if part.drive.clip is None)]
 
 
 def _clips(path: Along, where: Where) -> list[float]:
@@ -97,5 +97,5 @@ INPUT_EFFECTS = (
            ("missing_link",), "the heater alone, in fast steps"),
 )
 # the second form of an effect: the same name, another law
-CLIP = Effect("input_saturation", _unclipped, (Quantity("clip", "unit", 0.0, 1e6, grid=_clips, typical=1e6),), _add_clip,
-              input_clip, ("joule_split", "lead_heating"), "a sweep of the amplitude")
+CLIP = Effect("input_saturation", _unclipped, (Quantity("clip", "unit", 0.0, 1e6, grid=_clips, typical=1e6),),
+              _add_clip, input_clip, ("joule_split", "lead_heating"), "a sweep of the amplitude")

@@ -22,10 +22,11 @@ from ._next_experiment import NextExperiment, next_experiment, rivals
 from ._noise_floor import noise_floor
 from ._refit import Refit, refit, whitened
 from ._revise import revised
-from ._score import ALPHA, BIC_GAP, Scores, score
+from ._score import Scores, promising, score
 from ._sessions import SessionGain
 from ._short_list import Entry, quantities_of, refit_short_list
 from ._unknown_heat import unknown_heat
+from ._wider_noise import with_wider_noise
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
@@ -113,6 +114,15 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     unseen = None if validation is None else hold_out(nominal, fit, validation, operating_point=operating_point)
     progress("locating the misfit and planning the next experiment")
     verdict, outcome = _verdict(rounds, fit, checks, unseen)
+    if verdict == "unexplained" and (wider := with_wider_noise(nominal, effects)) is not None:
+        predicts = None if validation is None else hold_out(wider[0], wider[0], validation,
+                                                            operating_point=operating_point)
+        if predicts is None or predicts.outcome.ok:
+            (nominal, scores, checks), unseen, rounds, fit, joint = wider, predicts, (), wider[0], None
+            verdict, outcome = "consistent", Outcome(True, "consistent", "Nothing but noise is missing: the records "
+                                                     f"agree with the model if {nominal.levels}. Declare it.")
+    if fit.contradictions:
+        outcome = replace(outcome, text=" ".join([outcome.text, *fit.contradictions]))
     found = tuple(_found(fit, i, round_) for i, round_ in enumerate(rounds))
     named = verdict in ("named", "ambiguous")
     gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit), fit.unit)}
@@ -140,7 +150,7 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         if rounds:
             progress(f"trying every effect again beside {len(rounds)} accepted")
             scores = score(fit, effects)
-        if not _promising(fit, scores):
+        if not promising(fit, scores):
             break
         progress("refitting the best candidates")
         decision = decide(refit_short_list(fit, scores))
@@ -161,12 +171,6 @@ def _flails(fit: Refit, best: Entry) -> bool:
     n = fit.n_readings
     after = fit.rss * np.exp(-best.delta_bic / n)
     return bool(after > _LARGE * n and after - n > _MOST * (fit.rss - n))
-
-
-def _promising(fit: Refit, scores: Scores) -> bool:
-    """Whether any score could pass: refits are not started for nothing."""
-    least = 0.5 * (BIC_GAP + np.log(fit.n_readings))  # half: a refit may gain over its linearisation
-    return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
 
 
 def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None

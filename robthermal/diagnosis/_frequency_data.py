@@ -142,7 +142,7 @@ class ResponseData:
         return found
 
     def _point(self, system: System) -> OperatingPoint:
-        """Operating point that knows where the steady state was; of other lumps, it starts where the known ones were."""
+        """Operating point that knows where the steady state was; a new lump starts at the first ambient."""
         names = system.lump_names
         if names not in self._points:
             known = {name: T for lumps, point in self._points.items() if point.last is not None
@@ -202,8 +202,8 @@ def response_data(system: System, G: FrequencyResponse, where: str, operating_po
                          "degrees of freedom, so that their covariance is not known", where=f"argument {where}",
                          remedy="Estimate it with rt.identify.lpm or lrmp, a larger half_width, better poles, or a "
                                 "longer record.")
-    o = [G.output_names.index(name) for name in outputs]
-    i = [G.input_names.index(name) for name in inputs]
+    o = np.array([G.output_names.index(name) for name in outputs], np.intp)
+    i = np.array([G.input_names.index(name) for name in inputs], np.intp)
     index, factor = kept_bins(G, good, i)
     measured = G.response[np.ix_(o, i, index)].transpose(2, 1, 0).reshape(index.size, -1)
     return ResponseData(G, index, outputs, inputs, as_real(measured), response_whitener(G, index, factor, o, i),

@@ -1,4 +1,4 @@
-"""What an estimated noise does to tests: the covariance of a response is known with q degrees of freedom per window only.
+"""What an estimated noise does to tests: the covariance of a response has q degrees of freedom per window only.
 
 With C = W/q, W complex Wishart, p outputs, a deviation e and a signature g, the score |gᴴC⁻¹e|²/gᴴC⁻¹g is
 q |e₁ - β e₂|² / w, where w ~ Γ(q-p+1) and β, the regression of the noise along g on the other outputs, has

@@ -18,6 +18,7 @@ from ..identify import FrequencyResponse
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Places = NDArray[np.intp]
 _LEAST = 0.1  # eigenvalue of the correlation between the bins kept: below it small biases would be blown up
 _MOST = 2000  # rows of the correlation
 _SPREAD = 0.02  # relative distance of the bins of a long response
@@ -65,7 +66,7 @@ def as_complex(r: Array) -> Complex:
     return out
 
 
-def shared_weights(G: FrequencyResponse, index: NDArray[np.intp], inputs: list[int]) -> Complex:
+def shared_weights(G: FrequencyResponse, index: Places, inputs: Places) -> Complex:
     """s, the inner products of the window weights of bins and inputs, (n_b n_u, n_b n_u)."""
     n_y, n_u, n = len(G.output_names), len(G.input_names), index.size
     joint = G.joint_covariance(index).reshape(n, n_u, n_y, n, n_u, n_y)[:, inputs, 0][:, :, :, inputs, 0]
@@ -75,7 +76,7 @@ def shared_weights(G: FrequencyResponse, index: NDArray[np.intp], inputs: list[i
     return out
 
 
-def kept_bins(G: FrequencyResponse, good: NDArray[np.intp], inputs: list[int]) -> tuple[NDArray[np.intp], Complex]:
+def kept_bins(G: FrequencyResponse, good: Places, inputs: Places) -> tuple[Places, Complex]:
     """Bins to use, and the Cholesky factor of s over them (empty if independent).
 
     Estimates a third of a window apart hold nearly all the information and are well-conditioned together. Where the
@@ -102,7 +103,7 @@ def kept_bins(G: FrequencyResponse, good: NDArray[np.intp], inputs: list[int]) -
                          remedy="Estimate the response with a larger half_width, or from a longer record.") from None
 
 
-def thinned(good: NDArray[np.intp], step: int, most: int) -> NDArray[np.intp]:
+def thinned(good: Places, step: int, most: int) -> Places:
     """Bins at least `step` apart; two per cent apart if there would be more than `most`."""
     kept = [int(good[0])]
     share = _SPREAD if good.size > step * most else 0.0
@@ -112,8 +113,8 @@ def thinned(good: NDArray[np.intp], step: int, most: int) -> NDArray[np.intp]:
     return np.array(kept, np.intp)
 
 
-def response_whitener(G: FrequencyResponse, index: NDArray[np.intp], factor: Complex, outputs: list[int],
-                      inputs: list[int]) -> ResponseWhitener:
+def response_whitener(G: FrequencyResponse, index: Places, factor: Complex, outputs: Places,
+                      inputs: Places) -> ResponseWhitener:
     """Whitener of the channels of a response, inputs outermost.
 
     The noise is an estimate with q degrees of freedom: E[C_V⁻¹] is q/(q - n_y) times the inverse (complex Wishart), and
@@ -123,13 +124,13 @@ def response_whitener(G: FrequencyResponse, index: NDArray[np.intp], factor: Com
         noise = inverse_roots(np.moveaxis(G.noise_covariance[np.ix_(outputs, outputs, index)], -1, 0), G, index)
         roots = np.stack([np.kron(np.eye(len(inputs)), root) for root in noise])
     else:
-        channels = [i * len(G.output_names) + o for i in inputs for o in outputs]
+        channels = (inputs[:, None] * len(G.output_names) + outputs).ravel()
         roots = inverse_roots(np.moveaxis(G.covariance[np.ix_(channels, channels, index)], -1, 0), G, index)
     q = G.degrees_of_freedom[index].astype(float)
     return ResponseWhitener(roots * np.sqrt((q - len(outputs)) / q)[:, None, None], factor, len(outputs))
 
 
-def inverse_roots(covariance: Complex, G: FrequencyResponse, index: NDArray[np.intp]) -> Complex:
+def inverse_roots(covariance: Complex, G: FrequencyResponse, index: Places) -> Complex:
     """L⁻¹ of every L Lᴴ."""
     sound = [bool(np.all(np.isfinite(c))) and np.linalg.eigvalsh(c)[0] > 1e-13 * np.trace(c).real for c in covariance]
     if not all(sound):

@@ -65,11 +65,11 @@ def counted(data: Sequence[Data | ResponseData]) -> dict[str, int]:
 
 def _cleaned(system: System, one: Data, noise: Array) -> Data:
     try:
-        model = trajectory(system, one.record).readings[:, one.columns]
+        model = np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
     except Diverged:  # the refit will say so
         return one
     r, missing = one.readings - model, np.zeros(one.readings.shape, bool)
-    allowed = _FAR * noise + _BENT * _bends(model)
+    allowed: Array = _FAR * noise + _BENT * _bends(model)
     time = np.arange(len(r))
     for _ in range(_PASSES):
         new = outliers(r, allowed) & ~missing

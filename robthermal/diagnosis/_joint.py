@@ -18,7 +18,7 @@ from ._refit import Refit
 from ._score import Scores
 
 Array = NDArray[np.float64]
-_POOL = 8  # candidates whose sets are compared: up to half from the best pairs, the rest as they enter the path
+_POOL = 6  # candidates whose sets are compared: up to half from the best pairs, the rest as they enter the path
 _PAIRS = 5
 _PENALTIES = 16
 _NOISE = 2.0  # standard deviations beyond the largest of that many noises: where the path ends
@@ -116,8 +116,8 @@ class JointSelection:
 def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2) -> JointSelection:
     """Select effects together instead of one after the other.
 
-    minimise ½|z' - J'β|² + λ Σ_g w_g |β_g| within the physical bounds, for λ from the smallest that selects nothing
-    down to the noise. Up to eight candidates, from the best pairs and as they enter the path, are a pool; its sets of
+    minimise ½‖z' - J'β‖² + λ Σ_g w_g ‖β_g‖ within the physical bounds, for λ from the smallest that selects nothing
+    down to the noise. Up to six candidates, from the best pairs and as they enter the path, are a pool; its sets of
     up to three effects are compared by the linearised ΔBIC. The best, and the best pair, are refitted with the nominal
     parameters.
 

@@ -66,9 +66,12 @@ def checked_jointly(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, sc
     known = {_representative(key, scores) for key in (candidate.key for candidate in stepwise)}
     others = []
     for found in selection.sets:
-        if {_representative(key, scores) for key in found.keys} != known:
+        names = {_representative(key, scores) for key in found.keys}
+        if names != known:
             again = extended(fit, found.fit.structure, found.fit.v)  # with the filters of the accepted set
-            others.append((bic(fit) - bic(again), EffectSet(found.candidates, again, found.delta_bic)))
+            gain = bic(fit) - bic(again)
+            if gain > BIC_GAP or not names > known:  # the accepted effects and one more, for little, are no rival
+                others.append((gain, EffectSet(found.candidates, again, found.delta_bic)))
     advantage, best = max(others, key=lambda item: item[0], default=(-float("inf"), None))
     check = JointCheck(selection, stepwise, advantage)
     if best is not None and advantage > BIC_GAP:

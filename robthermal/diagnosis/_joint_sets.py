@@ -20,7 +20,7 @@ from ._refit import LIMIT, Refit, extended
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 MOST = 3  # effects in a set
-_POOLED = 6  # evaluations of the refit of the whole pool
+_POOLED = 4  # evaluations of the refit of the whole pool
 _NEAR = 0.5
 
 
@@ -104,7 +104,8 @@ def _promising(fit: Refit, pooled: EffectSet) -> list[tuple[tuple[Candidate, ...
     rest = np.setdiff1d(np.arange(pooled.fit.J.shape[1]), np.concatenate(own))
     scale = np.linalg.norm(pooled.fit.J, axis=0)
     J = pooled.fit.J / np.where(scale > 0, scale, 1.0)
-    gone = [_without(fit, pooled, i) for i in range(len(own))]
+    here = [modelled(one, system) for one, system in zip(structure.data, structure.systems(pooled.fit.v), strict=True)]
+    gone = [_without(fit, pooled, here, i) for i in range(len(own))]
     found = []
     for count in range(1, min(MOST, len(own)) + 1):
         for members in combinations(range(len(own)), count):
@@ -127,14 +128,14 @@ def _promising(fit: Refit, pooled: EffectSet) -> list[tuple[tuple[Candidate, ...
     return out
 
 
-def _without(fit: Refit, pooled: EffectSet, gone: int) -> Array:
+def _without(fit: Refit, pooled: EffectSet, here: Sequence[Array], gone: int) -> Array:
     """What leaving out one effect changes in the whitened residuals, all else as it is."""
     old, place = pooled.fit.structure, len(fit.structure.effects) + gone
     structure = old.with_effects(old.effects[:place] + old.effects[place + 1:])
     values = old.quantities(pooled.fit.v)
     v = structure.carried(old, pooled.fit.v, values[:place] + values[place + 1:])
-    change = [(modelled(one, a) - modelled(one, b))[..., None] for one, a, b in
-              zip(old.data, old.systems(pooled.fit.v), structure.systems(v), strict=True)]
+    change = [(with_it - modelled(one, system))[..., None] for one, with_it, system in
+              zip(old.data, here, structure.systems(v), strict=True)]
     return pooled.fit.whiten(change)[:, 0]
 
 

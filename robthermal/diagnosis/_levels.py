@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,9 @@ from ._whitening import settled_cost
 
 Array = NDArray[np.float64]
 LIMIT = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
+WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
 _CLOSE = 0.03
-_TRIED = tuple(float(t) for t in np.geomspace(1.0 / LIMIT, LIMIT, 15))  # five per cent apart
+_N_TRIED = 15  # five per cent apart
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,13 @@ class Levels:
         On the random heat of all lumps.
     noise : dict
         On the noise of every sensor.
+    limit : float
+        Largest factor, and the inverse of the smallest.
     """
 
     disturbance: float
     noise: dict[str, float]
+    limit: float = LIMIT
 
     def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
         """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
@@ -81,21 +85,23 @@ def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels
             total += settled_cost(path, r, *trial.of(path, floor))
         return total
 
+    tried = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
     if not any(floor.disturbance.values()):
-        return Levels(levels.disturbance, _by_spread(paths, residuals, floor))
+        return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
-        levels = _best([Levels(levels.disturbance, {**levels.noise, name: factor}) for factor in _TRIED], cost)
-    return _best([Levels(factor, levels.noise) for factor in _TRIED], cost)
+        levels = _best([replace(levels, noise={**levels.noise, name: factor}) for factor in tried], cost)
+    return _best([replace(levels, disturbance=factor) for factor in tried], cost)
 
 
-def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor) -> dict[str, float]:
+def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, limit: float
+               ) -> dict[str, float]:
     """Without random heat the most likely level is the root mean square of the residual."""
     out = {}
     for name, level in floor.noise.items():
         own = [r[:, path.one.sensors.index(name)] for path, r in zip(paths, residuals, strict=True)
                if name in path.one.sensors]
         ratio = float(np.sqrt(np.mean(np.concatenate(own) ** 2))) / level
-        out[name] = float(np.clip(ratio, 1.0 / LIMIT, LIMIT))
+        out[name] = float(np.clip(ratio, 1.0 / limit, limit))
     return out
 
 

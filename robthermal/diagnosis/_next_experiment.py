@@ -23,7 +23,8 @@ from ._short_list import Entry
 from ._trial_inputs import Limits, crossed, drawn, limits_of, towards_rest
 
 Array = NDArray[np.float64]
-MOST = 4  # candidates that one experiment is designed for
+MOST = 6  # candidates that one experiment is designed for
+_FULL = 4  # candidates for which all trials are made; more candidates, fewer trials
 _ENOUGH = 20.0  # expected ΔBIC that makes a name nearly certain
 _PLENTY = 80.0  # a search that reaches it ends
 _ALIKE = 0.5  # expected ΔBIC below which no input is said to separate a pair
@@ -93,9 +94,10 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 12, seed: int = 0
     Parameters
     ----------
     entries : sequence of Entry
-        Two candidates or more that the records cannot tell apart; the first four are told apart.
+        Two candidates or more that the records cannot tell apart; the first six are told apart.
     trials : int
-        Inputs tried, as many again to improve the best; a search that has found plenty ends earlier.
+        Inputs tried for up to four candidates, fewer for more; as many again to improve the best. A search that has
+        found plenty ends earlier.
     seed : int
         Of the random numbers.
     temperature : tuple of float, optional
@@ -132,12 +134,13 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 12, seed: int = 0
     rng = np.random.default_rng(seed)
     repeated = search.at(search.one.record)
     tried = [repeated]
-    for number in range(trials):
+    count = max(trials * _FULL // max(len(search.hypotheses), _FULL), 1)
+    for number in range(count):
         tried.append(search.at(drawn(search.one, search.limits, number, rng)))
         if search.plenty(tried):
             break
     else:
-        for _ in range(trials if search.limits else 0):
+        for _ in range(count if search.limits else 0):
             tried.sort(key=search.worth)
             other = tried[int(rng.integers(len(tried)))]
             tried.append(search.at(crossed(tried[-1].record, other.record, search.limits, rng)))

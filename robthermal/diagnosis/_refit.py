@@ -32,6 +32,7 @@ White = Whitener | ResponseWhitener
 LIMIT = 40  # evaluations of a refit
 _ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
 _FLAT = 1e-9  # relative size of a direction of J that counts as none
+_CONTRADICTED = 6.0  # standard deviations of a prior
 _ROUNDS = 3  # of filter and noise levels
 
 
@@ -196,6 +197,24 @@ class Refit:
         inverse = np.linalg.pinv(J.T @ J, rcond=_FLAT**2, hermitian=True)
         return np.asarray(inverse / np.outer(scale, scale) * max(self.variance, 1.0), np.float64)
 
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Priors that the records contradict, a sentence each: by more than six standard deviations.
+
+        With the leverage h of a prior's row its residual r has the variance 1 - h, so that r / sqrt(1 - h) is the
+        distance between the prior and what everything else says, in standard deviations of that distance.
+        """
+        ranges = self.structure.ranges
+        known = np.flatnonzero(np.isfinite(ranges.sigma))
+        rows = slice(self.n_readings, self.n_readings + known.size)
+        free = 1.0 - np.sum(self.basis[rows] ** 2, axis=1)
+        distance = np.abs(self.z[rows]) / np.sqrt(np.maximum(free, 1e-9) * max(self.variance, 1.0))
+        values = ranges.values(self.v[:len(ranges.names)])
+        return tuple(f"The prior of {ranges.names[i]} is contradicted by the records: {ranges.start[i]:.6g} ± "
+                     f"{ranges.sigma[i]:.2g} declared, {values[i]:.6g} fitted, {far:.0f} standard deviations from what "
+                     "the records say without it." for i, far in zip(known, distance, strict=True)
+                     if far > _CONTRADICTED)
+
     def __str__(self) -> str:
         ranges = self.structure.ranges
         values = ranges.values(self.v[:len(ranges.names)])
@@ -204,7 +223,7 @@ class Refit:
         gains = [g for path, g in zip(self.paths, self.structure.gains(self.v), strict=True) if isinstance(path, Along)]
         lines += session_table(self.structure.sessions, labels, gains)
         lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), rms {self.rms:.4g} {self.unit}")
-        return "\n".join([*lines, str(self.levels), str(self.outcome)])
+        return "\n".join([*lines, str(self.levels), *self.contradictions, str(self.outcome)])
 
     def plot(self) -> Any:
         """Residuals of every record against time [K], of every response against frequency; returns the axes."""

@@ -205,6 +205,12 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
                   possible[best] & visible[best], identifiability[best], limit[best], unit[:, best], len(trials))
 
 
+def promising(fit: Refit, scores: Scores) -> bool:
+    """Whether any score could pass: refits are not started for nothing."""
+    least = 0.5 * (BIC_GAP + math.log(fit.n_readings))  # half: a refit may gain over its linearisation
+    return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
+
+
 def turned(fit: Refit, trials: list[tuple[int, Candidate]], J: Array
            ) -> tuple[list[tuple[int, Candidate]], Array, NDArray[np.intp]]:
     """Join the two columns of every paired trial to the one at the best angle; also the columns each one had."""

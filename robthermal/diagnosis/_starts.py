@@ -1,7 +1,7 @@
 """Where the refit of a candidate starts: from the nominal fit, or from the declared parameters.
 
-A strong effect that is missing pulls the nominal parameters far away; the linearisation there knows little of the truth.
-The declared parameters are wrong by their priors only.
+A strong effect that is missing pulls the nominal parameters far away; the linearisation there knows little of the
+truth. The declared parameters are wrong by their priors only.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class Origin:
 
 def started(origin: Origin, candidate: Candidate, size: float) -> Refit:
     """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best."""
-    fit, tried = origin.fit, []
+    fit = origin.fit
+    tried: list[Refit] = []
     for at, trial, v, beta, promise in _starts(origin, candidate, size):
         if at is fit and tried and min(new.rss for new in tried) < fit.rss:
             break  # from nothing is the last resort
@@ -64,7 +65,8 @@ def started(origin: Origin, candidate: Candidate, size: float) -> Refit:
     return min(tried, key=lambda new: new.rss)
 
 
-def _starts(origin: Origin, candidate: Candidate, size: float) -> Iterator[tuple[Refit, Candidate, Array, float, float]]:
+def _starts(origin: Origin, candidate: Candidate, size: float
+            ) -> Iterator[tuple[Refit, Candidate, Array, float, float]]:
     """Linearised at, trial, unknowns, size, and the sum of squares that the linearisation promises."""
     fit = origin.fit
     yield fit, candidate, *_linear(fit, candidate, size)

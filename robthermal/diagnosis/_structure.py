@@ -153,7 +153,7 @@ class Structure:
 
     def system(self, v: Array) -> System:
         """Nominal system at these parameters with the effects added."""
-        values = self.ranges.values(v[:self.n_parameters])
+        values = np.clip(self.ranges.values(v[:self.n_parameters]), self.ranges.lower, self.ranges.upper)  # a rounding
         system = self.base.with_parameters(self.ranges.assigned(values)) if self.n_parameters else self.base
         for candidate, q in zip(self.effects, self.quantities(v), strict=True):
             system = candidate.effect.add(system, candidate.where, q)

@@ -14,6 +14,7 @@ from ..errors import Diverged, InputError, Outcome
 from ..signals import Record
 from ..thermal import Input
 from ._along import Along
+from ._frequency_data import ResponseData
 from ._locate import locate
 from ._refit import Refit, filters, whitened
 
@@ -162,10 +163,12 @@ def _heated(fit: Refit, v: Array, lump: str, knots: list[Array], heat: tuple[Arr
     """The fit at other unknowns and with an extra heat into one lump, as one more input of every record."""
     base = fit.structure.base
     base = base.model_copy(update={"inputs": {**base.inputs, _PROBE: Input(lump=lump)}})
-    data, parts = [], iter(zip(knots, heat, strict=True))
+    data: list[Data | ResponseData] = []
+    parts = iter(zip(knots, heat, strict=True))
     for one in fit.structure.data:
         if isinstance(one, Data):
-            q = np.interp(one.record.time + 0.5 * one.record.sample_time, *next(parts))  # held: its mean over the sample
+            middle = one.record.time + 0.5 * one.record.sample_time
+            q = np.interp(middle, *next(parts))  # held: its mean over the sample
             record = Record(sample_time=one.record.sample_time, inputs=np.column_stack([one.record.inputs, q]),
                             outputs=one.record.outputs, input_names=[*one.record.input_names, _PROBE],
                             output_names=one.record.output_names, start_time=one.record.start_time)
@@ -179,9 +182,9 @@ def _heated(fit: Refit, v: Array, lump: str, knots: list[Array], heat: tuple[Arr
 
 
 def _knots(time: Array) -> Array:
-    """Even times over a record."""
+    """Samples evenly over a record: between samples the heat is then linear."""
     count = int(np.clip(time.size // _SAMPLES_PER_KNOT, 4, _MOST_KNOTS))
-    return np.linspace(time[0], time[-1], count)
+    return np.asarray(time[np.round(np.linspace(0, time.size - 1, count)).astype(int)], np.float64)
 
 
 def _walk(t: Array) -> Array:
@@ -229,7 +232,8 @@ def _most_likely(s: Array, a: Array) -> tuple[float, float]:
     return (float(rates[best]), float(gains[best])) if gains[best] > 0 else (0.0, 0.0)
 
 
-def _posterior(lump: str, knots: list[Array], modes: Array, s: Array, a: Array, rate: float, gain: float) -> UnknownHeat:
+def _posterior(lump: str, knots: list[Array], modes: Array, s: Array, a: Array, rate: float, gain: float
+               ) -> UnknownHeat:
     """Mean and standard deviation at the knots: in every mode, the prior shrunk by 1/(1 + rate² s²)."""
     shrunk = rate**2 / (1.0 + (rate * s) ** 2)
     mean = modes @ (shrunk * s * a)

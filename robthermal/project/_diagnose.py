@@ -116,7 +116,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
 
 
 def _trained(found: Diagnosis) -> Iterator[Residuals]:
-    for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
+    for path, before, after in zip(found.nominal.along, found.nominal.residuals, found.fit.residuals, strict=True):
         names = path.one.sensors
         yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
 

@@ -1,0 +1,282 @@
+"""The engine: starts, glitches, steps of a converter, noise levels, priors, stages; truth integrated in conftest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.calibration._data import as_data
+from robthermal.diagnosis import _revise
+from robthermal.diagnosis._along import along
+from robthermal.diagnosis._decide import Decision
+from robthermal.diagnosis._descent import descend
+from robthermal.diagnosis._glitches import outliers
+from robthermal.diagnosis._refit import extended
+from robthermal.diagnosis._short_list import Entry, ShortList
+from robthermal.diagnosis._starts import Origin, started
+from robthermal.diagnosis._whitening import whitener
+
+Hide = Callable[..., tuple[rt.Record, rt.Record]]
+
+
+def convection(gain: float, rate: Callable) -> Callable:
+    """Natural convection from the plate."""
+
+    def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        dT = u[1] - T[0]
+        return rate(T, u, np.array([gain * abs(dT) ** 0.25 * dT, 0.0]))
+
+    return hidden
+
+
+def spiky(record: rt.Record, seed: int, share: float) -> tuple[rt.Record, np.ndarray]:
+    """Spikes of 0.3 to 6 K, thirty to six hundred standard deviations, and where they are."""
+    rng = np.random.default_rng(seed)
+    where = rng.random(record.outputs.shape) < share
+    size = rng.choice([-1.0, 1.0], where.sum()) * rng.uniform(0.3, 6.0, where.sum())
+    y = np.array(record.outputs)
+    y[where] += size
+    return record.with_outputs(y), where
+
+
+def stepped(record: rt.Record, step: float) -> rt.Record:
+    """Readings of a converter with that step."""
+    return record.with_outputs(np.round(np.asarray(record.outputs) / step) * step)
+
+
+# Starts
+
+
+def test_clip_is_named_with_its_level(plant: rt.System, hide: Hide) -> None:
+    def clipped(u: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.minimum(u[:, 0], 8.5), u[:, 1]])
+
+    train, unseen = hide(drive=clipped)
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert found.verdict == "named"
+    assert [effect.label for effect in found.effects] == ["input_saturation(heater)"]
+    assert found.effects[0].values["clip"][0] == pytest.approx(8.5, abs=0.02)
+    assert "cubic" not in found.effects[0].values
+    assert found.system.parameter("inputs.heater.drive.clip") == pytest.approx(8.5, abs=0.02)
+
+
+def test_cubic_saturation_is_not_called_a_clip(plant: rt.System, hide: Hide) -> None:
+    train, unseen = hide(drive=lambda u: np.column_stack([u[:, 0] - 1e-3 * u[:, 0] ** 3, u[:, 1]]))
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert [effect.label for effect in found.effects] == ["input_saturation(heater)"]
+    assert found.effects[0].values["cubic"][0] == pytest.approx(1e-3, rel=0.05)
+
+
+def test_strong_effect_is_reached_although_the_nominal_fit_is_far_off(plant: rt.System, hide: Hide,
+                                                                     rate: Callable) -> None:
+    # A large mass on the plate: the nominal fit moves its capacities instead. The start from there and the start from
+    # the declared parameters have to end at the truth.
+    C, tau = 150.0, 200.0
+
+    def hidden(t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        flow = C / tau * (x[2] - x[0])
+        return np.append(rate(x[:2], u, np.array([flow, 0.0])), -flow / C)
+
+    fit = rt.diagnosis.refit(plant, hide(hidden, extra_states=1)[0])
+    assert fit.variance > 50.0
+    scores = rt.diagnosis.score(fit, ["hidden_mass"])
+    place = [candidate.label for candidate in scores.candidates].index("hidden_mass(plate)")
+    new = started(Origin(fit), scores.candidates[place], float(scores.size[place]))
+    values = extended(new, new.structure, new.v).structure.quantities(extended(new, new.structure, new.v).v)[0]
+    assert values["capacity"] == pytest.approx(C, rel=0.05)
+    assert values["time_constant"] == pytest.approx(tau, rel=0.05)
+
+
+def test_descent_does_not_polish_what_is_hopeless() -> None:
+    # Rosenbrock's valley with a misfit that nothing removes: fewer evaluations than without it.
+    def valley(offset: float) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        def evaluate(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            z = np.array([10.0 * (v[1] - v[0] ** 2), 1.0 - v[0], offset])
+            return z, np.array([[20.0 * v[0], -10.0], [1.0, 0.0], [0.0, 0.0]])
+        return evaluate
+
+    bounds = np.full(2, -10.0), np.full(2, 10.0)
+    exact = descend(valley(0.0), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
+    rough = descend(valley(1e4), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
+    assert np.allclose(exact.v, 1.0, atol=1e-4)
+    assert rough.converged and rough.iterations < exact.iterations
+
+
+# Glitches
+
+
+def test_outliers_are_told_from_ramps_and_kinks() -> None:
+    t = np.arange(60.0)
+    r = np.where(t < 30, 0.02 * t, 0.6 - 0.05 * (t - 30))[:, None] + np.zeros((60, 2))  # a kink, steep on both sides
+    r[12, 0] += 0.5
+    r[40:42, 1] -= 1.0  # two side by side
+    found = outliers(r, np.full(r.shape, 0.08))
+    assert np.flatnonzero(found[:, 0]).tolist() == [12]
+    assert np.flatnonzero(found[:, 1]).tolist() == [40, 41]
+
+
+def test_spikes_make_no_name_when_nothing_is_hidden(plant: rt.System, hide: Hide) -> None:
+    (train, where), (unseen, _) = (spiky(record, seed, 0.01) for seed, record in enumerate(hide()))
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert found.verdict == "consistent"
+    counted = found.noise_floor.glitches
+    assert counted == {"Tp": int(where[:, 0].sum()), "Tb": int(where[:, 1].sum())}
+    assert "isolated outliers" in str(found.noise_floor)
+    assert found.nominal.variance == pytest.approx(1.0, abs=0.1)
+
+
+def test_spikes_do_not_hide_an_effect(plant: rt.System, hide: Hide, rate: Callable) -> None:
+    (train, _), (unseen, _) = (spiky(record, seed, 0.01) for seed, record in enumerate(hide(convection(0.08, rate))))
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert found.verdict == "named"
+    assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
+    gain, std, _ = found.effects[0].values["gain"]
+    assert abs(gain - 0.08) < 4 * std
+
+
+def test_too_many_spikes_are_refused(plant: rt.System, hide: Hide) -> None:
+    record, where = spiky(hide(n=300)[0], 3, 0.08)
+    assert where[:, 0].mean() > 0.055
+    with pytest.raises(rt.InputError, match="are isolated outliers"):
+        rt.diagnose(plant, record)
+
+
+def test_a_missing_reading_counts_for_nothing(plant: rt.System, hide: Hide) -> None:
+    # Any value at the place of a missing reading gives the same innovations everywhere else.
+    moving = plant.model_copy(update={"lumps": {name: lump.model_copy(update={"disturbance": 0.05})
+                                                for name, lump in plant.lumps.items()}})
+    one = as_data(moving, hide(n=100)[0], "records")[0]
+    missing = np.zeros(one.readings.shape, bool)
+    missing[40, 0] = True
+    path = along(moving, type(one)(one.record, one.sensors, one.columns, one.readings, missing))
+    w = whitener(path, np.array([0.01, 0.01]), np.array([0.05, 0.05]))
+    r = np.random.default_rng(0).standard_normal((100, 2, 2))
+    r[:, :, 1] = r[:, :, 0]
+    r[40, 0, 1] += 7.0
+    z = w(r)
+    assert np.allclose(z[..., 0], z[..., 1], atol=1e-4)
+    assert abs(z[40, 0, 0]) < 1e-4
+
+
+# Converters
+
+
+def test_steps_of_a_converter_make_no_name(plant: rt.System, hide: Hide) -> None:
+    train, unseen = (stepped(record, 0.25) for record in hide())
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert found.verdict == "consistent"
+    assert found.noise_floor.noise["Tp"] == pytest.approx(0.25 / 12**0.5, rel=1e-6)
+    assert found.noise_floor.quantised == ("Tp", "Tb")
+
+
+def test_an_effect_is_named_through_the_steps_of_a_converter(plant: rt.System, hide: Hide, rate: Callable) -> None:
+    train, unseen = (stepped(record, 0.25) for record in hide(convection(0.3, rate)))
+    found = rt.diagnose(plant, train, validation=unseen)
+    assert found.verdict == "named"
+    assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
+    assert found.effects[0].values["gain"][0] == pytest.approx(0.3, rel=0.1)
+
+
+# Noise levels, limits, priors
+
+
+def test_twice_the_declared_random_heat_is_said_and_is_no_name() -> None:
+    system = rt.System(
+        ambients={"room": {"temperature": 298.15}}, lumps={"bar": {"capacity": 50.0, "disturbance": 0.05}},
+        links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+        sensors={"T": {"lump": "bar", "noise": 0.003}})
+    rng = np.random.default_rng(5)
+    h, n, p = 5.0, 900, np.exp(-0.05)
+    heater = np.repeat(rng.uniform(0.0, 4.0, n // 30), 30)
+    spread = 2.0 * 0.05 / 50.0 * np.sqrt((1 - p**2) / (2 * 0.01))  # exact for one lump
+    T = np.zeros(n)
+    for k in range(n - 1):
+        T[k + 1] = p * T[k] + (1 - p) * heater[k] / 0.5 + spread * rng.standard_normal()
+    record = rt.Record(sample_time=h, inputs=heater, outputs=298.15 + T + 0.003 * rng.standard_normal(n),
+                       input_names=["heater"], output_names=["T"])
+    found = rt.diagnose(system, record)
+    assert found.verdict == "consistent"
+    assert found.nominal.levels.disturbance == pytest.approx(2.0, rel=0.15)
+    assert "Nothing but noise is missing" in found.outcome.text
+
+
+def test_limits_are_those_of_the_noise_not_of_the_misfit(plant: rt.System, hide: Hide, rate: Callable) -> None:
+    def limit(record: rt.Record) -> float:
+        return float(rt.diagnosis.score(rt.diagnosis.refit(plant, record), ["sensor_gain"]).limit[0])
+
+    train, strange = hide(n=300)[0], hide(convection(0.6, rate), n=300)[0]
+    assert rt.diagnosis.refit(plant, strange).variance > 20.0
+    assert limit(strange) < 2.0 * limit(train)
+
+
+def test_a_contradicted_prior_is_named(plant: rt.System, hide: Hide) -> None:
+    sure = plant.model_copy(update={"fit": {name: limits.model_copy(update={"sigma": 0.01}) if "capacity" in name
+                                            else limits for name, limits in plant.fit.items()}})
+    found = rt.diagnose(sure, hide(n=300)[0], effects=["sensor_offset"])
+    told = " ".join(found.fit.contradictions)
+    assert "The prior of lumps.plate.capacity is contradicted by the records: 120 ± 0.01 declared" in told
+    # leave the prior out: the records alone differ from it as much, or more, as the misfit does not raise their noise
+    free = sure.model_copy(update={"fit": {name: limits.model_copy(update={"sigma": None}) if name ==
+                                           "lumps.plate.capacity" else limits for name, limits in sure.fit.items()}})
+    fit = rt.diagnosis.refit(free, hide(n=300)[0])
+    std = np.sqrt(fit.covariance[0, 0]) * fit.system.parameter("lumps.plate.capacity")
+    distance = (fit.system.parameter("lumps.plate.capacity") - 120.0) / np.hypot(std, 0.01)
+    said = int(told.split(" fitted, ")[1].split()[0])
+    assert 0.4 < said / distance < 1.1
+    assert told in found.outcome.text and told in str(found.fit).replace("\n", " ")
+    assert not rt.diagnosis.refit(plant, hide(n=300)[0]).contradictions
+
+
+def test_a_parameter_at_its_bound_makes_no_error(plant: rt.System, hide: Hide) -> None:
+    structure = rt.diagnosis.refit(plant, hide(n=100)[0]).structure
+    ranges = structure.ranges
+    beyond = 0
+    for factor in np.linspace(0.9, 1.1, 40):  # some exp(log(x)) exceed x by a rounding
+        upper = ranges.upper * factor
+        fit = {name: limits.model_copy(update={"upper": top}) for (name, limits), top in
+               zip(plant.fit.items(), upper, strict=True)}
+        tight = replace(structure, ranges=replace(ranges, upper=upper), base=plant.model_copy(update={"fit": fit}))
+        beyond += int(np.any(ranges.values(ranges.coordinates(upper)) > upper))
+        built = tight.system(tight.bounds[1])
+        assert built.parameter("lumps.plate.capacity") == pytest.approx(upper[0], rel=1e-12)
+    assert beyond  # otherwise nothing was tested
+
+
+# Stages
+
+
+def test_stages_are_told_in_order(plant: rt.System, hide: Hide) -> None:
+    told: list[str] = []
+    train, unseen = hide(n=200)
+    rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag"], progress=told.append)
+    assert len(told) > 4 and all(told)
+    assert told.index("refitting the nominal system") < told.index("predicting the unseen records")
+
+
+def test_effects_without_a_place_are_no_error(plant: rt.System, hide: Hide) -> None:
+    scores = rt.diagnosis.score(rt.diagnosis.refit(plant, hide(n=100)[0]), ["thomson"])
+    assert scores.candidates == () and scores.order == [] and scores.not_testable == {}
+
+
+def test_an_effect_that_another_stands_on_stays(plant: rt.System, hide: Hide, monkeypatch: pytest.MonkeyPatch) -> None:
+    nominal = rt.diagnosis.refit(plant, hide(n=100)[0])
+    mass = next(c for c in rt.diagnosis.candidates(plant, ["hidden_mass"]) if c.where == ("plate",))
+    mass = mass.trials(nominal.paths[0])[0]
+    warm = next(c for c in rt.diagnosis.candidates(mass.add(plant, 1.0), ["heat_source"])
+                if c.where == ("plate_hidden",))
+    with pytest.raises(rt.InputError):
+        nominal.structure.with_effects((warm,))
+    both = nominal.structure.with_effects((mass, warm))
+    v = both.start(nominal.structure.ranges.values(nominal.v[:nominal.structure.n_parameters]),
+                   [{"capacity": 1.0, **mass.shape}, {"heat": 0.01}])
+    fit = extended(nominal, both, v, 3)
+    first, second = (Decision(True, nominal, Entry(c, fit, 100.0, 0.0), ()) for c in (mass, warm))
+    # the heat on the hidden mass is chosen again as it was; then it is the mass's turn
+    monkeypatch.setattr(_revise, "refit_short_list", lambda *a, **k: ShortList(nominal, (second.best,), {}))
+    monkeypatch.setattr(_revise, "settled", lambda *a: second)
+    kept, _ = _revise.revised((first, second), nominal, ["heat_source"])
+    assert [decision.best.candidate.key for decision in kept] == [mass.key, warm.key]
