@@ -143,19 +143,28 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
 
 @app.command()
 def diagnose(system: SystemFile,
-             records: Annotated[list[Path], typer.Argument(help="Training records.", metavar="TRAIN.csv...")],
+             records: Annotated[list[Path], typer.Argument(
+                 help="Training records, or frequency responses from `robthermal frf` (.json, .npz).",
+                 metavar="TRAIN.csv...")],
              validation: Annotated[list[Path] | None, typer.Option(
-                 "--validation", help="Record that no fit sees, may repeat.")] = None,
+                 "--validation", help="Record or response that no fit sees, may repeat.")] = None,
+             session_gain: Annotated[bool, typer.Option(
+                 "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
+             operating_point: Annotated[list[str] | None, typer.Option(
+                 help="Of frequency responses: mean of an input [unit, A] or ambient [K], may repeat.",
+                 metavar="NAME=VALUE")] = None,
              out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
     """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
 
     Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
     """
     found = rt.read_system(system)
-    train, held_out = ([rt.read_record(path, found) for path in paths] for paths in (records, validation or []))
+    train, held_out = (rt.project.read_measured(paths, found) for paths in (records, validation or []))
+    point = rt.project.point_from_text(found, operating_point or [])
     rt.project.check_free(out)
     with progress() as stage:
-        result = rt.project.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage)
+        result = rt.project.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage,
+                                             operating_point=point, session_gain=session_gain)
         stage("writing the report")
         rt.project.write_diagnosis(result, out)
     summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),

@@ -246,3 +246,38 @@ class TestBadInput:
         status, _, message = run("diagnose", *files(nothing)[:2], "--out", tmp_path / "mine")
         assert status == 2 and "other things" in message
         assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+
+
+def test_a_frequency_response_and_its_operating_point(files: Any, run: Run, tmp_path: Path) -> None:
+    """Estimated by `robthermal frf`; hidden: a path to the room, which a response cannot tell from convection."""
+    system, train, unseen = files(across)
+    assert run("frf", train, "--system", system, "--out", tmp_path / "frf.json")[0] == 0
+    words = ("diagnose", system, tmp_path / "frf.json", "--operating-point", "heater=5.25", "--operating-point",
+             "room=25", "--out", tmp_path / "found", "--json")
+    status, _, warned = run(*words, "--validation", unseen)
+    assert status == 2 and "a frequency response" in warned
+    status, said, _ = run(*words)
+    found = json.loads(said)
+    named = [(e["effect"], tuple(e["where"])) for e in found["effects"]]
+    named += [(e["effect"], tuple(e["where"])) for others in found["alternatives"] for e in others]
+    assert status in (0, 1) and ("missing_ambient_link", ("block", "room")) in named
+    page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
+    assert "Measured − model, response (lpm" in page
+
+
+def test_days_with_a_gain_of_their_own(files: Any, run: Run, tmp_path: Path) -> None:
+    system, train, unseen = files(nothing)
+    table = np.loadtxt(unseen, delimiter=",", skiprows=1)
+    table[:, 1] /= 1.05  # on this day the heater gave 5 % more than recorded
+    other = tmp_path / "day2.csv"
+    np.savetxt(other, table, delimiter=",", header="time,heater,Tp,Tb", comments="", fmt="%.9g")
+    without = run("diagnose", system, train, other, "--out", tmp_path / "a", "--json")
+    with_gain = run("diagnose", system, train, other, "--session-gain", "--out", tmp_path / "b", "--json")
+    assert json.loads(without[1])["verdict"] != "consistent"
+    assert (with_gain[0], json.loads(with_gain[1])["verdict"]) == (0, "consistent")
+
+
+def test_a_bad_operating_point_is_refused(files: Any, run: Run, tmp_path: Path) -> None:
+    system, train, _ = files(nothing)
+    status, _, said = run("diagnose", system, train, "--operating-point", "room=298.15 K", "--out", tmp_path / "out")
+    assert status == 2 and "NAME=VALUE" in said and not (tmp_path / "out").exists()

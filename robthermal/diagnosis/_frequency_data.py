@@ -158,7 +158,7 @@ def as_measured(system: System, data: Measured | Sequence[Measured], where: str,
     """Check records and frequency responses, records first."""
     items = [data] if isinstance(data, Record | FrequencyResponse) else data
     if not isinstance(items, Sequence) or not any(isinstance(item, FrequencyResponse) for item in items):
-        if operating_point is not None:
+        if operating_point is not None and where == "records":  # records may validate what responses taught
             raise InputError("operating_point is given with records", where="argument operating_point",
                              remedy="Leave it out: a record brings its own inputs.")
         return list(as_data(system, _records(data, where), where))

@@ -134,7 +134,11 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
 
 
 def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Data | ResponseData]) -> None:
-    """Data validate nothing that was fitted to them."""
+    """Data validate nothing that was fitted to them; a record's noise must be known from training records."""
+    if not any(isinstance(one, Data) for one in training) and any(isinstance(one, Data) for one in validation):
+        raise InputError("a record is to validate what only frequency responses taught", where="argument validation",
+                         expected="a frequency response", remedy="Estimate one from that record with rt.identify.lpm, "
+                         "or train on a record too.")
     seen, unseen = ([one for one in data if isinstance(one, Data)] for data in (training, validation))
     refuse_same(seen, unseen)
     for new in validation:

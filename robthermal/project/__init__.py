@@ -2,6 +2,7 @@
 
 from ._arguments import boxes_from_text as boxes_from_text
 from ._arguments import certificate_files as certificate_files
+from ._arguments import point_from_text as point_from_text
 from ._check_files import FileCheck as FileCheck
 from ._check_files import verify_files as verify_files
 from ._check_files import write_checks as write_checks
@@ -21,6 +22,7 @@ from ._design_request import DesignRequest as DesignRequest
 from ._design_request import design_from_text as design_from_text
 from ._diagnose import Diagnosed as Diagnosed
 from ._diagnose import Residuals as Residuals
+from ._diagnose import ResponseResiduals as ResponseResiduals
 from ._diagnose import diagnose_records as diagnose_records
 from ._diagnose_report import write_diagnosis as write_diagnosis
 from ._explain import Explanation as Explanation
@@ -30,6 +32,7 @@ from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
 from ._frequency import design_excitation as design_excitation
 from ._frequency import estimate_response as estimate_response
+from ._frequency import read_measured as read_measured
 from ._frequency import write_excitation as write_excitation
 from ._job import Comparison as Comparison
 from ._job import JobResult as JobResult
@@ -47,9 +50,10 @@ from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
-           "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project", "Residuals",
-           "boxes_from_text", "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
-           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response", "explain",
-           "explainable", "map_from_text", "map_system", "new_project", "output_folder", "read_coupling",
-           "read_project", "rebuild_report", "run_job", "verify_files", "write_certify", "write_checks",
-           "write_coupling", "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]
+           "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project",
+           "Residuals", "ResponseResiduals", "boxes_from_text", "certificate_files", "certify_system", "check_free",
+           "couple_subsystems", "demo_project", "design_excitation", "design_from_text", "design_system",
+           "diagnose_records", "estimate_response", "explain", "explainable", "map_from_text", "map_system",
+           "new_project", "output_folder", "point_from_text", "read_coupling", "read_measured", "read_project",
+           "rebuild_report", "run_job", "verify_files", "write_certify", "write_checks", "write_coupling",
+           "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]

@@ -63,6 +63,38 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
                  method=method, structure=structure, large=large)
 
 
+def point_from_text(system: System, values: Sequence[str]) -> dict[str, float]:
+    """Operating point from the command line.
+
+    Parameters
+    ----------
+    system : System
+        Whose unit ambients are given in.
+    values : sequence of str
+        ``NAME=VALUE``: heaters [unit], module currents [A], ambients [unit of the file].
+
+    Returns
+    -------
+    dict
+        Ambients in kelvin.
+
+    Raises
+    ------
+    InputError
+        Another form.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.point_from_text(rt.systems.two_module(), ["m1=0.8"])
+    {'m1': 0.8}
+    """
+    given = dict(_value(text, "--operating-point") for text in values)
+    unit, option = system.temperature_unit, "--operating-point"
+    return {name: in_kelvin(value, unit, f"{option} {name}") if name in system.ambients else value
+            for name, value in given.items()}
+
+
 def certificate_files(paths: Sequence[Path]) -> list[Path]:
     """Certificate files among files and folders.
 

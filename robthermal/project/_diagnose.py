@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from ..calibration._data import as_data
 from ..calibration._score import validate
-from ..diagnosis import Diagnosis, Refit, diagnose
+from ..diagnosis import Along, Diagnosis, Refit, diagnose
+from ..diagnosis._frequency_model import AlongResponse
 from ..errors import Diverged, InputError
+from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System
 
@@ -42,6 +45,43 @@ class Residuals:
     after: dict[str, Array]
 
 
+    @property
+    def frequency(self) -> Array:
+        """Frequencies of `spectra` [Hz]."""
+        return np.asarray(self._welch(np.zeros_like(self.time))[0])
+
+    def spectra(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Amplitude spectral densities [K/√Hz] of the residuals before and after, by Welch's method."""
+        before, after = ({name: np.sqrt(self._welch(values)[1]) for name, values in residuals.items()}
+                         for residuals in (self.before, self.after))
+        return before, after
+
+    def _welch(self, values: Array) -> tuple[Array, Array]:
+        n = values.size
+        f, power = welch(values, fs=1.0 / float(self.time[1] - self.time[0]), nperseg=max(min(n, 8), n // 4))
+        return f[1:], power[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseResiduals:
+    """What two models leave of one frequency response.
+
+    Parameters
+    ----------
+    name : str
+        Of the response.
+    frequency : ndarray, shape (n,)
+        Of its bins [Hz].
+    before, after : dict
+        {"output/input": |measured - model| (n,)} [output unit / input unit].
+    """
+
+    name: str
+    frequency: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
     """A diagnosis with what its report draws.
@@ -52,12 +92,15 @@ class Diagnosed:
         What was found.
     residuals : tuple of Residuals
         One per record.
+    responses : tuple of ResponseResiduals
+        One per frequency response fitted.
     files : tuple of Path
         System file and records.
     """
 
     diagnosis: Diagnosis
     residuals: tuple[Residuals, ...]
+    responses: tuple[ResponseResiduals, ...]
     files: tuple[Path, ...]
 
     @property
@@ -66,10 +109,11 @@ class Diagnosed:
         return self.diagnosis.outcome.ok
 
 
-def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Record],
-                     validation: Sequence[Record] = (), progress: Callable[[str], None] = lambda stage: None
-                     ) -> Diagnosed:
-    """Diagnose a system on records.
+def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Record | FrequencyResponse],
+                     validation: Sequence[Record | FrequencyResponse] = (),
+                     progress: Callable[[str], None] = lambda stage: None, *,
+                     operating_point: Mapping[str, float] | None = None, session_gain: bool = False) -> Diagnosed:
+    """Diagnose a system on records and frequency responses.
 
     Parameters
     ----------
@@ -77,10 +121,12 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
         Nominal.
     files : tuple of Path
         Input files, for their hashes.
-    train, validation : sequence of Record
+    train, validation : sequence of Record or FrequencyResponse
         Fitted, and not seen by any fit.
     progress : callable, optional
         Called with a sentence before every stage.
+    operating_point, session_gain
+        As in `rt.diagnose`.
 
     Returns
     -------
@@ -106,19 +152,32 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     (True, 'sensor_lag(T)', 'train')
     """
     try:
-        found = diagnose(system, list(train), validation=list(validation) or None, progress=progress)
+        found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
+                         operating_point=operating_point or None, session_gain=session_gain)
     except InputError as error:
         where = error.where.replace("argument records", "training records")
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
         raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
     progress("running both models freely")
-    return Diagnosed(found, (*_trained(found), *_unseen(found, validation)), files)
+    records = [one for one in validation if isinstance(one, Record)]
+    return Diagnosed(found, (*_trained(found), *_unseen(found, records)), tuple(_responses(found)), files)
 
 
 def _trained(found: Diagnosis) -> Iterator[Residuals]:
-    for path, before, after in zip(found.nominal.along, found.nominal.residuals, found.fit.residuals, strict=True):
-        names = path.one.sensors
-        yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
+    for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
+        if isinstance(path, Along):
+            names = path.one.sensors
+            yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
+
+
+def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
+    """Real parts stand above imaginary parts."""
+    for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
+        if isinstance(path, AlongResponse):
+            n = path.one.frequencies.size
+            sizes = (np.hypot(r[:n], r[n:]) for r in (before, after))
+            yield ResponseResiduals(path.one.label, path.one.frequencies,
+                                    *(_by_name(path.one.sensors, size) for size in sizes))
 
 
 def _unseen(found: Diagnosis, records: Sequence[Record]) -> Iterator[Residuals]:

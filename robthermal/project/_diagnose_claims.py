@@ -66,7 +66,9 @@ def _claim(title: str, sentence: str, holds: bool, reason: str, box: str, margin
 
 
 def _records(result: Diagnosed, kind: str) -> str:
-    return "; ".join(f"{kind}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind)
+    said = [f"{kind}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind]
+    said += [f"{kind}: {one.name}, {one.frequency.size} bins" for one in result.responses if kind == "train"]
+    return "; ".join(said)
 
 
 def _margin(found: Diagnosis) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from ..diagnosis import Diagnosis, effects
-from ..report import Figure, Report, Section, Table, house_style, residuals_before_after
+from ..report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
 from ..signals import Record
 from ..thermal import write_system
-from ._diagnose import Diagnosed, Residuals
+from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._diagnose_claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose_ranking import ranking
 from ._evidence import write_report
@@ -113,17 +113,18 @@ def _effect_section(found: Diagnosis) -> Section:
 
 def _gap_section(result: Diagnosed) -> Section:
     found = result.diagnosis
-    rows = [{"records": kind, "before [K]": gap.before, "after [K]": gap.after, "noise alone [K]": gap.noise}
+    rows = [{"records": kind, "before": gap.before, "after": gap.after, "noise alone": gap.noise, "unit": gap.unit}
             for kind, gap in found.gap.items()]
-    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before [K]": _rms(one.before[name]),
-              "after [K]": _rms(one.after[name]), "noise alone [K]": float("nan")}
+    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before": _rms(one.before[name]),
+              "after": _rms(one.after[name]), "noise alone": float("nan"), "unit": "K"}
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
             "the validation records only the initial temperatures were estimated, from the first tenth.")
     if found.provisional:
         text += " The effects are provisional, not names."
-    figures = tuple(_figure(one, found) for one in result.residuals)
-    return Section("Residual before and after", text, figures=figures,
+    figures = [_figure(one, found) for one in result.residuals]
+    figures += [_spectrum(one) for one in result.residuals] + [_response(one) for one in result.responses]
+    return Section("Residual before and after", text, figures=tuple(figures),
                    tables=(Table(pd.DataFrame(rows), "Residuals, root mean square; all sensors, then each."),),
                    anchor="gap")
 
@@ -136,6 +137,22 @@ def _figure(one: Residuals, found: Diagnosis) -> Figure:
     return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
                        caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
                        "alone would give.")
+
+
+def _spectrum(one: Residuals) -> Figure:
+    names = sorted(one.before, key=lambda name: -_rms(one.before[name]))[:_DRAWN]
+    before, after = ({name: sizes[name] for name in names} for sizes in one.spectra())
+    drawn = spectra_before_after(one.frequency, before, after, unit="K/√Hz", title=f"{one.kind}: {one.name}")
+    return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {one.kind} record, without and with the "
+                       "effects.", caption=f"The same residuals over frequency, {one.kind} record.")
+
+
+def _response(one: ResponseResiduals) -> Figure:
+    names = list(one.before)[:_DRAWN]
+    before, after = ({name: sizes[name] for name in names} for sizes in (one.before, one.after))
+    drawn = spectra_before_after(one.frequency, before, after, unit="output/input", title=one.name)
+    return Figure.draw(drawn, alt="Residuals of the frequency response, without and with the effects.",
+                       caption=f"Measured − model, {one.name}.")
 
 
 def _located_section(found: Diagnosis) -> Section:

@@ -154,3 +154,32 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
                output_names=[]).save(file)
         written.append(file)
     return written
+
+
+def read_measured(paths: Sequence[Path], system: System) -> list[Record | FrequencyResponse]:
+    """Read what a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Responses end in .json or .npz; everything else is a record.
+    system : System
+        Gives the columns.
+
+    Returns
+    -------
+    list of Record or FrequencyResponse
+
+    Raises
+    ------
+    InputError
+        As the readers.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.read_measured([], rt.systems.two_module())
+    []
+    """
+    return [FrequencyResponse.load(path) if path.suffix.lower() in (".json", ".npz") else read_record(path, system)
+            for path in paths]

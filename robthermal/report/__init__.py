@@ -12,6 +12,7 @@ from ._html import write_html as write_html
 from ._provenance import file_hash as file_hash
 from ._provenance import versions as versions
 from ._residuals import residuals_before_after as residuals_before_after
+from ._residuals import spectra_before_after as spectra_before_after
 from ._store import read_content as read_content
 from ._store import write_content as write_content
 from ._style import house_style as house_style
@@ -23,4 +24,5 @@ from ._traces import measured_against_model as measured_against_model
 
 __all__ = ["Claim", "Evidence", "Figure", "Printed", "Report", "Section", "Table", "box_ranges", "current_limits",
            "file_hash", "house_style", "load_curve", "measured_against_model", "read_content",
-           "residuals_before_after", "versions", "write_content", "write_html", "write_json", "write_junit"]
+           "residuals_before_after", "spectra_before_after", "versions", "write_content", "write_html", "write_json",
+           "write_junit"]

@@ -1,4 +1,4 @@
-"""Drawing of what a model leaves unexplained, before and after it was changed."""
+"""Drawings of what a model leaves unexplained, before and after it was changed: over time, over frequency."""
 
 from __future__ import annotations
 
@@ -45,13 +45,7 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     ['before', 'after']
     """
     t = np.asarray(time, dtype=float)
-    if not before or list(before) != list(after):
-        raise InputError(f"sensors {list(before)} before and {list(after)} after", where="residuals_before_after",
-                         expected="the same sensors, at least one")
-    for name, values in [*before.items(), *after.items()]:
-        if np.shape(values) != t.shape:
-            raise InputError(f"{name!r} has shape {np.shape(values)}", where="residuals_before_after",
-                             expected=f"one value per time, shape {t.shape}")
+    _check(t, before, after, "residuals_before_after", "sensors")
     scale, unit = time_unit(t)
     with house_style():
         figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
@@ -68,3 +62,60 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
         if title:
             figure.suptitle(plain(title), x=0.02, ha="left")
     return figure
+
+
+def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
+                         unit: str, title: str = "") -> Any:
+    """Draw the size of residuals over frequency for two models, one below the other and on one scale.
+
+    Parameters
+    ----------
+    frequency : array_like
+        [Hz].
+    before, after : mapping
+        {channel: size} of the same channels.
+    unit : str
+        Of the sizes.
+    title : str, optional
+        Heading.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        No channels, different channels, arrays of different length.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> figure = rt.report.spectra_before_after([0.1, 0.2], {"T1": [1.0, 2.0]}, {"T1": [0.1, 0.1]}, unit="K/√Hz")
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['before', 'after']
+    """
+    f = np.asarray(frequency, dtype=float)
+    _check(f, before, after, "spectra_before_after", "channels")
+    with house_style():
+        figure, axes = canvas(4.8, 2, sharex=True, sharey=True)
+        for ax, sizes, what in zip(axes, (before, after), ("before", "after"), strict=True):
+            for i, (name, values) in enumerate(sizes.items()):
+                ax.loglog(f, np.asarray(values, dtype=float), color=COLOURS[i % len(COLOURS)],
+                          linestyle=("-", "--", ":")[i // len(COLOURS) % 3], linewidth=0.8, label=plain(name))
+            ax.set(ylabel=f"|measured −\nmodel| [{unit}]", title=what)
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
+        axes[-1].set(xlabel="frequency [Hz]")
+        if title:
+            figure.suptitle(plain(title), x=0.02, ha="left")
+    return figure
+
+
+def _check(x: Any, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], where: str, what: str) -> None:
+    if not before or list(before) != list(after):
+        raise InputError(f"{what} {list(before)} before and {list(after)} after", where=where,
+                         expected=f"the same {what}, at least one")
+    for name, values in [*before.items(), *after.items()]:
+        if np.shape(values) != x.shape:
+            raise InputError(f"{name!r} has shape {np.shape(values)}", where=where,
+                             expected=f"one value per sample, shape {x.shape}")

@@ -122,4 +122,6 @@ def all_cases(seeds: int, topologies: list[str], effects: list[str] | None = Non
     out += [Case(where, group, effect, 2 * first + seed) for where in topologies for group, own in names.items()
             for effect in own if effect != "polarity_memory" or PLANTS[where]().modules
             for seed in range(counts[group])]
+    counts["hidden"] = seeds
+    out.sort(key=lambda case: case.seed / counts[case.group])  # a run that is cut short has seen a share of everything
     return [case for case in out if effects is None or case.effect in effects]
