@@ -22,7 +22,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 import robthermal as rt
 
 DEFAULT = Path(__file__).resolve().parents[3] / "shared" / "data"
-TRAINING, HEATER_1, STEPS = "random_both_heaters_run_01.csv", "random_heater1_run_01.csv", "step_heater1_{}.csv"
+TRAINING, REPEATED = "random_both_heaters_run_01.csv", "random_both_heaters_run_02.csv"
+HEATER_1, STEPS = "random_heater1_run_01.csv", "step_heater1_{:03}.csv"
 SAMPLE = 5.0  # s; the inputs of the random runs change every 35 s
 GLITCH = 3.0  # K from the running median
 STEP = 0.489  # K, of the converter: all the noise that a running median leaves
