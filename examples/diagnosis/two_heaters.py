@@ -38,13 +38,15 @@ def nominal(room: float) -> rt.System:
     """Each heater loses heat to the room by convection, and that is all; m c_p = 2 J/K stays fixed."""
     heaters = {"heater_1": ("Q1", 0.0123, "T1"), "heater_2": ("Q2", 0.0062, "T2")}
     ranges = {f"links.{name}-room.conductance": {"lower": 1e-4, "upper": 0.05} for name in heaters}
+    ranges |= {f"inputs.{q}.gain": {"lower": 1e-3, "upper": 0.1} for q, _, _ in heaters.values()}
     return rt.System(
-        name="board with two heaters, convection only", temperature_unit="degC", ambients={"room": {"temperature": room}},
+        name="board with two heaters, convection only", temperature_unit="degC",
+        ambients={"room": {"temperature": room}},
         lumps={name: {"capacity": 2.0, "disturbance": DRAUGHT} for name in heaters},
         links=[{"between": (name, "room"), "conductance": 8e-3} for name in heaters],
         inputs={q: {"lump": name, "gain": gain, "limits": (0.0, 100.0)} for name, (q, gain, _) in heaters.items()},
         sensors={sensor: {"lump": name, "noise": NOISE[sensor]} for name, (_, _, sensor) in heaters.items()},
-        fit={**ranges, "inputs.Q1.gain": {"lower": 1e-3, "upper": 0.1}, "inputs.Q2.gain": {"lower": 1e-3, "upper": 0.1}})
+        fit=ranges)
 
 
 def read_run(folder: Path, file: str) -> rt.Record:

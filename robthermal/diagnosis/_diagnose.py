@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ..calibration._ranges import Choice
 from ..errors import Outcome
@@ -33,6 +34,7 @@ _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def diagnose(system: System, records: Measured | Sequence[Measured], *,
              validation: Measured | Sequence[Measured] | None = None,
              parameters: Choice = None, effects: Iterable[str] | None = None,
@@ -160,8 +162,8 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         rounds, fit = (*rounds, decision), decision.best.fit
         if hopeless:
             return rounds, fit
-    if len(rounds) < 2:
-        return rounds, fit
+    if len(rounds) < 2 or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
+        return rounds, fit  # a large misfit beside three effects: choosing them again will not remove it
     progress(f"choosing each of {len(rounds)} effects again beside the others")
     return revised(rounds, nominal, effects)
 

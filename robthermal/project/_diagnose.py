@@ -73,7 +73,7 @@ class ResponseResiduals:
     frequency : ndarray, shape (n,)
         Of its bins [Hz].
     before, after : dict
-        {"output/input": |measured - model| (n,)} [output unit / input unit].
+        {"output/input": size of measured - model (n,)} [output unit / input unit].
     """
 
     name: str
