@@ -9,6 +9,7 @@ from typing import Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from ..errors import Diverged, InputError, Outcome
 from ..identify import FrequencyResponse
@@ -48,6 +49,7 @@ def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Ch
               method: Method = "output_error") -> Fit: ...
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def calibrate(system: System, data: Record | Sequence[Record] | FrequencyResponse, *, parameters: Choice = None,
               validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
               noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ..calibration import Fit, calibrate
 from ..signals import Record, read_record
@@ -82,6 +83,7 @@ class JobResult:
         return self.certification.holds
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def run_job(project: Project, progress: Progress = lambda stage: None) -> JobResult:
     """Run the main job of a project.
 
