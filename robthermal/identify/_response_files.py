@@ -36,8 +36,10 @@ _ARRAYS = (
 )
 _LISTS = ("input_names", "output_names", "notes")
 _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
+# What the readers of json, numpy and scipy raise for damaged files. NotImplementedError: MATLAB's 7.3 format, or a
+# compression that zipfile does not know. RecursionError: nesting.
 _UNREADABLE = (
-    *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError),
+    *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError, RecursionError),
     *(MatReadError, zipfile.BadZipFile, zlib.error),
 )
 _SUFFIXES = (".json", ".mat", ".npz")
@@ -79,8 +81,33 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
     if missing:
         raise InputError(f"lacks {', '.join(missing)}", where=str(path), remedy="Write it again with save.")
     arguments = {name: content[name] for name in _ARRAYS if name in content}
-    arguments |= {name: [str(text) for text in content[name]] for name in _LISTS}
-    return arguments | {name: kind(content[name]) for name, kind in _SCALARS.items()}
+    arguments |= {name: _texts(content[name], name, path) for name in _LISTS}
+    arguments |= {name: _scalar(content[name], name, kind, path) for name, kind in _SCALARS.items()}
+    shape = len(arguments["output_names"]), len(arguments["input_names"]), arguments["frequencies"].size
+    if arguments["response"].shape != shape:
+        raise InputError(f"its response has shape {arguments['response'].shape}", where=str(path),
+                         expected=f"{shape}, from its names and frequencies", remedy="Write it again with save.")
+    return arguments
+
+
+def _texts(value: Any, name: str, path: Path) -> list[str]:
+    if not isinstance(value, list | np.ndarray) or not all(isinstance(text, str) for text in value):
+        raise InputError(f"its {name} are {str(value)[:40]!r}", where=str(path), expected="a list of texts")
+    return [str(text) for text in value]
+
+
+def _scalar(value: Any, name: str, kind: type, path: Path) -> Any:
+    """A text, or a number that can be one: sample times and sample counts are positive, widths not negative."""
+    if kind is str:
+        good = isinstance(value, str)
+    else:
+        numeric = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+        good = numeric and math.isfinite(value) and value == kind(value)
+        good = good and (value > 0 or (name == "half_width" and value == 0))
+    if not good:
+        raise InputError(f"its {name} is {str(value)[:40]!r}", where=str(path),
+                         expected={float: "a number above 0", int: "a whole number", str: "a text"}[kind])
+    return kind(value)
 
 
 def _checked(path: str | PathLike[str]) -> Path:

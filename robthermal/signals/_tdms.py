@@ -13,6 +13,7 @@ from ..errors import InputError
 from ._checks import Array
 from ._source import equally_long, numeric, refuse_large
 
+# What npTDMS raises for damaged files, by what its parser trips over. NotImplementedError: data it does not know.
 _DAMAGED = (ValueError, KeyError, TypeError, OSError, EOFError, IndexError, struct.error, NotImplementedError)
 
 
@@ -36,7 +37,7 @@ class TdmsSource:
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise InputError(f"channel {twice!r} stands in several groups", where=f"{path}", remedy="Keep one of them.")
-        self._waveforms = {channel.name: _waveform(channel) for channel in found}
+        self._waveforms = {channel.name: _waveform(channel, path) for channel in found}
         self._has_clock = any(name.split("[")[0].strip().lower() == "time" for name in names)
         self._made_time = () if self._has_clock else ("time",)
         self.headers = self._made_time + tuple(names)
@@ -78,9 +79,16 @@ class TdmsSource:
         return offset + increment * rows
 
 
-def _waveform(channel: Any) -> tuple[float | None, float]:
-    increment = channel.properties.get("wf_increment")
-    return (None if increment is None else float(increment), float(channel.properties.get("wf_start_offset", 0.0)))
+def _waveform(channel: Any, path: Path) -> tuple[float | None, float]:
+    """Increment and offset of the samples [s]."""
+    found: list[float | None] = []
+    for name, default in (("wf_increment", None), ("wf_start_offset", 0.0)):
+        value = channel.properties.get(name, default)
+        if value is not None and not (isinstance(value, int | float | np.number) and np.isfinite(value)):
+            raise InputError(f"channel {channel.name!r}: {name} is {value!r}", where=f"{path}",
+                             expected="a finite number [s]")
+        found.append(None if value is None else float(value))
+    return found[0], found[1] or 0.0
 
 
 def _require_nptdms() -> Any:

@@ -239,6 +239,15 @@ def test_tdms_with_waveform_increment(tmp_path: Path) -> None:
     check(read(path))
 
 
+@pytest.mark.parametrize("clock", [{"wf_increment": "fast"}, {"wf_increment": np.nan}, {"wf_increment": np.inf},
+                                   {"wf_increment": 0.5, "wf_start_offset": "noon"}])
+def test_tdms_with_a_clock_that_is_no_number(clock: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "run.tdms"
+    write_tdms(path, [("a", "u", U, clock), ("a", "T", T, clock)])
+    with pytest.raises(InputError, match="channel 'u': wf_.* is .*a finite number"):
+        rt.read_record(path, inputs=["u"], outputs=["T"])
+
+
 def test_tdms_refuses(tmp_path: Path) -> None:
     path = tmp_path / "run.tdms"
 

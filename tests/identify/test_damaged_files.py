@@ -1,0 +1,60 @@
+"""Files of frequency responses that somebody or something has damaged: refused in words, nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    rng = np.random.default_rng(0)
+    record = rt.Record(sample_time=1.0, inputs=rng.normal(size=200), outputs=rng.normal(size=200), input_names=["u"],
+                       output_names=["y"])
+    path = tmp_path_factory.mktemp("response") / "G.json"
+    rt.identify.lpm(record).save(path)
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def refused(text: str, path: Path) -> None:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(rt.InputError, match=path.name):
+        rt.identify.FrequencyResponse.load(path)
+
+
+NONE = ["x", None, [], {}, -3, True, "1" * 5000, float("nan"), float("inf")]
+
+
+@pytest.mark.parametrize(("key", "value"), [
+    *((key, value) for key in ("sample_time", "n_samples", "half_width") for value in NONE),
+    ("sample_time", 0), ("n_samples", 0), ("n_samples", 1.5), ("half_width", 1.5)])
+def test_numbers_that_are_none(content: dict[str, Any], key: str, value: Any, tmp_path: Path) -> None:
+    refused(json.dumps({**content, key: value}), tmp_path / "G.json")
+
+
+@pytest.mark.parametrize("value", ["y", None, 7, {}, [1], [[]], ["y", "z"]])
+@pytest.mark.parametrize("key", ["input_names", "output_names"])
+def test_names_that_are_none(content: dict[str, Any], key: str, value: Any, tmp_path: Path) -> None:
+    refused(json.dumps({**content, key: value}), tmp_path / "G.json")
+
+
+@pytest.mark.parametrize("text", ["[1]", "null", "{", "[" * 100_000, '{"a":' * 100_000])
+def test_other_documents(text: str, tmp_path: Path) -> None:
+    refused(text, tmp_path / "G.json")
+
+
+def test_what_is_not_damaged_still_loads(content: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "G.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    for suffix in (".json", ".npz", ".mat"):
+        G = rt.identify.FrequencyResponse.load(path)
+        G.save(tmp_path / f"again{suffix}")
+        again = rt.identify.FrequencyResponse.load(tmp_path / f"again{suffix}")
+        np.testing.assert_array_equal(again.response, G.response)
+        assert (again.sample_time, again.half_width, again.input_names) == (G.sample_time, G.half_width, G.input_names)
