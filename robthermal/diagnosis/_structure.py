@@ -25,6 +25,7 @@ from ._sessions import Sessions
 Array = NDArray[np.float64]
 _KEPT = 2
 _STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+_UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
 
 
@@ -288,8 +289,9 @@ class Structure:
                 other = _numbers(self.system(moved))
                 columns.append({name: (other[name] - values[name]) / step for name in values
                                 if other[name] != values[name]})
-            for i in range(p):  # what an effect derives from a nominal parameter moves with it
-                columns[i] = _moved_by(self, v, i, values, columns[i])
+            if _derives(self, v, values, columns[:p]):
+                for i in range(p):  # what an effect derives from a nominal parameter moves with it
+                    columns[i] = _moved_by(self, v, i, values, columns[i])
         for column in columns:
             names |= dict.fromkeys(column)
         return list(names), np.array([[column.get(name, 0.0) for column in columns] for name in names]
@@ -298,6 +300,19 @@ class Structure:
 
 def _numbers(system: System) -> dict[str, float]:
     return {name: system.parameter(name) for name in system.parameter_names}
+
+
+def _derives(structure: Structure, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
+    """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?"""
+    p = len(columns)
+    steps = _STEP * np.maximum(np.abs(v[:p]), 1e-3)
+    moved = _numbers(structure.system(np.concatenate([v[:p] + steps, v[p:]])))
+    for name, value in values.items():
+        change = moved[name] - value
+        known = sum(float(step) * column.get(name, 0.0) for step, column in zip(steps, columns, strict=True))
+        if abs(change - known) > _UNLIKE * abs(change):
+            return True
+    return False
 
 
 def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], own: dict[str, float]

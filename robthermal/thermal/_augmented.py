@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ._equations import Equations
 from ._layout import Layout
 from ._parameter_heat import AFFINE, unit_change
-from ._parameters import locate
+from ._parameters import locate, parts_of
+from ._parts import Link, Module
 from ._ports import PortHeat
 from ._terms import Array
 
@@ -94,16 +95,39 @@ def _periodic(eq: Equations, layout: Layout, F: Array) -> None:
             F[layout.source_meter, sine] += load.heat
 
 
+def without_meters(parts: Augmented, n_free: int) -> Augmented:
+    """The states before the meters, which feed nothing back."""
+    return Augmented(parts.F[:n_free, :n_free], parts.B[:n_free], parts.N[:n_free], parts.ports)
+
+
 def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
-    """Derivative of F, B and N with respect to a parameter of the linear part; None when it has no part in it."""
+    """Derivative of F, B and N by a parameter of the linear part, meters left out; None when it has no part in it."""
     table, part, field = locate(eq.system, name)
+    own = without_meters(parts, Layout(eq).n_free)
+    if (table, field) in (("links", "conductance"), ("modules", "conductance.value")):
+        return _slope_by_conductance(eq, own, parts_of(eq.system, table)[part])
     if (table, field) in AFFINE:  # a difference is exact
         changed, step = unit_change(eq.system, name)
-        other = augment(Equations(changed))
-        differences = ((other.F - parts.F) / step, (other.B - parts.B) / step, (other.N - parts.N) / step)
+        other = without_meters(augment(Equations(changed)), len(own.F))
+        differences = ((other.F - own.F) / step, (other.B - own.B) / step, (other.N - own.N) / step)
         return Augmented(*differences, parts.ports)
     rows = _rows_of_scale(eq, table, part, field)
-    return _rows_scaled(parts, rows, -1 / eq.system.parameter(name)) if rows else None
+    return _rows_scaled(own, rows, -1 / eq.system.parameter(name)) if rows else None
+
+
+def _slope_by_conductance(eq: Equations, parts: Augmented, path: Link | Module) -> Augmented:
+    """A linear conductance brings (T_b - T_a) / C_a into a, and as much the other way into b."""
+    F, B, n = np.zeros_like(parts.F), np.zeros_like(parts.B), len(eq.capacity)
+    a, b = (eq.index[node] for node in (path.between if isinstance(path, Link) else (path.hot, path.cold)))
+    for node, other in ((a, b), (b, a)):
+        if node < n:
+            F[node, node] -= 1 / eq.capacity[node]
+        if node < n and other < n:
+            F[node, other] += 1 / eq.capacity[node]
+        elif node < n:
+            B[node, eq.drives.ambients.start + other - n] += 1 / eq.capacity[node]
+            B[node, eq.drives.one] += eq.gradient[node] / eq.capacity[node]
+    return Augmented(F, B, np.zeros_like(parts.N), parts.ports)
 
 
 def _rows_of_scale(eq: Equations, table: str, part: str, field: str) -> list[int]:

@@ -16,7 +16,6 @@ from math import factorial
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from ._augmented import Augmented
 from ._terms import Array
@@ -26,6 +25,9 @@ NODES = 0.5 * (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE))
 _MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))  # nodal values -> coefficients of (s/h)^k
 # nodal values -> last two Chebyshev coefficients
 TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]
+_TERMS = 18  # of the series of a matrix of norm 1: 1/18! is below a rounding
+_FUNCTIONS = DEGREE + 2
+_FACTORIALS = np.array([factorial(k) for k in range(_TERMS + _FUNCTIONS)], float)
 
 
 @dataclass(frozen=True)
@@ -48,24 +50,57 @@ class Step:
 
 
 def step_matrices(parts: Augmented, h: float) -> Step:
-    """Matrices of a step of length h [s]; complex `parts` are allowed (complex-step derivatives)."""
-    nz, nu, nq = parts.F.shape[0], parts.B.shape[1], parts.N.shape[1]
-    size = nz + nu + (DEGREE + 1) * nq
-    H = np.zeros((size, size), parts.F.dtype)
-    H[:nz, :nz], H[:nz, nz:nz + nu], H[:nz, nz + nu:nz + nu + nq] = parts.F * h, parts.B * h, parts.N * h
-    chain = np.arange(nz + nu, size - nq)
-    H[chain, chain + nq] = 1.0  # v_j' = v_(j+1): the chain that makes monomials
-    rows = [expm(c * H)[:nz] for c in NODES[1:]]
-    K, Ku, M = [], [], []
-    for i, block in enumerate(rows, start=1):
-        keep = parts.ports if i < DEGREE else np.concatenate([parts.ports, np.arange(nz)])
-        block = block[keep]
-        K.append(block[:, :nz])
-        Ku.append(block[:, nz:nz + nu])
-        powers = block[:, nz + nu:].reshape(len(keep), DEGREE + 1, nq)
-        powers = powers * np.array([factorial(k) for k in range(DEGREE + 1)])[:, None]
-        M.append(np.einsum("rkq,kj->rjq", powers, _MONOMIALS).reshape(len(keep), (DEGREE + 1) * nq))
-    return Step(np.concatenate(K), np.concatenate(Ku), np.concatenate(M))
+    """Matrices of a step of length h [s].
+
+    Complex `parts` (complex-step derivatives) and leading axes of F, B and N (many derivatives at once) are allowed;
+    the matrices then have the same leading axes.
+    """
+    theta = node_integrals(parts.F * h)
+    many, nz, nq = parts.F.shape[:-2], parts.F.shape[-1], parts.N.shape[-1]
+    to_nodes, to_end = theta[..., parts.ports, :], theta[..., -1, :, :, :]
+
+    def stacked(function: int, by: Array) -> Array:
+        """Rows [ports at nodes 1..p, z at the end] of one of the functions times a matrix."""
+        nodes = to_nodes[..., function, :, :] @ by[..., None, :, :]
+        return np.concatenate([nodes.reshape(*many, DEGREE * parts.ports.size, by.shape[-1]), to_end[..., function, :, :] @ by], axis=-2)
+
+    powers = np.stack([factorial(k) * stacked(k + 1, parts.N * h) for k in range(DEGREE + 1)], axis=-2)  # of s/h
+    M = np.einsum("...rkq,kj->...rjq", powers, _MONOMIALS)
+    return Step(stacked(0, np.eye(nz)), stacked(1, parts.B * h), M.reshape(*M.shape[:-2], (DEGREE + 1) * nq))
+
+
+def node_integrals(Z: Array) -> Array:
+    """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at the nodes c = 1..p: e^(cZ), and the integrals of e^((c-s)Z) s^(j-1) / (j-1)!.
+
+    A Taylor series at c / 2^s, then s doublings θ_j(2c) = θ_0 θ_j + Σ_(k=1..j) c^(j-k) / (j-k)! θ_k
+    (Al-Mohy and Higham 2011, section 3).
+
+    Parameters
+    ----------
+    Z : ndarray, shape (..., n, n)
+        Rate times step [-].
+
+    Returns
+    -------
+    ndarray, shape (..., p, p + 2, n, n)
+        By node and j.
+    """
+    size = float(np.abs(Z).sum(axis=-1).max(initial=0.0))
+    doublings = max(0, int(np.ceil(np.log2(size)))) if size > 1.0 else 0
+    many, n = Z.shape[:-2], Z.shape[-1]
+    scaled, powers = Z / 2.0**doublings, [np.broadcast_to(np.eye(n), Z.shape)]
+    for _ in range(_TERMS - 1):
+        powers.append(powers[-1] @ scaled)
+    m, j = np.arange(_TERMS), np.arange(_FUNCTIONS)[:, None]
+    c = NODES[1:, None, None] / 2.0**doublings
+    weights = NODES[1:, None, None] ** m * c**j / _FACTORIALS[m + j]
+    theta = np.moveaxis(np.tensordot(weights, np.stack(powers), axes=1), (0, 1), (-4, -3))
+    for _ in range(doublings):
+        mixing = np.where((j.T >= 1) & (j.T <= j), c ** np.maximum(j - j.T, 0) / _FACTORIALS[np.maximum(j - j.T, 0)], 0.0)
+        mixed = mixing @ theta.reshape(*many, DEGREE, _FUNCTIONS, n * n)
+        theta = theta[..., :1, :, :] @ theta + mixed.reshape(theta.shape)
+        c = 2.0 * c
+    return np.asarray(theta)
 
 
 def window_matrices(step: Step, ports: NDArray[np.intp], samples: int) -> Step:

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._augmented import Augmented, slope
-from ._collocation import DEGREE, Step, step_matrices
+from ._augmented import Augmented, slope, without_meters
+from ._collocation import DEGREE, step_matrices
 from ._exponential import Integrator, Path
+from ._parameter_heat import touched
 from ._schedule import Schedule
 from ._terms import Array
 
 _CHUNK = 1024
+_ENTRIES = 60000  # of all matrices F that are differentiated at once: their step matrices have 35 times as many
 _IMAGINARY = 1e-40
 
 
@@ -51,17 +53,27 @@ class Sensitivity:
         self.n_free = integrator.layout.n_free  # meters feed nothing back
         self._linear = {name: part for name in self.names
                         if (part := slope(integrator.eq, integrator.parts, name)) is not None}
-        self._steps: dict[tuple[str, int, int], Step] = {}
+        eq = integrator.eq
+        self._acting = [name for name in self.names  # the others move no more than the start
+                        if name in self._linear or name in held or any(True for _ in touched(eq, name))]
+        self._columns = [self._acting.index(name) for name in self._linear]
+        self._steps: dict[tuple[int, int], Array] = {}
 
-    def _step_slope(self, name: str, kind: int, level: int) -> Step:
-        """Derivative of the step matrices by a complex step."""
-        if (name, kind, level) not in self._steps:
-            parts, d = self.by.parts, self._linear[name]
-            moved = Augmented(parts.F + 1j * _IMAGINARY * d.F, parts.B + 1j * _IMAGINARY * d.B,
-                              parts.N + 1j * _IMAGINARY * d.N, parts.ports)
-            s = step_matrices(moved, self.by.lengths[kind] / 2**level)
-            self._steps[name, kind, level] = Step(*(m.imag / _IMAGINARY for m in (s.K, s.Ku, s.M)))
-        return self._steps[name, kind, level]
+    def _step_slopes(self, kind: int, level: int) -> Array:
+        """Derivatives of a step's matrices [K Ku M] by all parameters of the linear part, (columns, rows, P)."""
+        if (kind, level) not in self._steps:
+            parts, h = without_meters(self.by.parts, self.n_free), self.by.lengths[kind] / 2**level
+            size = max(1, _ENTRIES // self.n_free**2)
+            every, done = list(self._linear.values()), []
+            for first in range(0, len(every), size):
+                d = every[first:first + size]
+                moved = Augmented(*(own + 1j * _IMAGINARY * np.stack(slopes) for own, slopes in (
+                    (parts.F, [part.F for part in d]), (parts.B, [part.B for part in d]),
+                    (parts.N, [part.N for part in d]))), parts.ports)
+                s = step_matrices(moved, h)
+                done.append(np.concatenate([s.K, s.Ku, s.M], axis=2).imag / _IMAGINARY)
+            self._steps[kind, level] = np.ascontiguousarray(np.concatenate(done).T)
+        return self._steps[kind, level]
 
     def along(self, path: Path, plan: Schedule, start: Array) -> Array:
         """Propagate along a path.
@@ -99,11 +111,13 @@ class Sensitivity:
         """Linear maps of a chunk of steps."""
         n, segment, level = self.n_free, path.segment[chunk], path.level[chunk]
         kind = plan.kind[segment]
-        F, P = np.empty((len(segment), n, n)), np.empty((len(segment), n, len(self.names)))
+        F, P = np.empty((len(segment), n, n)), np.zeros((len(segment), n, len(self.names)))
+        acting = [self.names.index(name) for name in self._acting]
         for which, depth in {(int(a), int(b)) for a, b in zip(kind, level, strict=True)}:
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
-            F[own], P[own] = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
+            F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
+            P[np.ix_(own, np.ones(n, bool), acting)] = by_acting
         return Transitions(F, P)
 
     def rate_slope(self, name: str, states: Array, w: Array) -> Array:
@@ -113,7 +127,7 @@ class Sensitivity:
         out: Array = np.zeros((len(states), n))
         if name in self._linear:
             d = self._linear[name]
-            out = states @ d.F[:n, :n].T + w @ d.B[:n].T + self.by.port_heat(V) @ d.N[:n].T
+            out = states @ d.F.T + w @ d.B.T + self.by.port_heat(V) @ d.N.T
         heat = self.by.port_heat.parameter(name, V)
         return out if heat is None else out + heat @ parts.N[:n].T
 
@@ -123,7 +137,7 @@ class Sensitivity:
         V = self._at_ports(step, z, w)
         q = self.by.port_heat(V)
         G = self.by.port_heat.slopes(V)  # (S, p+1, nq, np + nw)
-        direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, P)
+        direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, parameters that act)
         S = len(z)
         M = step.M.reshape(step.M.shape[0], DEGREE + 1, self.by.nq)
         coupled = np.empty((S, nodes, DEGREE + 1, np_))
@@ -158,19 +172,19 @@ class Sensitivity:
 
     def _direct(self, kind: int, level: int, z: Array, w: Array, held: Mapping[str, Array], V: Array, q: Array,
                 G: Array) -> Array:
-        """Derivative of all rows with respect to the parameters at fixed port states."""
-        step = self.by.step(kind, level)
-        out = np.zeros((len(z), step.K.shape[0], len(self.names)))
-        flat = q.reshape(len(z), (DEGREE + 1) * self.by.nq)
-        for column, name in enumerate(self.names):
-            if name in self._linear:
-                d = self._step_slope(name, kind, level)
-                out[..., column] = z @ d.K.T + w @ d.Ku.T + flat @ d.M.T
+        """Derivative of all rows with respect to the parameters that act on a step, at fixed port states."""
+        step, rows = self.by.step(kind, level), DEGREE * self.by.ports.size + self.n_free
+        out = np.zeros((len(z), rows, len(self._acting)))
+        if self._linear:
+            d = self._step_slopes(kind, level)
+            by = np.concatenate([z[:, :self.n_free], w, q.reshape(len(z), -1)], axis=1)
+            out[..., self._columns] = (by @ d.reshape(len(d), -1)).reshape(len(z), rows, -1)
+        for column, name in enumerate(self._acting):
             heat = self.by.port_heat.parameter(name, V)
             if name in held:
-                out[..., column] += held[name] @ step.Ku.T
+                out[..., column] += held[name] @ step.Ku[:rows].T
                 through_drive = np.einsum("sjqw,sw->sjq", G[..., self.by.ports.size:], held[name])
                 heat = through_drive if heat is None else heat + through_drive
             if heat is not None:
-                out[..., column] += heat.reshape(len(z), (DEGREE + 1) * self.by.nq) @ step.M.T
+                out[..., column] += heat.reshape(len(z), -1) @ step.M[:rows].T
         return out
