@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from ._equations import Equations
 from ._layout import Layout
 from ._parameter_heat import AFFINE, unit_change
-from ._parameters import locate, parts_of
-from ._parts import Link, Module
+from ._parameters import locate
 from ._ports import PortHeat
 from ._terms import Array
 
@@ -104,8 +103,10 @@ def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
     """Derivative of F, B and N by a parameter of the linear part, meters left out; None when it has no part in it."""
     table, part, field = locate(eq.system, name)
     own = without_meters(parts, Layout(eq).n_free)
-    if (table, field) in (("links", "conductance"), ("modules", "conductance.value")):
-        return _slope_by_conductance(eq, own, parts_of(eq.system, table)[part])
+    if (table, field) == ("links", "conductance"):
+        return _slope_by_conductance(eq, own, next(x for x in eq.system.links if x.name == part).between)
+    if (table, field) == ("modules", "conductance.value"):
+        return _slope_by_conductance(eq, own, (eq.system.modules[part].hot, eq.system.modules[part].cold))
     if (table, field) in AFFINE:  # a difference is exact
         changed, step = unit_change(eq.system, name)
         other = without_meters(augment(Equations(changed)), len(own.F))
@@ -115,10 +116,10 @@ def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
     return _rows_scaled(own, rows, -1 / eq.system.parameter(name)) if rows else None
 
 
-def _slope_by_conductance(eq: Equations, parts: Augmented, path: Link | Module) -> Augmented:
+def _slope_by_conductance(eq: Equations, parts: Augmented, between: tuple[str, str]) -> Augmented:
     """A linear conductance brings (T_b - T_a) / C_a into a, and as much the other way into b."""
     F, B, n = np.zeros_like(parts.F), np.zeros_like(parts.B), len(eq.capacity)
-    a, b = (eq.index[node] for node in (path.between if isinstance(path, Link) else (path.hot, path.cold)))
+    a, b = (eq.index[node] for node in between)
     for node, other in ((a, b), (b, a)):
         if node < n:
             F[node, node] -= 1 / eq.capacity[node]

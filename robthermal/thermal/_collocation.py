@@ -57,12 +57,13 @@ def step_matrices(parts: Augmented, h: float) -> Step:
     """
     theta = node_integrals(parts.F * h)
     many, nz, nq = parts.F.shape[:-2], parts.F.shape[-1], parts.N.shape[-1]
+    n_rows = DEGREE * parts.ports.size
     to_nodes, to_end = theta[..., parts.ports, :], theta[..., -1, :, :, :]
 
     def stacked(function: int, by: Array) -> Array:
         """Rows [ports at nodes 1..p, z at the end] of one of the functions times a matrix."""
-        nodes = to_nodes[..., function, :, :] @ by[..., None, :, :]
-        return np.concatenate([nodes.reshape(*many, DEGREE * parts.ports.size, by.shape[-1]), to_end[..., function, :, :] @ by], axis=-2)
+        nodes = (to_nodes[..., function, :, :] @ by[..., None, :, :]).reshape(*many, n_rows, by.shape[-1])
+        return np.concatenate([nodes, to_end[..., function, :, :] @ by], axis=-2)
 
     powers = np.stack([factorial(k) * stacked(k + 1, parts.N * h) for k in range(DEGREE + 1)], axis=-2)  # of s/h
     M = np.einsum("...rkq,kj->...rjq", powers, _MONOMIALS)
@@ -70,7 +71,7 @@ def step_matrices(parts: Augmented, h: float) -> Step:
 
 
 def node_integrals(Z: Array) -> Array:
-    """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at the nodes c = 1..p: e^(cZ), and the integrals of e^((c-s)Z) s^(j-1) / (j-1)!.
+    """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at nodes 1..p: e^(cZ), and integrals over s of e^((c-s)Z) s^(j-1) / (j-1)!.
 
     A Taylor series at c / 2^s, then s doublings θ_j(2c) = θ_0 θ_j + Σ_(k=1..j) c^(j-k) / (j-k)! θ_k
     (Al-Mohy and Higham 2011, section 3).
@@ -96,7 +97,8 @@ def node_integrals(Z: Array) -> Array:
     weights = NODES[1:, None, None] ** m * c**j / _FACTORIALS[m + j]
     theta = np.moveaxis(np.tensordot(weights, np.stack(powers), axes=1), (0, 1), (-4, -3))
     for _ in range(doublings):
-        mixing = np.where((j.T >= 1) & (j.T <= j), c ** np.maximum(j - j.T, 0) / _FACTORIALS[np.maximum(j - j.T, 0)], 0.0)
+        later = np.maximum(j - j.T, 0)
+        mixing = np.where((j.T >= 1) & (j.T <= j), c**later / _FACTORIALS[later], 0.0)
         mixed = mixing @ theta.reshape(*many, DEGREE, _FUNCTIONS, n * n)
         theta = theta[..., :1, :, :] @ theta + mixed.reshape(theta.shape)
         c = 2.0 * c

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._augmented import Augmented, slope, without_meters
-from ._collocation import DEGREE, step_matrices
+from ._collocation import DEGREE, Step, step_matrices
 from ._exponential import Integrator, Path
 from ._parameter_heat import touched
 from ._schedule import Schedule
@@ -67,9 +67,9 @@ class Sensitivity:
             every, done = list(self._linear.values()), []
             for first in range(0, len(every), size):
                 d = every[first:first + size]
-                moved = Augmented(*(own + 1j * _IMAGINARY * np.stack(slopes) for own, slopes in (
-                    (parts.F, [part.F for part in d]), (parts.B, [part.B for part in d]),
-                    (parts.N, [part.N for part in d]))), parts.ports)
+                moved = Augmented(parts.F + 1j * _IMAGINARY * np.stack([part.F for part in d]),
+                                  parts.B + 1j * _IMAGINARY * np.stack([part.B for part in d]),
+                                  parts.N + 1j * _IMAGINARY * np.stack([part.N for part in d]), parts.ports)
                 s = step_matrices(moved, h)
                 done.append(np.concatenate([s.K, s.Ku, s.M], axis=2).imag / _IMAGINARY)
             self._steps[kind, level] = np.ascontiguousarray(np.concatenate(done).T)
@@ -112,12 +112,12 @@ class Sensitivity:
         n, segment, level = self.n_free, path.segment[chunk], path.level[chunk]
         kind = plan.kind[segment]
         F, P = np.empty((len(segment), n, n)), np.zeros((len(segment), n, len(self.names)))
-        acting = [self.names.index(name) for name in self._acting]
+        acting = np.array([self.names.index(name) for name in self._acting], np.intp)
         for which, depth in {(int(a), int(b)) for a, b in zip(kind, level, strict=True)}:
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
             F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
-            P[np.ix_(own, np.ones(n, bool), acting)] = by_acting
+            P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
         return Transitions(F, P)
 
     def rate_slope(self, name: str, states: Array, w: Array) -> Array:
