@@ -26,6 +26,7 @@ from ._joint_sets import EffectSet as EffectSet
 from ._levels import Levels as Levels
 from ._locate import Location as Location
 from ._locate import locate as locate
+from ._measurement import Measurement as Measurement
 from ._next_experiment import NextExperiment as NextExperiment
 from ._next_experiment import next_experiment as next_experiment
 from ._noise_floor import NoiseFloor as NoiseFloor
@@ -40,8 +41,8 @@ from ._short_list import refit_short_list as refit_short_list
 from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
-__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
-           "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "NextExperiment", "NoiseFloor",
-           "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "adequacy", "candidates", "decide",
-           "diagnose", "effects", "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit",
-           "refit_short_list", "register_effect", "score", "select_jointly", "unknown_heat"]
+__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found",
+           "Gap", "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "Measurement", "NextExperiment",
+           "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "adequacy",
+           "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate", "next_experiment",
+           "noise_floor", "refit", "refit_short_list", "register_effect", "score", "select_jointly", "unknown_heat"]

@@ -20,6 +20,7 @@ from ..thermal import Equations, System, Trajectory, trajectory
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
+_BLOCK = 64  # responses at once
 _SAME = 1e-4  # change of a rate times the sample time [-]
 
 
@@ -209,15 +210,24 @@ class Along:
         ndarray, shape (n, n_sensors, m)
             [K].
         """
+        out = np.zeros((len(self.x), len(self.one.sensors), len(responses)))
+        for first in range(0, len(responses), _BLOCK):
+            block = slice(first, first + _BLOCK)
+            out[..., block] = self._readings_of(responses[block])
+        return out
+
+    def _readings_of(self, responses: list[Response]) -> Array:
+        """The same for so few that they stay in the cache."""
         n, nl = self.x.shape
         start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
-        out = np.zeros((n, len(self.one.sensors), len(responses)))
         for j, response in enumerate(responses):
             if response.heat is not None:
                 start[..., j], end[..., j] = response.heat
+        out = self.answer(start, end)
+        for j, response in enumerate(responses):
             if response.reading is not None:
                 out[..., j] += response.reading[:, self.one.columns]
-        return out + self.answer(start, end)
+        return out
 
     def answer(self, start: Array, end: Array) -> Array:
         """Change of the readings that extra heats cause.
@@ -233,13 +243,13 @@ class Along:
             [K].
         """
         A, by_start, by_end = self.steps
-        push = by_start @ start + by_end @ end
-        state = np.zeros((len(push), *push.shape[1:]))
-        now = np.zeros(push.shape[1:])
+        push = by_start @ start
+        push += by_end @ end
+        state = np.zeros(push.shape)
         for k in range(len(push) - 1):
-            now = A[k] @ now + push[k]
-            state[k + 1] = now
-        return np.einsum("sz,kzm->ksm", self.C, state, optimize=True)
+            np.matmul(A[k], state[k], out=state[k + 1])
+            state[k + 1] += push[k]
+        return self.C @ state
 
 
 def along(system: System, one: Data, run: Trajectory | None = None) -> Along:

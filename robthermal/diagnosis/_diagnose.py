@@ -104,9 +104,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                     session_gain=session_gain)
     progress("trying every effect of the catalogue at every place")
     scores = score(nominal, effects)
-    rounds, fit = _accepted(nominal, scores, effects, progress)
+    rounds, fit, hopeless = _accepted(nominal, scores, effects, progress)
     joint = None
-    if len(rounds) > 1:
+    if len(rounds) > 1 and not hopeless:
         progress("selecting all effects at once, to compare")
         rounds, fit, joint = checked_jointly(rounds, fit, nominal, scores, effects)
     progress("testing whether anything is left")
@@ -122,7 +122,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         if predicts is None or predicts.outcome.ok:
             (nominal, scores, checks), unseen, rounds, fit, joint = wider, predicts, (), wider[0], None
             verdict, outcome = "consistent", Outcome(True, "consistent", "Nothing but noise is missing: the records "
-                                                     f"agree with the model if {nominal.levels}. Declare it.")
+                                                     f"agree with the model if {nominal.levels}."
+                                                     + ("" if nominal.levels.share else " Declare it."))
     if fit.contradictions:
         outcome = replace(outcome, text=" ".join([outcome.text, *fit.contradictions]))
     found = tuple(_found(fit, i, round_) for i, round_ in enumerate(rounds))
@@ -144,8 +145,11 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
 
 
 def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progress: Callable[[str], None]
-              ) -> tuple[tuple[Decision, ...], Refit]:
-    """Add effects one by one while any is beyond doubt, then revise those added before others were known."""
+              ) -> tuple[tuple[Decision, ...], Refit, bool]:
+    """Add effects one by one while any is beyond doubt, then revise those added before others were known.
+
+    Also returned: whether a large misfit is left that choosing again, or together, will not remove.
+    """
     rounds: tuple[Decision, ...] = ()
     fit = nominal
     while len(rounds) < MOST_EFFECTS:
@@ -160,12 +164,12 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
             break
         hopeless = _flails(fit, decision.best)
         rounds, fit = (*rounds, decision), decision.best.fit
-        if hopeless:
-            return rounds, fit
-    if len(rounds) < 2 or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
-        return rounds, fit  # a large misfit beside three effects: choosing them again will not remove it
+        if hopeless or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
+            return rounds, fit, True
+    if len(rounds) < 2:
+        return rounds, fit, False
     progress(f"choosing each of {len(rounds)} effects again beside the others")
-    return revised(rounds, nominal, effects)
+    return *revised(rounds, nominal, effects), False
 
 
 def _flails(fit: Refit, best: Entry) -> bool:
@@ -206,7 +210,7 @@ def _still(fit: Refit) -> bool:
     scale[scale == 0] = 1.0
     step = np.linalg.lstsq(J / scale, z, rcond=1e-10)[0] / scale
     place = slice(structure.n_parameters, structure.n_parameters + structure.n_effects)
-    return bool(np.all(np.abs(step[place]) <= 1e-12 + np.sqrt(np.diag(fit.covariance)[place])))
+    return bool(np.all(np.abs(step[place]) <= 1e-12 + np.sqrt(np.maximum(np.diag(fit.covariance)[place], 0.0))))
 
 
 def _others(round_: Decision) -> tuple[tuple[str, tuple[str, ...]], ...]:

@@ -157,6 +157,7 @@ class Diagnosis:
             "next_experiment": {} if plan is None else {
                 "advice": plan.advice, "expected_delta_bic": plan.expected, "present_delta_bic": plan.present,
                 "sample_time": plan.record.sample_time,
+                **({} if plan.measurement is None else {"measure": vars(plan.measurement)}),
                 "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
             "provisional": [_plain(found) for found in self.provisional],
             "outcome": vars(self.outcome),

@@ -237,10 +237,12 @@ def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
         if not isinstance(path, Along):
             continue
         noise, disturbance = fit.levels.of(path, fit.floor)
+        slow = fit.levels.slow(path, fit.floor)
+        spread = float(noise @ noise) + (0.0 if slow is None else float(slow.std @ slow.std))
         A, P = path.steps[0], np.zeros(path.M.shape[1:])
         Q = gathered(path, disturbance)
         for k in range(len(A)):
-            total += float(np.trace(path.C @ P @ path.C.T)) + float(noise @ noise)
+            total += float(np.trace(path.C @ P @ path.C.T)) + spread
             P = A[k] @ P @ A[k].T + Q[k]
         count += path.one.readings.size
     return float(np.sqrt(total / count)) if count else 1.0

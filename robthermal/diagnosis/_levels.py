@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._along import Along
 from ._noise_floor import NoiseFloor
-from ._whitening import settled_cost
+from ._whitening import SlowNoise, settled_cost
 
 Array = NDArray[np.float64]
 LIMIT = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
 WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
 _CLOSE = 0.03
 _N_TRIED = 15  # five per cent apart
+_SHARES = np.geomspace(0.25, 1.0, 9)  # never more than the declared noise: it must not swallow physics
+_MEMORIES = np.geomspace(2.0, 30.0, 9)  # samples; what drifts more slowly is physics
+_ROUNDS = 2  # of slow part and levels: each was found with the other
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,18 @@ class Levels:
         On the noise of every sensor.
     limit : float
         Largest factor, and the inverse of the smallest.
+    share : float
+        Standard deviation of a slow part of every sensor's noise, beside the white one, over that of the white one; 0
+        without.
+    memory : float
+        Time constant of the slow part [s].
     """
 
     disturbance: float
     noise: dict[str, float]
     limit: float = LIMIT
+    share: float = 0.0
+    memory: float = 0.0
 
     def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
         """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
@@ -54,8 +65,28 @@ class Levels:
         noise = np.array([floor.noise[name] * self.noise.get(name, 1.0) for name in path.one.sensors])
         return noise, self.disturbance * np.array([floor.disturbance.get(name, 0.0) for name in path.system.lumps])
 
+    def slow(self, path: Along, floor: NoiseFloor) -> SlowNoise | None:
+        """Slow part of the noise of the record's sensors, at most as large as the declared noise; None without one.
+
+        Parameters
+        ----------
+        path : Along
+            Simulated record.
+        floor : NoiseFloor
+            Declared levels.
+
+        Returns
+        -------
+        SlowNoise or None
+        """
+        if not self.share:
+            return None
+        declared = np.array([floor.noise[name] for name in path.one.sensors])
+        std = np.minimum(self.share * self.of(path, floor)[0], declared)
+        return SlowNoise(std, float(np.exp(-path.h / self.memory)))
+
     def close_to(self, other: Levels) -> bool:
-        """Whether all factors agree within three per cent.
+        """Whether all factors agree within three per cent, with the same slow part.
 
         Parameters
         ----------
@@ -68,29 +99,65 @@ class Levels:
         """
         pairs = [(self.disturbance, other.disturbance)]
         pairs += [(value, other.noise.get(name, 1.0)) for name, value in self.noise.items()]
-        return all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
+        same = (self.share, self.memory) == (other.share, other.memory)
+        return same and all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
 
     def __str__(self) -> str:
         sensors = ", ".join(f"{name} {factor:.2f}" for name, factor in self.noise.items())
-        return f"noise levels times: {sensors}; random heat {self.disturbance:.2f}"
+        text = f"noise levels times: {sensors}; random heat {self.disturbance:.2f}"
+        return text if not self.share else (
+            f"{text}; and the noise of every sensor has, besides its white part, a slow part of {self.share:.2f} times "
+            f"its size that remembers {self.memory:.3g} s")
 
 
 def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels:
     """Most likely factors within the limits, one after the other, once round."""
-    residuals = [path.one.readings - path.readings[:, path.one.columns] for path in paths]
-
-    def cost(trial: Levels) -> float:
-        total = 0.0
-        for path, r in zip(paths, residuals, strict=True):
-            total += settled_cost(path, r, *trial.of(path, floor))
-        return total
-
+    residuals = _residuals(paths)
+    cost = partial(_cost, paths, residuals, floor)
     tried = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
-    if not any(floor.disturbance.values()):
+    heated = any(floor.disturbance.values())
+    if not heated and not levels.share:
         return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
         levels = _best([replace(levels, noise={**levels.noise, name: factor}) for factor in tried], cost)
-    return _best([replace(levels, disturbance=factor) for factor in tried], cost)
+    return _best([replace(levels, disturbance=factor) for factor in tried], cost) if heated else levels
+
+
+def with_slow_part(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels | None:
+    """Most likely slow part of the sensors' noise, one for all, and the factors that go with it.
+
+    None if the smallest size or the longest memory tried is the most likely, or if any sensor is more likely to have
+    white noise of the same size: weak physics looks like that, not noise.
+    """
+    cost, h = partial(_cost, paths, _residuals(paths), floor), min(path.h for path in paths)
+    for _ in range(_ROUNDS):
+        levels = _best([replace(levels, share=float(share), memory=float(memory * h))
+                        for share in _SHARES for memory in _MEMORIES], cost)
+        levels = refined(paths, floor, levels)
+    inside = levels.share > _SHARES[0] and levels.memory < _MEMORIES[-1] * h
+    return levels if inside and all(_is_slow(name, paths, floor, levels) for name in floor.noise) else None
+
+
+def _is_slow(name: str, paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> bool:
+    """Whether a slow part of this sensor's noise is more likely than white noise of the same size."""
+    gain = 0.0
+    for path, r in zip(paths, _residuals(paths), strict=True):
+        (noise, disturbance), slow = levels.of(path, floor), levels.slow(path, floor)
+        assert slow is not None
+        own = np.array([sensor == name for sensor in path.one.sensors])
+        white, others = np.where(own, np.hypot(noise, slow.std), noise), replace(slow, std=np.where(own, 0.0, slow.std))
+        gain += settled_cost(path, r, white, disturbance, others) - settled_cost(path, r, noise, disturbance, slow)
+    return gain > 0.0 or not any(name in path.one.sensors for path in paths)
+
+
+def _residuals(paths: Sequence[Along]) -> list[Array]:
+    return [path.one.readings - path.readings[:, path.one.columns] for path in paths]
+
+
+def _cost(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, levels: Levels) -> float:
+    """-2 log likelihood of the residuals of all records."""
+    return sum(settled_cost(path, r, *levels.of(path, floor), levels.slow(path, floor))
+               for path, r in zip(paths, residuals, strict=True))
 
 
 def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, limit: float

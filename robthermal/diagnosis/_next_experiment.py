@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from ..calibration._data import Data
 from ..errors import Diverged, InputError
@@ -16,35 +17,26 @@ from ..thermal import simulate, trajectory
 from ._decide import Decision
 from ._effect import Candidate
 from ._joint_sets import refit_set
+from ._measurement import Measurement, instead, measurements, most_telling
 from ._refit import Refit
-from ._score import score_candidates
-from ._separation import Hypothesis, Pair, hypotheses_of, separations
+from ._score import BIC_GAP, score_candidates
+from ._separation import Hypothesis, Pair, hypotheses_of, separation
 from ._short_list import Entry
 from ._trial_inputs import Limits, crossed, drawn, limits_of, towards_rest
 
 Array = NDArray[np.float64]
 MOST = 6  # candidates that one experiment is designed for
 _FULL = 4  # candidates for which all trials are made; more candidates, fewer trials
-_ENOUGH = 20.0  # expected ΔBIC that makes a name nearly certain
+_ENOUGH = 40.0  # expected ΔBIC that exceeds 10 with a probability of 0.99
+_HELPS = 20.0  # expected ΔBIC from which the advice is to apply it as it is: a probability of 0.87
 _PLENTY = 80.0  # a search that reaches it ends
+_LITTLE = 1e-3  # pairs per unit of ΔBIC: so that a search finds its way where nothing is told apart yet
+_MORE = 0.2  # pairs told apart: what makes another measurement worth its trouble
+_HOPELESS = 6  # trials
+_FASTER = 10.0  # of the sample time, where no input at the present one is enough
+_FAST_TRIALS = 3
 _ALIKE = 0.5  # expected ΔBIC below which no input is said to separate a pair
 _FIRST = 5  # evaluations of the refit of an alias, which is as good as its twin already
-_INSTEAD = {
-    "ambient_gradient": "a second ambient sensor beside {0}",
-    "heat_source": "switch off what could heat {0}, or a heat-flux sensor there",
-    "sensor_self_heating": "read {0} with another excitation current",
-    "sensor_offset": "compare {0} with a reference thermometer in an isothermal soak",
-    "sensor_gain": "compare {0} with a reference thermometer at two temperatures",
-    "input_offset": "measure the current or power of {0} itself",
-    "input_gain": "measure the current or power of {0} itself",
-    "input_delay": "record the current or power of {0} itself, sampled faster",
-    "input_lag": "record the current or power of {0} itself, sampled faster",
-    "joule_split": "measure the voltage of {0}: it gives its resistance alone",
-    "resistance_slope": "measure the voltage of {0}: it gives its resistance alone",
-    "lead_heating": "measure the voltage across the leads of {1} and across {1} alone",
-    "thomson": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
-    "seebeck_slope": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +55,11 @@ class NextExperiment:
     pairs : dict
         Expected ΔBIC of every pair, by labels.
     inseparable : tuple of (str, str)
-        Pairs that no trial input tells apart: something else has to be measured.
+        Pairs that neither a trial input nor the measurement tells apart: something else has to be measured.
     advice : str
         In words.
+    measurement : Measurement or None
+        A parameter to measure by itself besides; `expected` and `pairs` count on it.
     """
 
     record: Record
@@ -74,6 +68,7 @@ class NextExperiment:
     pairs: dict[Pair, float]
     inseparable: tuple[Pair, ...]
     advice: str
+    measurement: Measurement | None = None
 
     def __str__(self) -> str:
         return self.advice
@@ -83,21 +78,22 @@ class NextExperiment:
         return self.record.plot()
 
 
-def next_experiment(entries: Sequence[Entry], *, trials: int = 12, seed: int = 0,
+def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0,
                     temperature: tuple[float, float] | None = None) -> NextExperiment:
     """Find an input that separates candidates.
 
     T-optimality (Hunter and Reiner 1965) with everything refitted: the smallest over the pairs of the expected gain of
     ΔBIC is made large over switched, stepped and multisine inputs within the limits, one input at a time or all
-    together; a coordinate search then improves the best.
+    together; a coordinate search then improves the best. Where that is not enough, some inputs are tried at a tenth of
+    the sample time, and then resistances and Seebeck coefficients of modules as measured by themselves.
 
     Parameters
     ----------
     entries : sequence of Entry
         Two candidates or more that the records cannot tell apart; the first six are told apart.
     trials : int
-        Inputs tried for up to four candidates, fewer for more; as many again to improve the best. A search that has
-        found plenty ends earlier.
+        Inputs tried for up to four candidates, fewer for more; half as many again to improve the best. A search that
+        has found plenty ends earlier.
     seed : int
         Of the random numbers.
     temperature : tuple of float, optional
@@ -140,12 +136,14 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 12, seed: int = 0
         if search.plenty(tried):
             break
     else:
-        for _ in range(count if search.limits else 0):
+        for _ in range((count + 1) // 2 if search.limits else 0):
             tried.sort(key=search.worth)
             other = tried[int(rng.integers(len(tried)))]
             tried.append(search.at(crossed(tried[-1].record, other.record, search.limits, rng)))
             if search.plenty(tried):
                 break
+    if search.limits and not search.enough(tried):
+        tried += [search.at(drawn(search.one, search.limits, number, rng, _FASTER)) for number in range(_FAST_TRIALS)]
     return _plan(entries, search, repeated, tried)
 
 
@@ -183,6 +181,16 @@ class _Trial:
     pairs: dict[Pair, float]
 
 
+def _worth(pairs: Mapping[Pair, float]) -> float:
+    """Expected number of pairs that will be told apart; where that is none, the gains themselves, a little.
+
+    The gain of ΔBIC is normal with mean λ and variance 4 λ, and has to exceed 10.
+    """
+    gain = np.array(list(pairs.values()))
+    apart = norm.cdf((gain - BIC_GAP) / (2.0 * np.sqrt(np.maximum(gain, 1e-9))))
+    return float(np.sum(apart + _LITTLE * np.minimum(gain, _ENOUGH)))
+
+
 @dataclass(frozen=True, eq=False)
 class _Search:
     """What all trials share."""
@@ -199,7 +207,7 @@ class _Search:
         for _ in range(4):
             try:
                 if self._allowed(record):
-                    return _Trial(record, separations(self.hypotheses, self.best, self.place, record))
+                    return _Trial(record, separation(self.hypotheses, self.best, self.place, record).pairs())
             except (Diverged, InputError):  # one of the candidates runs away
                 pass
             record = towards_rest(record, self.limits, 0.6)
@@ -211,16 +219,27 @@ class _Search:
         x = trajectory(self.best.structure.systems(self.best.v)[self.place], record).lumps
         return bool(x.min() >= self.temperature[0] and x.max() <= self.temperature[1])
 
-    def worth(self, trial: _Trial) -> tuple[float, float]:
-        """Pairs told apart, none counting more than plenty; a pair that no input separates must not decide."""
-        values = list(trial.pairs.values())
-        return sum(min(value, _PLENTY) for value in values), min(values, default=0.0)
+    def worth(self, trial: _Trial) -> float:
+        """How much a trial tells."""
+        return _worth(trial.pairs)
+
+    def enough(self, tried: Sequence[_Trial], gain: float = _ENOUGH) -> bool:
+        """Whether the best trial gains as much for every pair."""
+        return min(max(tried, key=self.worth).pairs.values(), default=0.0) >= gain
+
+    def measured(self, trial: _Trial) -> tuple[Measurement | None, dict[Pair, float]]:
+        """The parameter that tells most if measured by itself, where the trial is not enough; pairs with it."""
+        if self.enough([trial]):
+            return None, trial.pairs
+        found = separation(self.hypotheses, self.best, self.place, trial.record)
+        options = {option: found.pairs(option) for option in measurements(self.best.structure.ranges)}
+        best = most_telling({option: _worth(pairs) for option, pairs in options.items()}, self.worth(trial) + _MORE)
+        return (None, trial.pairs) if best is None else (best, options[best])
 
     def plenty(self, tried: Sequence[_Trial]) -> bool:
         """Whether a trial separates every pair; or nothing has separated any."""
-        best = max(tried, key=self.worth)
-        hopeless = len(tried) > 8 and self.worth(best)[0] < _ALIKE
-        return hopeless or bool(best.pairs) and min(best.pairs.values()) >= _PLENTY
+        hopeless = len(tried) > _HOPELESS and all(gain < _ALIKE for one in tried for gain in one.pairs.values())
+        return hopeless or self.enough(tried, _PLENTY)
 
 
 def _search_of(entries: Sequence[Entry], temperature: tuple[float, float] | None) -> _Search:
@@ -241,35 +260,38 @@ def _plan(entries: Sequence[Entry], search: _Search, repeated: _Trial, tried: Se
     if not best.pairs:
         return NextExperiment(search.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or runs away: "
                               "set limits of the inputs, or start from another state.")
-    alike = tuple(pair for pair in best.pairs if max(t.pairs.get(pair, 0.0) for t in tried) < _ALIKE)
-    apart = [pair for pair in best.pairs if pair not in alike]
-    expected = min((best.pairs[pair] for pair in apart), default=0.0)
+    measurement, pairs = search.measured(best)
+    alike = tuple(pair for pair in pairs if max(pairs[pair], *(t.pairs.get(pair, 0.0) for t in tried)) < _ALIKE)
+    apart = [pair for pair in pairs if pair not in alike]
+    expected = min((pairs[pair] for pair in apart), default=0.0)
     now = min((repeated.pairs.get(pair, 0.0) for pair in apart), default=0.0)
     record = simulate(search.best.structure.systems(search.best.v)[search.place], best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
-    return NextExperiment(record, expected, now, best.pairs, alike, _advice(named, alike, apart, expected, now))
+    faster = best.record.sample_time < search.one.record.sample_time
+    text = _advice(named, alike, apart, expected, now, _besides(best.record if faster else None, measurement))
+    return NextExperiment(record, expected, now, pairs, alike, text, measurement)
+
+
+def _besides(faster: Record | None, measurement: Measurement | None) -> str:
+    """What more than other inputs the plan asks for."""
+    asked = [f"sample every {faster.sample_time:.3g} s"] if faster is not None else []
+    asked += [str(measurement)] if measurement is not None else []
+    return f" Also {' and '.join(asked)}." if asked else ""
 
 
 def _advice(named: Mapping[str, Candidate], alike: Sequence[Pair], apart: Sequence[Pair], expected: float,
-            now: float) -> str:
+            now: float, besides: str) -> str:
     text = []
-    if apart and expected > _ENOUGH:
+    if apart and expected > _HELPS:
         text.append(f"Apply the inputs of this plan: expected ΔBIC {expected:.0f} between the closest two candidates "
-                    f"that inputs tell apart (the present inputs once more: {now:.0f}).")
+                    f"that it tells apart (the present inputs once more: {now:.0f}).{besides}")
     elif apart:
         hints = {named[label].effect.separated_by for pair in apart for label in pair} - {""}
-        longer = f"; {np.ceil(_ENOUGH / expected):.0f} such records" if expected > 1.0 else ""
+        longer = f"; {np.ceil(_HELPS / expected):.0f} such records" if expected > 1.0 else ""
         text.append(f"The inputs of this plan separate them little (expected ΔBIC {expected:.1f}){longer}. "
-                    f"What separates them: {'; '.join(sorted(hints))}.")
+                    f"What separates them: {'; '.join(sorted(hints))}.{besides}")
     if alike:
         labels = list(dict.fromkeys(label for pair in alike for label in pair))
-        measure = dict.fromkeys(_instead(named[label]) for label in labels)
         text.append(f"No input within the limits tells {' from '.join(labels)}. Measure something else: "
-                    f"{'; '.join(measure)}.")
+                    f"{instead(named[label] for label in labels)}.")
     return " ".join(text)
-
-
-def _instead(candidate: Candidate) -> str:
-    """What would show this effect and no alias of it."""
-    said = _INSTEAD.get(candidate.effect.name, "")
-    return said.format(*candidate.where) if said else candidate.effect.separated_by

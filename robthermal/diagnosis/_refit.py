@@ -331,7 +331,7 @@ def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
     """Linearisation and filter of every record; whitener of every response."""
     paths = paths_of(structure, v)
     return paths, tuple(path.one.white if isinstance(path, AlongResponse) else
-                        whitener(path, *levels.of(path, floor)) for path in paths)
+                        whitener(path, *levels.of(path, floor), levels.slow(path, floor)) for path in paths)
 
 
 def paths_of(structure: Structure, v: Array) -> tuple[Path, ...]:

@@ -11,7 +11,7 @@ from ._refit import Refit, extended, relinearised
 from ._score import BIC_GAP, score
 from ._short_list import refit_short_list
 
-_SWEEPS = 3
+_SWEEPS = 2
 _LENGTH = 4
 
 

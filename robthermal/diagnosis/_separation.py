@@ -12,6 +12,7 @@ from scipy.linalg import qr
 
 from ..calibration._data import Data
 from ..signals import Record
+from ._measurement import Measurement
 from ._refit import Refit, filters, whitened
 from ._short_list import Entry
 from ._structure import Structure
@@ -57,11 +58,59 @@ def hypotheses_of(entries: Sequence[Entry]) -> tuple[Hypothesis, ...]:
     return tuple(out)
 
 
-def separations(hypotheses: Sequence[Hypothesis], best: Refit, place: int, record: Record) -> dict[Pair, float]:
-    """Expected gain of ΔBIC between every two candidates from one more record.
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """What one more record would show of the differences between candidates.
 
-    If j is true, k has to explain y_j - y_k on the new record with its own unknowns, which the present records and the
-    priors hold: λ_jk = min over δ of |R δ|² + |L⁻¹(y_j - y_k) - J_k δ|². The smaller of λ_jk and λ_kj is returned.
+    Parameters
+    ----------
+    hypotheses : tuple of Hypothesis
+        Candidates.
+    z : tuple of ndarray, shape (m,)
+        Whitened residuals of the new record, up to what is common to all.
+    rows : tuple of ndarray, shape (m + p + ..., p)
+        Derivatives of the new readings, of what the present records know, and of the new start's prior.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    z: tuple[Array, ...]
+    rows: tuple[Array, ...]
+
+    def pairs(self, measured: Measurement | None = None) -> dict[Pair, float]:
+        """Expected gain of ΔBIC between every two candidates, if a parameter is also measured by itself or not.
+
+        If j is true, k has to explain y_j - y_k on the new record with its own unknowns, which the present records and
+        the priors hold: λ_jk = min over δ of |R δ|² + |L⁻¹(y_j - y_k) - J_k δ|². The smaller of λ_jk and λ_kj is
+        returned. A measured parameter is one more row.
+
+        Parameters
+        ----------
+        measured : Measurement, optional
+            Which.
+        """
+        out: dict[Pair, float] = {}
+        for j, k in permutations(range(len(self.hypotheses)), 2):
+            pair = (self.hypotheses[min(j, k)].label, self.hypotheses[max(j, k)].label)
+            J, difference = self.rows[k], self.z[k] - self.z[j]
+            if measured is not None:
+                row, target = self._measured(measured, j, k)
+                J, difference = np.vstack([row, J]), np.concatenate([[target], difference])
+            out[pair] = min(out.get(pair, np.inf), _unexplained(J, difference))
+        return out
+
+    def _measured(self, measured: Measurement, j: int, k: int) -> tuple[Array, float]:
+        """Row and target of the parameter that k has to move to the value of j."""
+        ranges = self.hypotheses[k].structure.ranges
+        at = ranges.names.index(measured.parameter)
+        true, own = (ranges.values(self.hypotheses[i].v[:len(ranges.names)]) for i in (j, k))
+        std = measured.accuracy * abs(float(true[at]))
+        row = np.zeros(self.rows[k].shape[1])
+        row[at] = ranges.slopes(own)[at] / std
+        return row, float(true[at] - own[at]) / std
+
+
+def separation(hypotheses: Sequence[Hypothesis], best: Refit, place: int, record: Record) -> Separation:
+    """Simulate all candidates on one more record.
 
     Parameters
     ----------
@@ -77,19 +126,14 @@ def separations(hypotheses: Sequence[Hypothesis], best: Refit, place: int, recor
     one = best.structure.data[place]
     assert isinstance(one, Data)
     trial = Data(record, one.sensors, one.columns, one.readings)
-    own, v = hypotheses[0].on(trial, place)
-    _, whiteners = filters(own, v, best.floor, best.levels)
+    on = [hypothesis.on(trial, place) for hypothesis in hypotheses]
+    _, whiteners = filters(*on[0], best.floor, best.levels)
     n, z, rows = trial.readings.size, [], []
-    for hypothesis in hypotheses:
-        own, v = hypothesis.on(trial, place)
+    for hypothesis, (own, v) in zip(hypotheses, on, strict=True):
         residual, J = whitened(own, v, whiteners)
         z.append(residual[:n])
         rows.append(_stacked(hypothesis, own, J, n))
-    out: dict[Pair, float] = {}
-    for j, k in permutations(range(len(hypotheses)), 2):
-        pair = (hypotheses[min(j, k)].label, hypotheses[max(j, k)].label)
-        out[pair] = min(out.get(pair, np.inf), _unexplained(rows[k], z[k] - z[j]))
-    return out
+    return Separation(tuple(hypotheses), tuple(z), tuple(rows))
 
 
 def _stacked(hypothesis: Hypothesis, own: Structure, J: Array, n: int) -> Array:

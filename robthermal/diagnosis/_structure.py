@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,7 +258,7 @@ class Structure:
         return replace(self, effects=effects, starts=starts)
 
     def hides(self, candidate: Candidate) -> str:
-        """Why these data cannot show an effect, known before they are looked at; empty if they may.
+        """Why an effect is not tried on these data, known before they are looked at; empty if it is.
 
         Parameters
         ----------
@@ -268,8 +269,19 @@ class Structure:
         -------
         str
         """
+        if any(part in self._added for part in candidate.where):
+            return "it would act on a part that another effect has added"
         responses = all(isinstance(one, ResponseData) for one in self.data)
         return (responses and hidden_from_response(self.base, candidate)) or self.sessions.hides(candidate)
+
+    @cached_property
+    def _added(self) -> frozenset[str]:
+        """Lumps and links that the effects have added."""
+        system = self.base
+        for candidate in self.effects:
+            system = candidate.add(system, candidate.effect.size.typical)
+        before, after = ({*one.lumps, *(link.name for link in one.links)} for one in (self.base, system))
+        return frozenset(after - before)
 
     def _chain(self, v: Array) -> tuple[list[str], Array]:
         """The system's numbers that depend on parameters and quantities, and their derivatives by these coordinates."""

@@ -70,8 +70,12 @@ def limits_of(system: System, record: Record) -> dict[str, Limits]:
     return {name: limits for name, limits in out.items() if limits[0] < limits[1]}
 
 
-def drawn(one: Data, limits: Mapping[str, Limits], number: int, rng: np.random.Generator) -> Record:
-    """A trial: every input of its own shape; every third trial one input at a time, the others at rest."""
+def drawn(one: Data, limits: Mapping[str, Limits], number: int, rng: np.random.Generator, faster: float = 1.0
+          ) -> Record:
+    """A trial: every input of its own shape; every third trial one input at a time, the others at rest.
+
+    As many samples as the record has, at its sample time divided by `faster`.
+    """
     record, n = one.record, len(one.record)
     chosen = {name: SHAPES[(number + place) % len(SHAPES)](n, own, rng) for place, (name, own) in
               enumerate(limits.items())}
@@ -79,7 +83,7 @@ def drawn(one: Data, limits: Mapping[str, Limits], number: int, rng: np.random.G
         part = np.arange(n) * len(chosen) // n
         for place, (name, own) in enumerate(limits.items()):
             chosen[name] = np.where(part == place, chosen[name], np.clip(0.0, *own))
-    return with_inputs(record, chosen)
+    return with_inputs(record, chosen, record.sample_time / faster)
 
 
 def crossed(best: Record, other: Record, limits: Mapping[str, Limits], rng: np.random.Generator) -> Record:
@@ -98,10 +102,10 @@ def towards_rest(record: Record, limits: Mapping[str, Limits], share: float) -> 
                                 for name, own in limits.items()})
 
 
-def with_inputs(record: Record, values: Mapping[str, Array]) -> Record:
-    """The same record with other inputs."""
+def with_inputs(record: Record, values: Mapping[str, Array], sample_time: float | None = None) -> Record:
+    """The same record with other inputs and, where given, another sample time [s]."""
     inputs = np.array(record.inputs, np.float64)
     for name, column in values.items():
         inputs[:, record.input_names.index(name)] = column
-    return Record(sample_time=record.sample_time, inputs=inputs, outputs=record.outputs,
+    return Record(sample_time=sample_time or record.sample_time, inputs=inputs, outputs=record.outputs,
                   input_names=record.input_names, output_names=record.output_names, name="next experiment")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
+from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.signal import lfilter
 
 from ._along import Along
@@ -16,11 +16,41 @@ _IGNORED = 1e6  # K: standard deviation of a missing reading
 
 
 @dataclass(frozen=True, eq=False)
+class SlowNoise:
+    """Slow part of the sensors' noise: s(k+1) = pole s(k) + n, independent between sensors, stationary from the start.
+
+    Parameters
+    ----------
+    std : ndarray, shape (n_sensors,)
+        Standard deviation [K].
+    pole : float
+        Per sample, between 0 and 1.
+    """
+
+    std: Array
+    pole: float
+
+    @property
+    def covariance(self) -> Array:
+        """Of s, (n_sensors, n_sensors) [K²]."""
+        return np.diag(self.std**2)
+
+    def beside(self, A: Array, C: Array, Q: Array) -> tuple[Array, Array, Array]:
+        """Transition, sensors and noise of [δ; s], from those of the deviations δ; Q and A with or without samples."""
+        n, nz, ns = A.shape[:-2], A.shape[-1], self.std.size
+        wide_A, wide_Q = np.zeros((*n, nz + ns, nz + ns)), np.zeros((*n, nz + ns, nz + ns))
+        wide_A[..., :nz, :nz], wide_A[..., nz:, nz:] = A, self.pole * np.eye(ns)
+        wide_Q[..., :nz, :nz], wide_Q[..., nz:, nz:] = Q, (1.0 - self.pole**2) * self.covariance
+        return wide_A, np.hstack([C, np.eye(ns)]), wide_Q
+
+
+@dataclass(frozen=True, eq=False)
 class Whitener:
     """Maps free-run residuals (n, n_sensors, ...) [K] to white innovations of unit covariance.
 
     With δ(k+1) = A(k) δ(k) + w, r = C δ + v and the filter started at δ̂ = 0, P = 0 (the start is a parameter of the
-    fit), e = r - C δ̂ are the innovations and z = S^(-1/2) e. If the linearised model holds, cov z = 1.
+    fit), e = r - C δ̂ are the innovations and z = S^(-1/2) e. If the linearised model holds, cov z = 1. The states of a
+    slow part of the noise stand behind δ.
 
     Parameters
     ----------
@@ -51,7 +81,7 @@ class Whitener:
         return (self.roots @ e).reshape(r.shape)
 
 
-def whitener(path: Along, noise: Array, disturbance: Array) -> Whitener:
+def whitener(path: Along, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
     """Filter along one record.
 
     Parameters
@@ -62,17 +92,22 @@ def whitener(path: Along, noise: Array, disturbance: Array) -> Whitener:
         Standard deviation of the record's sensors [K].
     disturbance : ndarray, shape (n_lumps,)
         Random heat of every lump [W/√Hz].
+    slow : SlowNoise, optional
+        On top of the white noise.
     """
     A, C = path.steps[0], path.C
     n, R = len(A), np.broadcast_to(np.diag(noise**2), (len(A), noise.size, noise.size))
     if path.one.missing is not None:
         R = R + _IGNORED**2 * path.one.missing[:, :, None] * np.eye(noise.size)
-    gains, roots = np.zeros((n, A.shape[1], len(C))), np.zeros((n, len(C), len(C)))
-    if not disturbance.any():
+    roots = np.zeros((n, len(C), len(C)))
+    if slow is None and not disturbance.any():
         roots[:] = np.linalg.inv(np.linalg.cholesky(R))
-        return Whitener(A, C, gains, roots)
-    Q = gathered(path, disturbance)
-    P = np.zeros(A.shape[1:])
+        return Whitener(A, C, np.zeros((n, A.shape[1], len(C))), roots)
+    Q, P = gathered(path, disturbance), np.zeros(A.shape[1:])
+    if slow is not None:
+        A, C, Q = slow.beside(A, C, Q)
+        P = block_diag(P, slow.covariance)
+    gains = np.zeros((n, A.shape[1], len(C)))
     for k in range(n):
         S = C @ P @ C.T + R[k]
         root = np.linalg.inv(np.linalg.cholesky(S))
@@ -98,13 +133,16 @@ def gathered(path: Along, disturbance: Array, M: Array | None = None) -> Array:
     return Q[kind] if one_by_one else Q
 
 
-def settled_cost(path: Along, r: Array, noise: Array, disturbance: Array) -> float:
+def settled_cost(path: Along, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearisation.
 
     Good enough for noise levels, and a hundred times faster than the time-varying filter.
     """
     A, C, R = path.steps[0].mean(axis=0), path.C, np.diag(noise**2)
-    P = solve_discrete_are(A.T, C.T, gathered(path, disturbance, path.M.mean(axis=0)), R)
+    Q = gathered(path, disturbance, path.M.mean(axis=0))
+    if slow is not None:
+        A, C, Q = slow.beside(A, C, Q)
+    P = solve_discrete_are(A.T, C.T, Q, R)
     S = C @ P @ C.T + R
     gain = P @ C.T @ np.linalg.inv(S)
     poles, V = np.linalg.eig(A - A @ gain @ C)  # x(k+1) = (A - A K C) x + A K r, mode by mode

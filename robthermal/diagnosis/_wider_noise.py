@@ -1,4 +1,4 @@
-"""Where nothing explains the records: is it only that the declared noise is too small, or too large?"""
+"""Where nothing explains the records: is it only that the noise is not what was declared?"""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from dataclasses import replace
 
 from ..errors import Diverged
 from ._adequacy import Adequacy, adequacy
-from ._levels import LIMIT, WIDE
+from ._levels import LIMIT, WIDE, Levels, with_slow_part
 from ._refit import Refit, fitted
 from ._score import Scores, promising, score
 
+Answer = tuple[Refit, Scores, Adequacy]
 
-def with_wider_noise(nominal: Refit, effects: Iterable[str] | None) -> tuple[Refit, Scores, Adequacy] | None:
-    """The nominal fit with noise levels up to 2.2 times off, if that leaves nothing to explain; else None.
 
-    Asked last: levels that may change so much would also swallow small physics, so that a name is never looked for with
-    them. What they cannot swallow is a large misfit.
+def with_wider_noise(nominal: Refit, effects: Iterable[str] | None) -> Answer | None:
+    """The nominal fit with noise unlike the declared one, if that leaves nothing to explain; else None.
+
+    First levels up to 2.2 times off; then a slow part of the sensors' noise, at most as large as the declared noise,
+    with levels as near as ever. Asked last: such noise would also swallow small physics, so that a name is never looked
+    for with it. What it cannot swallow is a large misfit.
 
     Parameters
     ----------
@@ -25,13 +28,34 @@ def with_wider_noise(nominal: Refit, effects: Iterable[str] | None) -> tuple[Ref
     effects : iterable of str, optional
         Catalogue.
     """
-    try:
-        fit = fitted(nominal.structure, nominal.v, nominal.floor, replace(nominal.levels, limit=WIDE))
-    except Diverged:
+    effects = None if effects is None else list(effects)
+    return _with_wide_levels(nominal, effects) or _with_slow_part(nominal, effects)
+
+
+def _with_wide_levels(nominal: Refit, effects: list[str] | None) -> Answer | None:
+    fit = _refitted(nominal, replace(nominal.levels, limit=WIDE))
+    if fit is None:
         return None
     factors = [fit.levels.disturbance, *fit.levels.noise.values()]
-    if all(1.0 / LIMIT <= factor <= LIMIT for factor in factors):
+    return None if all(1.0 / LIMIT <= factor <= LIMIT for factor in factors) else _if_nothing_left(fit, effects)
+
+
+def _with_slow_part(nominal: Refit, effects: list[str] | None) -> Answer | None:
+    levels = with_slow_part(nominal.along, nominal.floor, nominal.levels) if nominal.along else None
+    fit = None if levels is None else _refitted(nominal, levels)
+    return None if fit is None else _if_nothing_left(fit, effects)
+
+
+def _refitted(nominal: Refit, levels: Levels) -> Refit | None:
+    try:
+        return fitted(nominal.structure, nominal.v, nominal.floor, levels)
+    except Diverged:
+        return None
+
+
+def _if_nothing_left(fit: Refit, effects: list[str] | None) -> Answer | None:
+    checks = adequacy(fit)
+    if not checks.outcome.ok:
         return None
     scores = score(fit, effects)
-    checks = adequacy(fit)
-    return None if promising(fit, scores) or not checks.outcome.ok else (fit, scores, checks)
+    return None if promising(fit, scores) else (fit, scores, checks)

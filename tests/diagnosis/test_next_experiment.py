@@ -9,6 +9,7 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis._next_experiment import rivals
+from robthermal.diagnosis._separation import hypotheses_of, separation
 from robthermal.diagnosis._trial_inputs import limits_of
 
 Array = np.ndarray
@@ -154,3 +155,66 @@ def test_inputs_without_limits_stay_within_the_record(bench: rt.System) -> None:
 def test_one_candidate_is_refused(convective: tuple[rt.diagnosis.Entry, ...]) -> None:
     with pytest.raises(rt.InputError, match="two or more to tell apart"):
         rt.diagnosis.next_experiment(convective[:1])
+
+
+def test_short_delay_needs_faster_sampling(bench: rt.System) -> None:
+    run = truth(delay=0.5)
+    heater = np.repeat(np.random.default_rng(7).uniform(0.0, 12.0, 60), 5)
+    fit = rt.diagnosis.refit(bench, measured(run, heater, 7))
+    short = rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit, ["input_delay", "input_lag"]), length=2)
+    plan = rt.diagnosis.next_experiment(short.entries)
+    assert plan.record.sample_time == pytest.approx(H / 10) and len(plan.record) == 300
+    assert "sample every 0.5 s" in plan.advice
+    assert plan.expected > 20.0 > 1.0 > plan.present
+
+
+@pytest.fixture(scope="module")
+def split() -> tuple[tuple[rt.diagnosis.Entry, ...], rt.System]:
+    """A module whose Joule heat is split unevenly; lead heating at the cold face and another resistance are as good."""
+    cooler = rt.System(
+        ambients={"room": {"temperature": ROOM}},
+        lumps={"cold": {"capacity": 40.0, "disturbance": 0.02}, "hot": {"capacity": 200.0}},
+        links=[{"between": ("hot", "room"), "conductance": 3.0}],
+        modules={"m": {"hot": "hot", "cold": "cold", "seebeck": 0.03, "resistance": 1.8, "conductance": 0.5,
+                       "reference_temperature": ROOM, "current_limits": (-1.5, 2.5)}},
+        sensors={"Tc": {"lump": "cold", "noise": 0.01}, "Th": {"lump": "hot", "noise": 0.01}},
+        fit={"modules.m.resistance.value": {"lower": 0.9, "upper": 3.6, "sigma": 0.15},
+             "modules.m.seebeck.value": {"lower": 0.015, "upper": 0.06, "sigma": 0.002}})
+    current = np.repeat(np.random.default_rng(3).uniform(-1.5, 2.5, 30), 10)
+    drive = rt.Record(sample_time=H, inputs=np.column_stack([current, np.full(300, ROOM)]), outputs=np.zeros((300, 0)),
+                      input_names=["m", "room"], output_names=[])
+    seen = rt.thermal.simulate(cooler.with_parameters({"modules.m.joule_split": 0.03}), drive)
+    record = seen.with_outputs(seen.outputs + 0.01 * np.random.default_rng(4).standard_normal((300, 2)))
+    fit = rt.diagnosis.refit(cooler, record)
+    tried = rt.diagnosis.score(fit, ["joule_split", "lead_heating"])
+    entries = rt.diagnosis.refit_short_list(fit, tried, length=3).entries
+    pair = {"joule_split(m)", "lead_heating(cold, m)", "lead_heating(hot, m)"}
+    return tuple(entry for entry in entries if entry.candidate.label in pair)[:2], cooler
+
+
+def test_resistance_measured_by_itself_tells_split_from_lead(
+        split: tuple[tuple[rt.diagnosis.Entry, ...], rt.System]) -> None:
+    entries, _ = split
+    assert len(entries) == 2 and abs(entries[0].delta_bic - entries[1].delta_bic) < 10.0
+    plan = rt.diagnosis.next_experiment(entries)
+    assert plan.measurement is not None and plan.measurement.parameter == "modules.m.resistance.value"
+    assert plan.expected > 40.0 and not plan.inseparable
+    assert "measure modules.m.resistance.value by itself" in plan.advice
+
+
+def test_promise_of_a_measurement_is_the_distance_of_the_two_values(
+        split: tuple[tuple[rt.diagnosis.Entry, ...], rt.System]) -> None:
+    # beside an idle record only the measured value tells: (R_j - R_k)² / (accuracy² R_j² + variance of R_k)
+    entries, _ = split
+    j, k = (entry.fit for entry in entries)
+    at = list(j.structure.ranges.names).index("modules.m.resistance.value")
+    R_j, R_k = (float(fit.structure.ranges.values(fit.v[:fit.structure.n_parameters])[at]) for fit in (j, k))
+    idle = rt.Record(sample_time=H, inputs=np.tile([0.0, ROOM], (300, 1)), outputs=np.zeros((300, 2)),
+                     input_names=["m", "room"], output_names=["Tc", "Th"])
+    found = separation(hypotheses_of(entries), j, 0, idle)
+    asked = rt.diagnosis.Measurement("modules.m.resistance.value", 0.005)
+    gain = found.pairs(asked)[entries[0].candidate.label, entries[1].candidate.label]
+    each = [(R_j - R_k) ** 2 / ((0.005 * true) ** 2 + (own**2) * fit.covariance[at, at] / max(fit.variance, 1.0))
+            for true, own, fit in ((R_j, R_k, k), (R_k, R_j, j))]
+    assert gain == pytest.approx(min(each), rel=0.05)
+    assert max(found.pairs().values()) < 1.0

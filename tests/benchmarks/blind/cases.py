@@ -45,10 +45,11 @@ class Given:
 
 @dataclass(frozen=True)
 class Truth:
-    """What it does not: effects with their values, and the plant, to run another experiment on."""
+    """What it does not: effects with their values, and the plant, to experiment on and to measure modules of."""
 
     effects: tuple[Found, ...]
     experiment: Callable[[rt.Record], rt.Record]
+    measured: Callable[[rt.diagnosis.Measurement], float]
 
 
 def made(case: Case) -> tuple[Given, Truth]:
@@ -67,13 +68,19 @@ def made(case: Case) -> tuple[Given, Truth]:
     if case.group == "outside":
         plant, hidden = OUTSIDE[case.effect](plant, rng)
 
-    def run(U: list[np.ndarray], starts: list[float], rng: np.random.Generator) -> list[rt.Record]:
-        return _records(plant, hidden, noise, kind, U, starts, rng)
+    def run(U: list[np.ndarray], starts: list[float], rng: np.random.Generator, h: float = H) -> list[rt.Record]:
+        return _records(plant, hidden, noise, kind, U, starts, rng, h)
+
+    def measured(asked: rt.diagnosis.Measurement) -> float:
+        _, module, part, _ = asked.parameter.split(".")
+        value = {"resistance": plant.modules[module].R, "seebeck": plant.modules[module].S}[part]
+        return float(value * (1.0 + asked.accuracy * own_rng.standard_normal()))
 
     train, unseen = run(list(inputs), [0.0, UNSEEN_START], rng)
     own_rng = np.random.default_rng(rng.integers(2**32))
     return (Given(system, train, unseen),
-            Truth(effects, lambda plan: run([_inputs(told, plan)], [FOLLOW_START], own_rng)[0]))
+            Truth(effects, lambda plan: run([_inputs(told, plan)], [FOLLOW_START], own_rng, plan.sample_time)[0],
+                  measured))
 
 
 def _declared(levels: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
@@ -95,20 +102,20 @@ def _inputs(plant: Plant, record: rt.Record) -> np.ndarray:
 
 
 def _records(plant: Plant, hidden: Hidden, noise: dict[str, float], kind: str, U: list[np.ndarray],
-             starts: list[float], rng: np.random.Generator) -> list[rt.Record]:
+             starts: list[float], rng: np.random.Generator, h: float) -> list[rt.Record]:
     """Integrate together (short ones padded), read the sensors, add their noise."""
     n = max(map(len, U))
     padded = np.stack([np.concatenate([u, np.repeat(u[-1:], n - len(u), axis=0)]) for u in U])
     room = padded[:, 0, plant.columns.index("room")]
     T0 = room[:, None] + 0.5 * rng.standard_normal((len(U), len(plant.capacity)))
-    T, m = integrate(plant, padded, np.array(starts), T0, hidden, rng)
+    T, m = integrate(plant, padded, np.array(starts), T0, hidden, rng, h)
     names = list(plant.capacity)
     Y = T[..., [names.index(lump) for lump in plant.sensors.values()]]
     for reading in hidden.readings:
         Y = reading(Y, m)
     sigma = np.array(list(noise.values()))
     Y = readings_noise(kind, Y, sigma, rng)
-    return [rt.Record(sample_time=H, inputs=u, outputs=Y[i, :len(u)], input_names=plant.columns,
+    return [rt.Record(sample_time=h, inputs=u, outputs=Y[i, :len(u)], input_names=plant.columns,
                       output_names=list(plant.sensors), start_time=start)
             for i, (u, start) in enumerate(zip(U, starts, strict=True))]
 

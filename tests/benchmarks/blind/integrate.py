@@ -84,16 +84,16 @@ class Network:
         return M, u @ self.B + current**2 @ self.joule, u
 
 
-def integrate(plant: Plant, U: Array, start: Array, T0: Array, hidden: Hidden, rng: np.random.Generator
-              ) -> tuple[Array, Array]:
+def integrate(plant: Plant, U: Array, start: Array, T0: Array, hidden: Hidden, rng: np.random.Generator,
+              h: float = H) -> tuple[Array, Array]:
     """Temperatures (batch, n, lumps) and memories (batch, n, k) at every sample, with random heat.
 
-    `U` (batch, n, columns) is held over every sample from the times `start` (batch,) on; `T0` (batch, lumps). Random
-    heat is drawn per sub-step.
+    `U` (batch, n, columns) is held over every sample of `h` s from the times `start` (batch,) on; `T0` (batch, lumps).
+    Random heat is drawn per sub-step.
     """
     net = Network(plant)
-    sub = _sub_steps(net, hidden)
-    dt, (batch, n, _) = H / sub, U.shape
+    sub = _sub_steps(net, hidden, h)
+    dt, (batch, n, _) = h / sub, U.shape
     for drive in hidden.drives:
         U = drive(U)
     fine = _fine(U, hidden, sub, dt) if hidden.delays or hidden.lags else None
@@ -125,7 +125,7 @@ def integrate(plant: Plant, U: Array, start: Array, T0: Array, hidden: Hidden, r
         for j in range(sub):
             if fine is not None:
                 first, middle, last = (net.frozen(fine[stage][:, k * sub + j]) for stage in range(3))
-            t, shake = start + k * H + j * dt, shaken[j]
+            t, shake = start + k * h + j * dt, shaken[j]
             a, am = rate(t, T, m, first, shake)
             b, bm = rate(t + dt / 2, T + dt / 2 * a, m + dt / 2 * am, middle, shake)
             c, cm = rate(t + dt / 2, T + dt / 2 * b, m + dt / 2 * bm, middle, shake)
@@ -136,11 +136,12 @@ def integrate(plant: Plant, U: Array, start: Array, T0: Array, hidden: Hidden, r
     return temperatures, memories
 
 
-def _sub_steps(net: Network, hidden: Hidden) -> int:
+def _sub_steps(net: Network, hidden: Hidden, h: float) -> int:
     """Per sample: twenty in the fastest pole, two in the shortest lag, ten a second where there is a delay."""
     shortest = min([*hidden.lags.values(), *(part.time_constant for part in hidden.memories)], default=np.inf)
-    fine = round(10 * H) if hidden.delays else 1
-    return max(int(np.ceil(FINENESS * H / net.fastest)), int(np.ceil(2 * H / shortest)), fine)
+    fine = round(10 * h) if hidden.delays else 1
+    least = max(int(np.ceil(FINENESS * h / net.fastest)), int(np.ceil(2 * h / shortest)))
+    return fine * max(int(np.ceil(least / fine)), 1)
 
 
 def _start(hidden: Hidden, T: Array, u: Array) -> Array:

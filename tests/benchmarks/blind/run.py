@@ -78,16 +78,23 @@ def _limit(found: rt.diagnosis.Diagnosis, name: str, where: tuple[str, ...]) -> 
 
 
 def _followed(given: Given, truth: Truth, found: rt.diagnosis.Diagnosis) -> Row:
-    """The recommended inputs on the true plant, then both records together."""
+    """The recommended inputs on the true plant, and the parameter to measure if any; then both records together."""
     assert found.next_experiment is not None
-    record = truth.experiment(found.next_experiment.record)
+    plan, system = found.next_experiment, given.system
+    record, asked = truth.experiment(plan.record), plan.measurement
+    if asked is not None:
+        value = truth.measured(asked)
+        known = {"sigma": asked.accuracy * value}
+        fit = {**system.fit, asked.parameter: system.fit[asked.parameter].model_copy(update=known)}
+        system = system.with_parameters({asked.parameter: value}).model_copy(update={"fit": fit})
     start = time.process_time()
     try:
-        again = rt.diagnose(given.system, [given.train, record], validation=given.unseen)
+        again = rt.diagnose(system, [given.train, record], validation=given.unseen)
     except Exception as error:
         return {"verdict": "crashed", "error": f"{type(error).__name__}: {error}"}
-    return {"seconds": time.process_time() - start, "expected": found.next_experiment.expected,
-            "present": found.next_experiment.present, **_said(again, truth)}
+    return {"seconds": time.process_time() - start, "expected": plan.expected, "present": plan.present,
+            "sample_time": record.sample_time,
+            "measured": asked and asked.parameter, **_said(again, truth)}
 
 
 def run(cases: Iterable[Case], out: Path, jobs: int, every: int) -> list[Row]:
