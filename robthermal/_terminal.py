@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -87,22 +88,20 @@ def exit_unless(good: bool) -> None:
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
     """A spinner with the stage on a terminal; nothing in a pipe."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
         yield lambda stage: None
         return
-    with console.status("starting") as status:
+    with Console(stderr=True).status("starting") as status:
         yield lambda stage: status.update(stage)
 
 
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
     """A bar of what is done on a terminal; nothing in a pipe."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
         yield lambda done, total: None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

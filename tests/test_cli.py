@@ -17,9 +17,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import robthermal as rt
 from robthermal import cli
+from robthermal._terminal import progress, progress_bar
 
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
@@ -171,6 +173,16 @@ def test_demo_is_quiet_in_a_pipe(demo: tuple[subprocess.CompletedProcess[str], P
     done, _ = demo
     assert done.stderr == ""
     assert "\x1b" not in done.stdout and "\r" not in done.stdout
+
+
+def test_no_spinner_in_a_pipe_that_may_have_colours(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+                                                    ) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as many CI runners set it: rich then takes a pipe for a terminal
+    assert Console(stderr=True).is_terminal
+    with progress() as stage, progress_bar("points") as bar:
+        stage("simulating")
+        bar(1, 2)
+    assert capsys.readouterr().err == ""
 
 
 def test_demo_finds_the_parameters_the_records_were_made_with(

@@ -42,6 +42,7 @@ _UNREADABLE = (
     *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError, RecursionError),
     *(MatReadError, zipfile.BadZipFile, zlib.error),
 )
+_LARGEST = 500_000_000  # bytes, unpacked
 _SUFFIXES = (".json", ".mat", ".npz")
 
 
@@ -67,6 +68,7 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
     path = _checked(path)
     if not path.is_file():
         raise InputError(f"no such file: {path}", where="path")
+    _refuse_large(path)
     try:
         content = {".json": _read_json, ".npz": _read_npz, ".mat": _read_mat}[path.suffix](path)
     except _UNREADABLE as error:
@@ -88,6 +90,18 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
         raise InputError(f"its response has shape {arguments['response'].shape}", where=str(path),
                          expected=f"{shape}, from its names and frequencies", remedy="Write it again with save.")
     return arguments
+
+
+def _refuse_large(path: Path) -> None:
+    """Refuse files that would fill the memory, also once an archive is unpacked."""
+    size = path.stat().st_size
+    if size <= _LARGEST and zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+    if size > _LARGEST:
+        raise InputError(f"it is {size / 1e6:.0f} MB large", where=str(path),
+                         expected=f"at most {_LARGEST / 1e6:.0f} MB",
+                         remedy="Keep fewer frequencies or channels in one file.")
 
 
 def _texts(value: Any, name: str, path: Path) -> list[str]:

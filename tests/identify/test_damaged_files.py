@@ -58,3 +58,16 @@ def test_what_is_not_damaged_still_loads(content: dict[str, Any], tmp_path: Path
         again = rt.identify.FrequencyResponse.load(tmp_path / f"again{suffix}")
         np.testing.assert_array_equal(again.response, G.response)
         assert (again.sample_time, again.half_width, again.input_names) == (G.sample_time, G.half_width, G.input_names)
+
+
+def test_large_files_are_refused_also_when_they_are_large_only_unpacked(
+        content: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    zeros = tmp_path / "zeros.npz"
+    np.savez_compressed(zeros, response=np.zeros(100_000))
+    assert zeros.stat().st_size < 10_000
+    text = tmp_path / "G.json"
+    text.write_text(json.dumps(content), encoding="utf-8")
+    monkeypatch.setattr("robthermal.identify._response_files._LARGEST", 10_000)
+    for path in (zeros, text):
+        with pytest.raises(rt.InputError, match="MB large"):
+            rt.identify.FrequencyResponse.load(path)
