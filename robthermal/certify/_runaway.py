@@ -56,9 +56,9 @@ class Runaway:
         """Plot the load curve with its fold; returns the matplotlib axes."""
         ax = self.curve.plot()
         for i, (name, current) in enumerate(self.current.items()):
-            ax.plot(current, self.load[name], "ko")
-            ax.annotate(f"{name}: {current:.3g} A, {self.load[name]:.3g} W", (current, self.load[name]), ha="right",
-                        xytext=(-10, -18 * (i + 1)), textcoords="offset points", arrowprops={"arrowstyle": "-"})
+            label = f"{name}: fold at {current:.3g} A, {self.load[name]:.3g} W"
+            ax.plot(current, self.load[name], "o", color=f"C{i}", label=label)
+        ax.legend()
         return ax
 
 
