@@ -25,6 +25,7 @@ from ._refit import Refit, refit, whitened
 from ._revise import revised
 from ._score import Scores, promising, score
 from ._sessions import SessionGain
+from ._setting import setting_of
 from ._short_list import Entry, quantities_of, refit_short_list
 from ._unknown_heat import unknown_heat
 from ._wider_noise import with_wider_noise
@@ -116,7 +117,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     unseen = None if validation is None else hold_out(nominal, fit, validation, operating_point=operating_point)
     progress("locating the misfit and planning the next experiment")
     verdict, outcome = _verdict(rounds, fit, checks, unseen)
-    if verdict == "unexplained" and (wider := with_wider_noise(nominal, effects)) is not None:
+    doubtful = verdict == "unexplained" or (rounds and fit.levels.exhausted)  # a name that asks for more noise besides
+    if doubtful and (wider := with_wider_noise(nominal, effects, verdict == "unexplained")) is not None:
         predicts = None if validation is None else hold_out(wider[0], wider[0], validation,
                                                             operating_point=operating_point)
         if predicts is None or predicts.outcome.ok:
@@ -235,5 +237,5 @@ def _plan(rounds: tuple[Decision, ...]) -> NextExperiment | None:
     for round_ in rounds:
         entries = rivals(round_)
         if len(entries) > 1:
-            return next_experiment(entries) if entries[0].fit.along else None
+            return next_experiment(entries) if setting_of(entries[0].fit) is not None else None
     return None

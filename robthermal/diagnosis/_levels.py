@@ -48,6 +48,11 @@ class Levels:
     share: float = 0.0
     memory: float = 0.0
 
+    @property
+    def exhausted(self) -> bool:
+        """Whether any level would be higher still, but for the limit."""
+        return max([self.disturbance, *self.noise.values()]) > 0.98 * self.limit
+
     def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
         """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
 

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from ..calibration._data import Data
 from ..errors import Diverged, InputError
 from ..signals import Record
-from ..thermal import simulate, trajectory
+from ..thermal import System, simulate, trajectory
 from ._decide import Decision
 from ._effect import Candidate
 from ._joint_sets import refit_set
@@ -21,6 +20,7 @@ from ._measurement import Measurement, instead, measurements, most_telling
 from ._refit import Refit
 from ._score import BIC_GAP, score_candidates
 from ._separation import Hypothesis, Pair, hypotheses_of, separation
+from ._setting import Setting, setting_of
 from ._short_list import Entry
 from ._trial_inputs import Limits, crossed, drawn, limits_of, towards_rest
 
@@ -106,7 +106,7 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
     Raises
     ------
     InputError
-        Fewer than two candidates, no record in the time domain.
+        Fewer than two candidates; frequency responses only, and no noise declared of any sensor.
 
     Examples
     --------
@@ -128,11 +128,12 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
     """
     search = _search_of(entries[:MOST], temperature)
     rng = np.random.default_rng(seed)
-    repeated = search.at(search.one.record)
+    present = search.setting.one
+    repeated = search.at(present.record)
     tried = [repeated]
     count = max(trials * _FULL // max(len(search.hypotheses), _FULL), 1)
     for number in range(count):
-        tried.append(search.at(drawn(search.one, search.limits, number, rng)))
+        tried.append(search.at(drawn(present, search.limits, number, rng)))
         if search.plenty(tried):
             break
     else:
@@ -143,7 +144,7 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
             if search.plenty(tried):
                 break
     if search.limits and not search.enough(tried):
-        tried += [search.at(drawn(search.one, search.limits, number, rng, _FASTER)) for number in range(_FAST_TRIALS)]
+        tried += [search.at(drawn(present, search.limits, number, rng, _FASTER)) for number in range(_FAST_TRIALS)]
     return _plan(entries, search, repeated, tried)
 
 
@@ -195,10 +196,9 @@ def _worth(pairs: Mapping[Pair, float]) -> float:
 class _Search:
     """What all trials share."""
 
-    best: Refit
     hypotheses: tuple[Hypothesis, ...]
-    place: int
-    one: Data
+    setting: Setting
+    system: System
     limits: Mapping[str, Limits]
     temperature: tuple[float, float] | None
 
@@ -207,7 +207,7 @@ class _Search:
         for _ in range(4):
             try:
                 if self._allowed(record):
-                    return _Trial(record, separation(self.hypotheses, self.best, self.place, record).pairs())
+                    return _Trial(record, separation(self.hypotheses, self.setting, record).pairs())
             except (Diverged, InputError):  # one of the candidates runs away
                 pass
             record = towards_rest(record, self.limits, 0.6)
@@ -216,7 +216,7 @@ class _Search:
     def _allowed(self, record: Record) -> bool:
         if self.temperature is None:
             return True
-        x = trajectory(self.best.structure.systems(self.best.v)[self.place], record).lumps
+        x = trajectory(self.system, record).lumps
         return bool(x.min() >= self.temperature[0] and x.max() <= self.temperature[1])
 
     def worth(self, trial: _Trial) -> float:
@@ -231,8 +231,8 @@ class _Search:
         """The parameter that tells most if measured by itself, where the trial is not enough; pairs with it."""
         if self.enough([trial]):
             return None, trial.pairs
-        found = separation(self.hypotheses, self.best, self.place, trial.record)
-        options = {option: found.pairs(option) for option in measurements(self.best.structure.ranges)}
+        found = separation(self.hypotheses, self.setting, trial.record)
+        options = {option: found.pairs(option) for option in measurements(self.hypotheses[0].structure.ranges)}
         best = most_telling({option: _worth(pairs) for option, pairs in options.items()}, self.worth(trial) + _MORE)
         return (None, trial.pairs) if best is None else (best, options[best])
 
@@ -246,29 +246,30 @@ def _search_of(entries: Sequence[Entry], temperature: tuple[float, float] | None
     if len(entries) < 2:
         raise InputError(f"{len(entries)} candidates", where="argument entries", expected="two or more to tell apart")
     best = entries[0].fit
-    places = [i for i, one in enumerate(best.structure.data) if isinstance(one, Data)]
-    if not places:
-        raise InputError("no record in the time domain", where="argument entries",
-                         remedy="Measure a record; inputs are designed in the time domain.")
-    one = best.structure.data[places[0]]
-    assert isinstance(one, Data)
-    return _Search(best, hypotheses_of(entries), places[0], one, limits_of(best.system, one.record), temperature)
+    setting = setting_of(best)
+    if setting is None:
+        raise InputError("no record, and no noise declared of any sensor", where="argument entries",
+                         remedy="Declare noise of the sensors in the system: a record is planned, not a response.")
+    system = best.system if setting.place is None else best.structure.systems(best.v)[setting.place]
+    limits = limits_of(best.system, setting.one.record)
+    return _Search(hypotheses_of(entries), setting, system, limits, temperature)
 
 
 def _plan(entries: Sequence[Entry], search: _Search, repeated: _Trial, tried: Sequence[_Trial]) -> NextExperiment:
     best = max(tried, key=search.worth)
     if not best.pairs:
-        return NextExperiment(search.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or runs away: "
-                              "set limits of the inputs, or start from another state.")
+        return NextExperiment(search.setting.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or "
+                              "runs away: set limits of the inputs, or start from another state.")
     measurement, pairs = search.measured(best)
     alike = tuple(pair for pair in pairs if max(pairs[pair], *(t.pairs.get(pair, 0.0) for t in tried)) < _ALIKE)
     apart = [pair for pair in pairs if pair not in alike]
     expected = min((pairs[pair] for pair in apart), default=0.0)
     now = min((repeated.pairs.get(pair, 0.0) for pair in apart), default=0.0)
-    record = simulate(search.best.structure.systems(search.best.v)[search.place], best.record)
+    record = simulate(search.system, best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
-    faster = best.record.sample_time < search.one.record.sample_time
-    text = _advice(named, alike, apart, expected, now, _besides(best.record if faster else None, measurement))
+    faster = best.record.sample_time < search.setting.one.record.sample_time
+    besides = _besides(best.record if faster else None, measurement)
+    text = _advice(named, alike, apart, expected, now, besides)
     return NextExperiment(record, expected, now, pairs, alike, text, measurement)
 
 

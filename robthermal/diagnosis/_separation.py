@@ -13,7 +13,8 @@ from scipy.linalg import qr
 from ..calibration._data import Data
 from ..signals import Record
 from ._measurement import Measurement
-from ._refit import Refit, filters, whitened
+from ._refit import filters, whitened
+from ._setting import Setting
 from ._short_list import Entry
 from ._structure import Structure
 
@@ -42,9 +43,10 @@ class Hypothesis:
     v: Array
     present: Array
 
-    def on(self, trial: Data, place: int) -> tuple[Structure, Array]:
-        """The structure and its unknowns on one new record, which starts as the present one of that place did."""
-        own = replace(self.structure, data=(trial,), starts=(self.structure.starts[place],))
+    def on(self, trial: Data, setting: Setting) -> tuple[Structure, Array]:
+        """The structure and its unknowns on one new record."""
+        start = setting.start(self.structure, self.structure.system(self.v))
+        own = replace(self.structure, data=(trial,), starts=(start,))
         values = own.ranges.values(self.v[:own.n_parameters])
         return own, own.start(values, self.structure.quantities(self.v))
 
@@ -109,25 +111,22 @@ class Separation:
         return row, float(true[at] - own[at]) / std
 
 
-def separation(hypotheses: Sequence[Hypothesis], best: Refit, place: int, record: Record) -> Separation:
+def separation(hypotheses: Sequence[Hypothesis], setting: Setting, record: Record) -> Separation:
     """Simulate all candidates on one more record.
 
     Parameters
     ----------
     hypotheses : sequence of Hypothesis
         Two or more.
-    best : Refit
-        Whose noise levels hold.
-    place : int
-        Of the present record whose beginning the new one shares.
+    setting : Setting
+        Its sensors, start and noise.
     record : Record
         Inputs to apply.
     """
-    one = best.structure.data[place]
-    assert isinstance(one, Data)
+    one = setting.one
     trial = Data(record, one.sensors, one.columns, one.readings)
-    on = [hypothesis.on(trial, place) for hypothesis in hypotheses]
-    _, whiteners = filters(*on[0], best.floor, best.levels)
+    on = [hypothesis.on(trial, setting) for hypothesis in hypotheses]
+    _, whiteners = filters(*on[0], setting.floor, setting.levels)
     n, z, rows = trial.readings.size, [], []
     for hypothesis, (own, v) in zip(hypotheses, on, strict=True):
         residual, J = whitened(own, v, whiteners)

@@ -14,7 +14,7 @@ from ._score import Scores, promising, score
 Answer = tuple[Refit, Scores, Adequacy]
 
 
-def with_wider_noise(nominal: Refit, effects: Iterable[str] | None) -> Answer | None:
+def with_wider_noise(nominal: Refit, effects: Iterable[str] | None, slow: bool = True) -> Answer | None:
     """The nominal fit with noise unlike the declared one, if that leaves nothing to explain; else None.
 
     First levels up to 2.2 times off; then a slow part of the sensors' noise, at most as large as the declared noise,
@@ -27,9 +27,11 @@ def with_wider_noise(nominal: Refit, effects: Iterable[str] | None) -> Answer | 
         Without any effect.
     effects : iterable of str, optional
         Catalogue.
+    slow : bool
+        Whether to ask the second question too.
     """
     effects = None if effects is None else list(effects)
-    return _with_wide_levels(nominal, effects) or _with_slow_part(nominal, effects)
+    return _with_wide_levels(nominal, effects) or (_with_slow_part(nominal, effects) if slow else None)
 
 
 def _with_wide_levels(nominal: Refit, effects: list[str] | None) -> Answer | None:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import robthermal as rt
+from robthermal.calibration._operating_point import OperatingPoint
+from robthermal.calibration._response_model import sampled_response
 from robthermal.errors import InputError
 
 AREA, POM_LENGTH, ALUMINIUM_LENGTH, LUMPS = 4e-4, 0.01, 0.06, 3
@@ -144,3 +146,23 @@ def test_bad_input_is_refused_by_name() -> None:
                       links=[{"between": ("x", "lab"), "conductance": 1.0}], sensors={"T1": {"lump": "x"}})
     with pytest.raises(InputError, match="no input of the system"):
         rt.calibrate(other, response, parameters={"lumps.x.capacity": (1.0, 100.0)})
+
+
+@pytest.mark.parametrize(("h", "read", "driven"), [
+    (5.0, 0.0, 0.7), (5.0, 0.0, 5.0), (5.0, 0.0, 12.6), (5.0, 5.0, 3.1), (0.5, 0.62, 0.0), (0.5, 0.15, 1.0)])
+def test_delays_of_held_inputs_are_exact_between_samples(h: float, read: float, driven: float) -> None:
+    # periodic inputs: spectra of the last period of a simulation, which interpolates late readings (error h^4, no jumps)
+    n = 40
+    plain = rt.System(
+        ambients={"room": {"temperature": 295.0}}, lumps={"plate": {"capacity": 30.0}, "block": {"capacity": 12.0}},
+        links=[{"between": ("plate", "room"), "conductance": 0.9}, {"between": ("plate", "block"), "conductance": 1.1}],
+        inputs={"heater": {"lump": "block"}},
+        sensors={"Tp": {"lump": "plate"}, "Tb": {"lump": "block", "time_constant": 4.0}})
+    late = plain.with_parameters({"inputs.heater.drive.delay": driven, "sensors.Tp.delay": read})
+    heater = np.tile(np.random.default_rng(2).uniform(0.0, 6.0, n), round(150 / h))
+    drive = rt.Record(sample_time=h, inputs=heater, outputs=np.zeros((heater.size, 0)), input_names=["heater"],
+                      output_names=[])
+    readings = rt.thermal.simulate(late, drive, tolerance=1e-9).outputs[-n:]
+    G = (np.fft.rfft(readings, axis=0) / np.fft.rfft(heater[-n:])[:, None])[1:]
+    found = sampled_response(late, np.arange(1, n // 2 + 1) / (n * h), h, OperatingPoint({}), ("Tp", "Tb"), ("heater",))
+    np.testing.assert_allclose(found[:, :, 0], G, rtol=0, atol=1e-6 * np.abs(G).max())

@@ -10,6 +10,7 @@ import pytest
 import robthermal as rt
 from robthermal.diagnosis._next_experiment import rivals
 from robthermal.diagnosis._separation import hypotheses_of, separation
+from robthermal.diagnosis._setting import setting_of
 from robthermal.diagnosis._trial_inputs import limits_of
 
 Array = np.ndarray
@@ -211,10 +212,43 @@ def test_promise_of_a_measurement_is_the_distance_of_the_two_values(
     R_j, R_k = (float(fit.structure.ranges.values(fit.v[:fit.structure.n_parameters])[at]) for fit in (j, k))
     idle = rt.Record(sample_time=H, inputs=np.tile([0.0, ROOM], (300, 1)), outputs=np.zeros((300, 2)),
                      input_names=["m", "room"], output_names=["Tc", "Th"])
-    found = separation(hypotheses_of(entries), j, 0, idle)
+    found = separation(hypotheses_of(entries), setting_of(j), idle)
     asked = rt.diagnosis.Measurement("modules.m.resistance.value", 0.005)
     gain = found.pairs(asked)[entries[0].candidate.label, entries[1].candidate.label]
     each = [(R_j - R_k) ** 2 / ((0.005 * true) ** 2 + (own**2) * fit.covariance[at, at] / max(fit.variance, 1.0))
             for true, own, fit in ((R_j, R_k, k), (R_k, R_j, j))]
     assert gain == pytest.approx(min(each), rel=0.05)
     assert max(found.pairs().values()) < 1.0
+
+
+def answered(run: Callable[[Array], Array], seed: int) -> rt.identify.FrequencyResponse:
+    heater = np.repeat(np.random.default_rng(seed).uniform(3.0, 6.0, 1500), 2)
+    y = run(heater) + 0.01 * np.random.default_rng(1000 + seed).standard_normal((heater.size, 2))
+    return rt.identify.lpm(rt.Record(sample_time=H, inputs=heater, outputs=y, input_names=["heater"],
+                                     output_names=["Tp", "Tb"]))
+
+
+def test_response_of_a_delayed_held_input_is_not_taken_for_a_lag(bench: rt.System) -> None:
+    late = rt.diagnose(bench, answered(truth(delay=2.0), 5), operating_point={"heater": 4.5},
+                       effects=["input_delay", "input_lag", "sensor_lag"])
+    assert late.verdict == "named" and late.effects[0].label == "input_delay(heater)"
+    value, std, _ = late.effects[0].values["delay"]
+    assert abs(value - 2.0) < 4.0 * std
+
+
+def test_record_is_planned_after_a_response(bench: rt.System) -> None:
+    run = truth(delay=0.5)
+    found = rt.diagnose(bench, answered(run, 5), operating_point={"heater": 4.5}, effects=["input_delay", "input_lag"])
+    assert found.verdict == "ambiguous" and {"input_delay(heater)", "input_lag(heater)"} == allowed(found)
+    plan = found.next_experiment
+    assert plan is not None and plan.expected > 100.0 > plan.present
+    assert plan.record.sample_time == pytest.approx(0.1 * 3000 * H / 2000) and len(plan.record) == 2000
+    assert plan.record["heater"].min() >= 0.0 and plan.record["heater"].max() <= 12.0
+
+
+def test_no_record_is_planned_for_sensors_of_unknown_noise(bench: rt.System) -> None:
+    silent = bench.model_copy(update={"sensors": {name: sensor.model_copy(update={"noise": 0.0})
+                                                  for name, sensor in bench.sensors.items()}})
+    found = rt.diagnose(silent, answered(truth(delay=0.5), 5), operating_point={"heater": 4.5},
+                        effects=["input_delay", "input_lag"])
+    assert found.verdict == "ambiguous" and found.next_experiment is None
