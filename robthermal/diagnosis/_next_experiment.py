@@ -35,6 +35,8 @@ _MORE = 0.2  # pairs told apart: what makes another measurement worth its troubl
 _HOPELESS = 6  # trials
 _FASTER = 10.0  # of the sample time, where no input at the present one is enough
 _FAST_TRIALS = 3
+_LONGEST = 4  # times the present number of samples, where a plan separates too little
+_LEAST = 2.0  # expected ΔBIC below which a longer record is not worth it
 _ALIKE = 0.5  # expected ΔBIC below which no input is said to separate a pair
 _FIRST = 5  # evaluations of the refit of an alias, which is as good as its twin already
 
@@ -85,7 +87,8 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
     T-optimality (Hunter and Reiner 1965) with everything refitted: the smallest over the pairs of the expected gain of
     ΔBIC is made large over switched, stepped and multisine inputs within the limits, one input at a time or all
     together; a coordinate search then improves the best. Where that is not enough, some inputs are tried at a tenth of
-    the sample time, and then resistances and Seebeck coefficients of modules as measured by themselves.
+    the sample time, and then resistances and Seebeck coefficients of modules as measured by themselves; at last the
+    inputs are repeated, up to four times the present number of samples.
 
     Parameters
     ----------
@@ -236,6 +239,19 @@ class _Search:
         best = most_telling({option: _worth(pairs) for option, pairs in options.items()}, self.worth(trial) + _MORE)
         return (None, trial.pairs) if best is None else (best, options[best])
 
+    def prolonged(self, trial: _Trial, times: int, measurement: Measurement | None) -> _Trial | None:
+        """The inputs of a trial several times, one after the other; None if that is too warm or runs away."""
+        r = trial.record
+        long = Record(sample_time=r.sample_time, inputs=np.tile(r.inputs, (times, 1)),
+                      outputs=np.tile(r.outputs, (times, 1)), input_names=r.input_names, output_names=r.output_names,
+                      name=r.name)
+        try:
+            if not self._allowed(long):
+                return None
+            return _Trial(long, separation(self.hypotheses, self.setting, long).pairs(measurement))
+        except (Diverged, InputError):
+            return None
+
     def plenty(self, tried: Sequence[_Trial]) -> bool:
         """Whether a trial separates every pair; or nothing has separated any."""
         hopeless = len(tried) > _HOPELESS and all(gain < _ALIKE for one in tried for gain in one.pairs.values())
@@ -265,17 +281,23 @@ def _plan(entries: Sequence[Entry], search: _Search, repeated: _Trial, tried: Se
     apart = [pair for pair in pairs if pair not in alike]
     expected = min((pairs[pair] for pair in apart), default=0.0)
     now = min((repeated.pairs.get(pair, 0.0) for pair in apart), default=0.0)
+    times = min(int(np.ceil(_ENOUGH / max(expected, 1e-9))), _LONGEST) if expected > _LEAST else 1
+    if times > 1 and (longer := search.prolonged(best, times, measurement)) is not None:
+        best, pairs = longer, longer.pairs
+        expected = min(pairs[pair] for pair in apart)
+    times = len(best.record) // len(search.setting.one.record)
     record = simulate(search.system, best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
     faster = best.record.sample_time < search.setting.one.record.sample_time
-    besides = _besides(best.record if faster else None, measurement)
+    besides = _besides(best.record if faster else None, times, measurement)
     text = _advice(named, alike, apart, expected, now, besides)
     return NextExperiment(record, expected, now, pairs, alike, text, measurement)
 
 
-def _besides(faster: Record | None, measurement: Measurement | None) -> str:
+def _besides(faster: Record | None, times: int, measurement: Measurement | None) -> str:
     """What more than other inputs the plan asks for."""
     asked = [f"sample every {faster.sample_time:.3g} s"] if faster is not None else []
+    asked += [f"measure {times} times as many samples as before"] if times > 1 else []
     asked += [str(measurement)] if measurement is not None else []
     return f" Also {' and '.join(asked)}." if asked else ""
 
@@ -288,8 +310,7 @@ def _advice(named: Mapping[str, Candidate], alike: Sequence[Pair], apart: Sequen
                     f"that it tells apart (the present inputs once more: {now:.0f}).{besides}")
     elif apart:
         hints = {named[label].effect.separated_by for pair in apart for label in pair} - {""}
-        longer = f"; {np.ceil(_HELPS / expected):.0f} such records" if expected > 1.0 else ""
-        text.append(f"The inputs of this plan separate them little (expected ΔBIC {expected:.1f}){longer}. "
+        text.append(f"The inputs of this plan separate them little (expected ΔBIC {expected:.1f}). "
                     f"What separates them: {'; '.join(sorted(hints))}.{besides}")
     if alike:
         labels = list(dict.fromkeys(label for pair in alike for label in pair))

@@ -124,7 +124,7 @@ def separation(hypotheses: Sequence[Hypothesis], setting: Setting, record: Recor
         Inputs to apply.
     """
     one = setting.one
-    trial = Data(record, one.sensors, one.columns, one.readings)
+    trial = Data(record, one.sensors, one.columns, np.zeros((len(record), len(one.sensors))))  # only differences count
     on = [hypothesis.on(trial, setting) for hypothesis in hypotheses]
     _, whiteners = filters(*on[0], setting.floor, setting.levels)
     n, z, rows = trial.readings.size, [], []

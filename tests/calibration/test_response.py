@@ -151,7 +151,7 @@ def test_bad_input_is_refused_by_name() -> None:
 @pytest.mark.parametrize(("h", "read", "driven"), [
     (5.0, 0.0, 0.7), (5.0, 0.0, 5.0), (5.0, 0.0, 12.6), (5.0, 5.0, 3.1), (0.5, 0.62, 0.0), (0.5, 0.15, 1.0)])
 def test_delays_of_held_inputs_are_exact_between_samples(h: float, read: float, driven: float) -> None:
-    # periodic inputs: spectra of the last period of a simulation, which interpolates late readings (error h^4, no jumps)
+    # periodic inputs: spectra of a simulation's last period, which interpolates late readings (error h^4, no jumps)
     n = 40
     plain = rt.System(
         ambients={"room": {"temperature": 295.0}}, lumps={"plate": {"capacity": 30.0}, "block": {"capacity": 12.0}},

@@ -21,6 +21,17 @@ def exact_alias(topology: str, a: list[Any], b: list[Any]) -> bool:
     return lump is not None and lump == _constant_heat(topology, b)
 
 
+FAMILIES = (  # near aliases that the contract and its notes list, at the same or a neighbouring place
+    {"input_lag", "input_delay", "sensor_lag"}, {"joule_split", "lead_heating"}, {"sensor_gain"},
+    {"missing_ambient_link", "radiation", "natural_convection", "condensation"})
+
+
+def near_aliases(row: Row) -> bool:
+    """Whether every hidden effect is in a set that holds nothing but near aliases of one family."""
+    return has_truth(row) and all(any({name[0] for name in names} <= family for family in FAMILIES)
+                                  or unique(row, names) for names in sets(row))
+
+
 def _constant_heat(topology: str, name: list[Any]) -> str | None:
     """Lump that gets a constant heat from this effect, if it is one."""
     plant, (effect, where) = PLANTS[topology](), name

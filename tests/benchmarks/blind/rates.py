@@ -17,6 +17,7 @@ from .judge import (
     detected,
     excess,
     has_truth,
+    near_aliases,
     own_top_one,
     ratio,
     sets,
@@ -62,6 +63,8 @@ def print_rates(rows: list[Row]) -> None:
     print_rate("truth in the returned set", ">= 97 %", said, has_truth)
     print_rate("  the same, 'unexplained' counted as a miss", "", seen, has_truth)
     print_rate("unique, ΔBIC > 300", ">= 92 %", (r for r in seen if strength(r) > 300), all_named)
+    print_rate("  unique, or in a set of near aliases of one family", "", (r for r in seen if strength(r) > 300),
+               near_aliases)
     print_rate("unique, ΔBIC 50 to 300", ">= 60 %", (r for r in seen if 50 < strength(r) <= 300), all_named)
     for low, high, aim in ((0, 0.7, ""), (0.7, 1.3, ""), (1.3, np.inf, ">= 90 %"), (3.0, np.inf, "")):
         print_rate(f"detected at {low} to {high} times the declared limit", aim,
@@ -108,7 +111,7 @@ def print_excess(rows: list[Row]) -> None:
 
 def print_follow(rows: list[Row]) -> None:
     """Ambiguous answers after the recommended experiment."""
-    one = [row for row in rows if row["group"] == "hidden"]
+    one = [row for row in rows if row["group"] == "hidden" and not all_named(row)]  # exact aliases count as unique
 
     def after(row: Row) -> Row:
         return {**row, "names": [], "others": [], **row["follow"]}
