@@ -11,22 +11,23 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
+from .._fitting._data import Data, as_data, refuse_same, refuse_short
+from .._fitting._free_run import validate
+from .._fitting._noise import LOSSES, Loss, declared_noise, estimated_noise, scipy_loss
+from .._fitting._problem import Problem, Weigh, scaled
+from .._fitting._ranges import Choice, Ranges, chosen_ranges
+from .._fitting._start import STARTS, Start, initial_of
 from ..errors import Diverged, InputError, Outcome
 from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System
 from ._covariance import information
-from ._data import Data, as_data, refuse_same, refuse_short
 from ._directions import in_words
 from ._estimates import outcome_of
 from ._fit import Fit
 from ._innovations import has_disturbance, whitener
-from ._noise import LOSSES, Loss, declared_noise, estimated_noise, scipy_loss
-from ._problem import Problem, Weigh, scaled
-from ._ranges import Choice, Ranges, chosen_ranges
 from ._response_fit import ResponseFit, calibrate_response
-from ._score import score_of, validate
-from ._start import STARTS, Start, initial_of
+from ._score import score_of
 from ._whiteness import whiteness_of
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from .._fitting._noise import Loss, score, score_slope
+from .._fitting._problem import Problem
+from .._fitting._ranges import Ranges
 from ._autoregression import correlation_of
-from ._noise import Loss, score, score_slope
-from ._problem import Problem
-from ._ranges import Ranges
 
 Array = NDArray[np.float64]
 _ZERO = 1e-12  # relative eigenvalue that is rounding

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from .._fitting._data import Data
 from ..thermal import System, linearize, trajectory
-from ._data import Data
 
 Array = NDArray[np.float64]
 _STEADY = 1e-12  # relative change of the state covariance at which the gain counts as constant

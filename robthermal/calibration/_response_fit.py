@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from .._fitting._operating_point import OperatingPoint
+from .._fitting._ranges import Choice, chosen_ranges
 from ..errors import InputError, Outcome
 from ..identify import FrequencyResponse
 from ..thermal import System
 from ._covariance import with_priors
 from ._directions import in_words
 from ._estimates import Estimates, outcome_of
-from ._operating_point import OperatingPoint
-from ._ranges import Choice, chosen_ranges
 from ._response_bins import bins_of, spread_of_score
 from ._response_model import ResponseProblem
 

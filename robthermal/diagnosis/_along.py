@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..errors import InputError
 from ..thermal import Equations, System, Trajectory, trajectory
 

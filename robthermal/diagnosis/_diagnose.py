@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..calibration._ranges import Choice
+from .._fitting._ranges import Choice
 from ..errors import Outcome
 from ..thermal import System
 from ._adequacy import Adequacy, adequacy

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data, as_data
-from ..calibration._operating_point import OperatingPoint
-from ..calibration._response_model import sampled_response
+from .._fitting._data import Data, as_data
+from .._fitting._operating_point import OperatingPoint
+from .._fitting._sampled_response import sampled_response
 from ..errors import Diverged, InputError
 from ..identify import FrequencyResponse
 from ..signals import Record

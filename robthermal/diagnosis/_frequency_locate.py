@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ._frequency_data import ResponseData
 from ._frequency_model import AlongResponse
 from ._refit import Refit, whitened

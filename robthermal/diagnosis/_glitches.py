@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..errors import Diverged, InputError
 from ..thermal import System, trajectory
 from ._frequency_data import ResponseData

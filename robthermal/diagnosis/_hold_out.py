@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from ..calibration._data import Data, refuse_same
-from ..calibration._score import validate
+from .._fitting._data import Data, refuse_same
+from .._fitting._free_run import validate
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import System
 from ._along import Along

@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..errors import Diverged, InputError
 from ..thermal import System, trajectory
 from ._effect import Candidate

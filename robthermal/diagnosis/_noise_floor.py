@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
-from ..calibration._noise import SMALLEST, declared_noise, quantum
+from .._fitting._data import Data
+from .._fitting._noise import SMALLEST, declared_noise, quantum
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ._frequency_data import Measured, ResponseData, as_measured

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._ranges import NONE, Choice, chosen_ranges
+from .._fitting._ranges import NONE, Choice, chosen_ranges
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import System
 from ._along import Along, along

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..signals import Record
 from ._measurement import Measurement
 from ._refit import filters, whitened

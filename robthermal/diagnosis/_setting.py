@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..calibration._data import Data
-from ..calibration._start import Initial, initial_of
+from .._fitting._data import Data
+from .._fitting._start import Initial, initial_of
 from ..signals import Record
 from ..thermal import System, steady_state
 from ._frequency_data import ResponseData

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
-from ..calibration._ranges import Ranges
-from ..calibration._start import Initial, Start, initial_of, start_values
+from .._fitting._data import Data
+from .._fitting._ranges import Ranges
+from .._fitting._start import Initial, Start, initial_of, start_values
 from ..errors import InputError
 from ..thermal import System, trajectory
 from ._along import Along, along

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..signals import Record
 from ..thermal import System
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from ..calibration._data import Data
+from .._fitting._data import Data
 from ..errors import Diverged, InputError, Outcome
 from ..signals import Record
 from ..thermal import Input

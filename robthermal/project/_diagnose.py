@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ..calibration._data import as_data
-from ..calibration._score import validate
+from .._fitting._data import as_data
+from .._fitting._free_run import validate
 from ..diagnosis import Along, Diagnosis, Refit, diagnose
 from ..diagnosis._frequency_model import AlongResponse
 from ..errors import Diverged, InputError

@@ -94,7 +94,7 @@ def test_gathered_noise_is_the_integral() -> None:
 
 def test_whitening_is_the_inverse_root_of_the_residuals_covariance() -> None:
     # L⁻¹ of a filter started at the known state satisfies L⁻¹ Σ L⁻ᵀ = 1 with Σ built by brute force over the samples.
-    from robthermal.calibration._data import as_data
+    from robthermal._fitting._data import as_data
     from robthermal.calibration._innovations import whitener
 
     system, n = plant(), 12

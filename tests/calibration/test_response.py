@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.calibration._operating_point import OperatingPoint
-from robthermal.calibration._response_model import sampled_response
+from robthermal._fitting._operating_point import OperatingPoint
+from robthermal._fitting._sampled_response import sampled_response
 from robthermal.errors import InputError
 
 AREA, POM_LENGTH, ALUMINIUM_LENGTH, LUMPS = 4e-4, 0.01, 0.06, 3

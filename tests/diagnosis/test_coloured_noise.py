@@ -14,7 +14,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import robthermal as rt
-from robthermal.calibration._data import Data, as_data
+from robthermal._fitting._data import Data, as_data
 from robthermal.diagnosis._along import Along, along
 from robthermal.diagnosis._levels import Levels, refined, with_slow_part
 from robthermal.diagnosis._whitening import SlowNoise, settled_cost, whitener

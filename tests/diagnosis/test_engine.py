@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.calibration._data import as_data
+from robthermal._fitting._data import as_data
 from robthermal.diagnosis import _revise
 from robthermal.diagnosis._along import along
 from robthermal.diagnosis._decide import Decision

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import nnls
 
 import robthermal as rt
-from robthermal.calibration._data import as_data
+from robthermal._fitting._data import as_data
 from robthermal.diagnosis import _score
 from robthermal.diagnosis._along import Along, along
 from robthermal.diagnosis._descent import descend
