@@ -32,7 +32,7 @@ from ._next_experiment import next_experiment as next_experiment
 from ._noise_floor import NoiseFloor as NoiseFloor
 from ._noise_floor import noise_floor as noise_floor
 from ._refit import Refit as Refit
-from ._refit import refit as refit
+from ._refitting import refit as refit
 from ._score import Scores as Scores
 from ._score import score as score
 from ._short_list import Entry as Entry

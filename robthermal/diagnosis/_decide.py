@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ._refit import Refit, fitted
+from ._refit import Refit
+from ._refitting import fitted
 from ._score import ALPHA, BIC_GAP
 from ._short_list import Entry, ShortList, refiltered
 

@@ -21,7 +21,8 @@ from ._joint_check import checked_jointly
 from ._locate import locate
 from ._next_experiment import NextExperiment, next_experiment, rivals
 from ._noise_floor import noise_floor
-from ._refit import Refit, refit, whitened
+from ._refit import Refit
+from ._refitting import refit, whitened
 from ._revise import revised
 from ._score import Scores, promising, score
 from ._sessions import SessionGain

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from .._fitting._data import Data
 from ._frequency_data import ResponseData
 from ._frequency_model import AlongResponse
-from ._refit import Refit, whitened
+from ._refit import Refit
+from ._refitting import whitened
 from ._structure import start_of
 
 Array = NDArray[np.float64]

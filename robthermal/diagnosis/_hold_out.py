@@ -18,7 +18,8 @@ from ._descent import Descent, descend
 from ._frequency_data import Measured, ResponseData, as_measured
 from ._frequency_locate import response_rms
 from ._glitches import without_glitches
-from ._refit import Refit, filters, paths_of, whitened
+from ._refit import Refit
+from ._refitting import filters, paths_of, whitened
 from ._structure import Structure, start_of
 from ._whitening import gathered
 

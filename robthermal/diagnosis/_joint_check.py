@@ -9,7 +9,8 @@ from ._decide import Decision
 from ._effect import Candidate
 from ._joint import JointSelection, select_jointly
 from ._joint_sets import EffectSet, Key, bic
-from ._refit import Refit, extended
+from ._refit import Refit
+from ._refitting import extended
 from ._revise import revised
 from ._score import BIC_GAP, Scores
 from ._short_list import Entry

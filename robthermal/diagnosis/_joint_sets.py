@@ -15,7 +15,8 @@ from ..errors import Diverged, InputError
 from ..thermal import System, trajectory
 from ._effect import Candidate
 from ._frequency_data import ResponseData
-from ._refit import LIMIT, Refit, extended
+from ._refit import Refit
+from ._refitting import LIMIT, extended
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]

@@ -1,39 +1,32 @@
-"""Stage 2: refit a structure with its priors; the whitened residual and what is left after the nominal parameters."""
+"""Result of stage 2: a structure fitted to the records, and what is left after the nominal parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._ranges import NONE, Choice, chosen_ranges
-from ..errors import Diverged, InputError, Outcome
+from ..errors import Outcome
 from ..thermal import System
-from ._along import Along, along
-from ._descent import Descent, descend
+from ._along import Along
 from ._effect import Candidate
-from ._frequency_data import Measured, ResponseData, as_measured
-from ._frequency_model import AlongResponse, along_response
+from ._frequency_model import AlongResponse
 from ._frequency_whitening import ResponseWhitener
-from ._glitches import without_glitches
-from ._levels import Levels, refined
-from ._noise_floor import NoiseFloor, noise_floor
-from ._sessions import SessionGain, session_table, sessions_of
-from ._structure import Structure, start_of, structure_of
-from ._whitening import Whitener, whitener
+from ._levels import Levels
+from ._noise_floor import NoiseFloor
+from ._sessions import session_table
+from ._structure import Structure
+from ._whitening import Whitener
 
 Array = NDArray[np.float64]
 Path = Along | AlongResponse
 White = Whitener | ResponseWhitener
-LIMIT = 40  # evaluations of a refit
-_ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
 _FLAT = 1e-9  # relative size of a direction of J that counts as none
 _CONTRADICTED = 6.0  # standard deviations of a prior
-_ROUNDS = 3  # of filter and noise levels
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,139 +228,3 @@ class Refit:
             ax.set(title=path.one.label)
             ax.legend(fontsize="small")
         return axes[:, 0]
-
-
-def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFloor | None = None, *,
-          parameters: Choice = None, operating_point: Mapping[str, float] | None = None,
-          session_gain: SessionGain = False) -> Refit:
-    """Refit the nominal parameters and the initial temperatures to the records, with their priors.
-
-    Parameters
-    ----------
-    system : System
-        Nominal. `sigma` in its fit table are the priors.
-    records : Record, FrequencyResponse, or list of them
-        Measured.
-    floor : NoiseFloor, optional
-        From `noise_floor`.
-    parameters : iterable or mapping, optional
-        As in `rt.calibrate`. Default: the fit table; without one, all parameters are taken as known.
-    operating_point : mapping, optional
-        For frequency responses: mean heaters [unit], module currents [A] and ambients [K] of the experiment; default
-        off and nominal.
-    session_gain : bool or mapping
-        Whether every record has a gain of its own of every heater and module: True, with a prior of 5 %, or a mapping
-        from input to the standard deviation of its gain [-].
-
-    Returns
-    -------
-    Refit
-
-    Raises
-    ------
-    InputError
-        As `noise_floor`; a nominal model that runs away; priors that contradict the bounds.
-
-    Examples
-    --------
-    >>> import numpy as np, robthermal as rt
-    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
-    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
-    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
-    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
-    >>> drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
-    ...                   output_names=[])
-    >>> run = rt.thermal.simulate(bar, drive)
-    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
-    >>> fit = rt.diagnosis.refit(bar, noisy, parameters={"lumps.bar.capacity": (10.0, 500.0)})
-    >>> 0.8 < fit.variance < 1.2
-    True
-    """
-    floor = noise_floor(system, records) if floor is None else floor
-    data = without_glitches(system, as_measured(system, records, "records", operating_point), floor.noise)
-    ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
-    starts = [start_of(system, one) for one in data]
-    structure = structure_of(system, ranges, data, starts, sessions_of(system, session_gain))
-    n_unknown = structure.n_parameters + structure.n_own
-    if structure.n_readings <= 2 * n_unknown:
-        raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
-                         expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
-    try:
-        return fitted(structure, structure.start(ranges.start, []), floor, Levels(1.0, {}))
-    except Diverged as error:
-        raise InputError(f"the nominal model runs away: {error}", where="argument system",
-                         remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
-
-
-def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) -> Refit:
-    """Fit from v; filter and noise levels are renewed at the estimate, and the fit repeated."""
-    for _ in range(_ROUNDS):
-        paths, whiteners = filters(structure, v, floor, levels)
-        found = minimised(structure, v, whiteners)
-        v = found.v
-        paths = paths_of(structure, v)
-        new = _refined(paths, floor, levels)
-        if new.close_to(levels):
-            break
-        levels = new
-    paths, whiteners = filters(structure, v, floor, levels)
-    z, J = whitened(structure, v, whiteners)
-    return Refit(structure, v, floor, levels, paths, whiteners, z, J, _outcome(found))
-
-
-def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
-    """Fit another structure with the same filters, so that sums of squares can be compared."""
-    found = minimised(structure, v, fit.whiteners, limit)
-    return replace(fit, structure=structure, v=found.v, z=found.z, J=found.J, outcome=_outcome(found))
-
-
-def relinearised(fit: Refit) -> Refit:
-    """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
-    return replace(fit, paths=paths_of(fit.structure, fit.v))
-
-
-def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
-            ) -> tuple[tuple[Path, ...], tuple[White, ...]]:
-    """Linearisation and filter of every record; whitener of every response."""
-    paths = paths_of(structure, v)
-    return paths, tuple(path.one.white if isinstance(path, AlongResponse) else
-                        whitener(path, *levels.of(path, floor), levels.slow(path, floor)) for path in paths)
-
-
-def paths_of(structure: Structure, v: Array) -> tuple[Path, ...]:
-    """Linearisation along every record; the modelled response beside every measured one."""
-    return tuple(along_response(system, one) if isinstance(one, ResponseData) else run.path or along(system, one)
-                 for system, one, run in zip(structure.systems(v), structure.data, structure.runs(v), strict=True))
-
-
-def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels:
-    """Noise levels of the records; those of responses come with them."""
-    records = [path for path in paths if isinstance(path, Along)]
-    if not records:
-        return levels
-    sensors = {name for path in records for name in path.one.sensors}
-    return refined(records, replace(floor, noise={name: floor.noise[name] for name in floor.noise if name in sensors}),
-                   levels)
-
-
-def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
-    """Gauss-Newton with fixed filters."""
-    return descend(lambda v: whitened(structure, v, whiteners), v, structure.bounds, limit, _ENOUGH)
-
-
-def whitened(structure: Structure, v: Array, whiteners: Sequence[White]) -> tuple[Array, Array]:
-    """Whitened residuals of all readings, then of the priors, and the derivative of the model."""
-    z, J = [], []
-    for run, w in zip(structure.runs(v), whiteners, strict=True):
-        both = w(np.concatenate([run.residual[..., None], run.slopes], axis=2)).reshape(-1, 1 + v.size)
-        z.append(both[:, 0])
-        J.append(both[:, 1:])
-    prior, prior_J = structure.prior(v)
-    return np.concatenate([*z, prior]), np.concatenate([*J, prior_J])
-
-
-def _outcome(found: Descent) -> Outcome:
-    if found.converged:
-        return Outcome(True, "converged", f"Converged in {found.iterations} evaluations.")
-    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow "
-                   "the bounds, or give priors (sigma) to parameters the data do not determine.")

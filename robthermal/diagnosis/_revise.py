@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from ..errors import InputError
 from ._decide import Decision, settled
 from ._effect import Candidate
-from ._refit import Refit, extended, relinearised
+from ._refit import Refit
+from ._refitting import extended, relinearised
 from ._score import BIC_GAP, score
 from ._short_list import refit_short_list
 

@@ -13,7 +13,7 @@ from scipy.linalg import qr
 from .._fitting._data import Data
 from ..signals import Record
 from ._measurement import Measurement
-from ._refit import filters, whitened
+from ._refitting import filters, whitened
 from ._setting import Setting
 from ._short_list import Entry
 from ._structure import Structure

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from ..errors import Diverged, InputError
 from ._effect import Candidate
-from ._refit import Refit, extended
+from ._refit import Refit
+from ._refitting import extended
 from ._score import BIC_GAP, Scores
 from ._starts import Origin, started
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..errors import Diverged, InputError
 from ._effect import Candidate
-from ._refit import Refit, extended, paths_of, whitened
+from ._refit import Refit
+from ._refitting import extended, paths_of, whitened
 from ._score import columns
 
 Array = NDArray[np.float64]

@@ -16,7 +16,8 @@ from ..thermal import Input
 from ._along import Along
 from ._frequency_data import ResponseData
 from ._locate import locate
-from ._refit import Refit, filters, whitened
+from ._refit import Refit
+from ._refitting import filters, whitened
 
 Array = NDArray[np.float64]
 _PROBE = "extra heat"

@@ -8,7 +8,8 @@ from dataclasses import replace
 from ..errors import Diverged
 from ._adequacy import Adequacy, adequacy
 from ._levels import LIMIT, WIDE, Levels, with_slow_part
-from ._refit import Refit, fitted
+from ._refit import Refit
+from ._refitting import fitted
 from ._score import Scores, promising, score
 
 Answer = tuple[Refit, Scores, Adequacy]

@@ -106,13 +106,14 @@ class Integrator:
         z[0] = z0
         refined: dict[int, Array] = {}
         k, level = 0, 0
-        while k < n - 1:
-            whole = level == 0 and n - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
-            if whole and self._advance_window(z, w, k):
-                k += WINDOW
-                continue
-            level = self._advance_segment(z, plan, k, level, refined)
-            k += 1
+        with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
+            while k < n - 1:
+                whole = level == 0 and n - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
+                if whole and self._advance_window(z, w, k):
+                    k += WINDOW
+                    continue
+                level = self._advance_segment(z, plan, k, level, refined)
+                k += 1
         return _path(z, refined)
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:

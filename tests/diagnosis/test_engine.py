@@ -15,7 +15,7 @@ from robthermal.diagnosis._along import along
 from robthermal.diagnosis._decide import Decision
 from robthermal.diagnosis._descent import descend
 from robthermal.diagnosis._glitches import outliers
-from robthermal.diagnosis._refit import extended
+from robthermal.diagnosis._refitting import extended
 from robthermal.diagnosis._short_list import Entry, ShortList
 from robthermal.diagnosis._starts import Origin, started
 from robthermal.diagnosis._whitening import whitener
