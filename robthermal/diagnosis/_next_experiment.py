@@ -31,6 +31,7 @@ _ENOUGH = 40.0  # expected ΔBIC that exceeds 10 with a probability of 0.99
 _HELPS = 20.0  # expected ΔBIC from which the advice is to apply it as it is: a probability of 0.87
 _PLENTY = 80.0  # a search that reaches it ends
 _LITTLE = 1e-3  # pairs per unit of ΔBIC: so that a search finds its way where nothing is told apart yet
+_TIE = 1e-7  # pairs per unit of ΔBIC of the closest pair: of equals the clearest
 _MORE = 0.2  # pairs told apart: what makes another measurement worth its trouble
 _HOPELESS = 6  # trials
 _FASTER = 10.0  # of the sample time, where no input at the present one is enough
@@ -186,13 +187,14 @@ class _Trial:
 
 
 def _worth(pairs: Mapping[Pair, float]) -> float:
-    """Expected number of pairs that will be told apart; where that is none, the gains themselves, a little.
+    """Expected number of pairs that will be told apart; where that is none, or all, the gains themselves, a little.
 
     The gain of ΔBIC is normal with mean λ and variance 4 λ, and has to exceed 10.
     """
     gain = np.array(list(pairs.values()))
     apart = norm.cdf((gain - BIC_GAP) / (2.0 * np.sqrt(np.maximum(gain, 1e-9))))
-    return float(np.sum(apart + _LITTLE * np.minimum(gain, _ENOUGH)))
+    least = float(gain.min()) if gain.size else 0.0
+    return float(np.sum(apart + _LITTLE * np.minimum(gain, _ENOUGH))) + _TIE * least
 
 
 @dataclass(frozen=True, eq=False)
