@@ -68,9 +68,11 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
     path = _checked(path)
     if not path.is_file():
         raise InputError(f"no such file: {path}", where="path")
-    _refuse_large(path)
     try:
+        _refuse_large(path)
         content = {".json": _read_json, ".npz": _read_npz, ".mat": _read_mat}[path.suffix](path)
+    except InputError:  # says it better than what follows
+        raise
     except _UNREADABLE as error:
         raise InputError(
             f"cannot be read: {error}", where=str(path), expected="a file written by FrequencyResponse.save"

@@ -29,7 +29,7 @@ class TdmsSource:
             self._group = {channel.name: group.name for group in described.groups() for channel in group.channels()}
             found = [channel for group in described.groups() for channel in group.channels()]
         except _DAMAGED as error:
-            raise InputError(f"this is no TDMS file ({error})", where=f"{path}") from None
+            raise InputError(f"this is no TDMS file ({error})", where=f"{path}") from error
         if not found:
             raise InputError("this is no TDMS file, or it holds no channels", where=f"{path}")
         refuse_large(path, 8.0 * sum(len(channel) for channel in found), "bytes unpacked", max_bytes)
@@ -45,11 +45,12 @@ class TdmsSource:
     def read(self, wanted: Sequence[str]) -> dict[str, Array]:
         """The wanted columns; time is made from the waveform increment where there is no channel for it."""
         names = [header for header in wanted if header not in self._made_time]
+        groups = {name: self._group[name] for name in names}
         try:
             with self._library.TdmsFile.open(self.path) as file:
-                raw = {name: np.asarray(file[self._group[name]][name][:]) for name in names}
+                raw = {name: np.asarray(file[group][name][:]) for name, group in groups.items()}
         except _DAMAGED as error:
-            raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from None
+            raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from error
         columns = {name: numeric(column, name, self.path) for name, column in raw.items()}
         equally_long(columns, self.path)
         if self._made_time and names:
