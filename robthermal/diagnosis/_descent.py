@@ -1,4 +1,4 @@
-"""Gauss-Newton with bounds and step halving."""
+"""Gauss-Newton with bounds; where a step fails, Marquardt's damping."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from ..errors import Diverged, InputError
 
 Array = NDArray[np.float64]
 _FLAT = 1e-10  # relative singular value that is rounding
-_HALVINGS = 8
+_DAMPING = 1e-3  # the least, relative to the squares of the derivatives
+_STIFFEST = 1e5
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,32 +61,34 @@ def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: 
     """
     v = np.clip(v, *bounds)
     z, J = evaluate(v)
-    count = 1
+    count, damping = 1, 0.0
     while True:
-        step = _step(z, J, v, bounds)
-        decrease = float(z @ z - (z - J @ step) @ (z - J @ step))
         power = float(z @ z)
-        if decrease <= enough * power * (1.0 + 10.0 * np.log(max(power / z.size, 1.0))):
-            return Descent(v, z, J, True, count)
-        for _ in range(_HALVINGS):
-            if count >= limit:
+        little = enough * power * (1.0 + 10.0 * np.log(max(power / z.size, 1.0)))
+        while True:
+            step = _step(z, J, v, bounds, damping)
+            decrease = power - float(np.sum((z - J @ step) ** 2))
+            if decrease <= little:
+                return Descent(v, z, J, True, count)
+            if count >= limit or damping > _STIFFEST:
                 return Descent(v, z, J, False, count)
             count += 1
             try:
                 new_z, new_J = evaluate(v + step)
             except (Diverged, InputError):  # beyond what the system accepts or survives
-                step = step / 2
+                damping = max(10.0 * damping, _DAMPING)
                 continue
-            if new_z @ new_z < z @ z - 1e-4 * decrease:
+            if new_z @ new_z < power - 1e-4 * decrease:
                 break
-            step = step / 2
-        else:
-            return Descent(v, z, J, False, count)
+            damping = max(10.0 * damping, _DAMPING)
         v, z, J = v + step, new_z, new_J
+        damping = damping / 100.0 if damping > 100.0 * _DAMPING else 0.0
 
 
-def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Array:
+def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], damping: float) -> Array:
     """Least-squares step within the bounds; unknowns that would leave are put on their bound, the rest solved again."""
+    rows = np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))
+    J, z = (np.concatenate([J, rows]), np.append(z, np.zeros(v.size))) if damping else (J, z)
     step, free = np.zeros(v.size), np.ones(v.size, bool)
     for _ in range(v.size + 1):
         step[free] = _solve(J[:, free], z - J[:, ~free] @ step[~free])

@@ -16,7 +16,7 @@ from ._catalogue import candidates
 from ._decide import Decision, decide
 from ._diagnosis import Diagnosis, Found, Verdict
 from ._frequency_data import Measured, as_measured
-from ._hold_out import Gap, HoldOut, expected_rms, hold_out, refuse_seen
+from ._hold_out import Gap, HoldOut, expected_rms, hold_out, refuse_seen, unseen_data
 from ._joint_check import checked_jointly
 from ._locate import locate
 from ._next_experiment import NextExperiment, next_experiment, rivals
@@ -29,6 +29,7 @@ from ._sessions import SessionGain
 from ._setting import setting_of
 from ._short_list import Entry, quantities_of, refit_short_list
 from ._unknown_heat import unknown_heat
+from ._unseen_doubts import supported
 from ._wider_noise import with_wider_noise
 
 MOST_EFFECTS = 3
@@ -111,6 +112,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if len(rounds) > 1 and not hopeless:
         progress("selecting all effects at once, to compare")
         rounds, fit, joint = checked_jointly(rounds, fit, nominal, scores, effects)
+    if rounds and validation is not None and not hopeless:
+        progress("asking the unseen records whether they speak against an effect")
+        rounds, fit = supported(rounds, fit, nominal, unseen_data(fit, validation, operating_point))
     progress("testing whether anything is left")
     checks = adequacy(fit)
     if validation is not None:
@@ -208,10 +212,10 @@ def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen:
 def _still(fit: Refit) -> bool:
     """Whether the sizes stay within a standard deviation when the simulation is ten times finer."""
     structure = replace(fit.structure, tolerance=fit.structure.tolerance / 10.0)
-    z, J = whitened(structure, fit.v, fit.whiteners)
-    scale = np.linalg.norm(J, axis=0)
+    finer, _ = whitened(structure, fit.v, fit.whiteners)
+    scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
-    step = np.linalg.lstsq(J / scale, z, rcond=1e-10)[0] / scale
+    step = np.linalg.lstsq(fit.J / scale, finer - fit.z, rcond=1e-10)[0] / scale
     place = slice(structure.n_parameters, structure.n_parameters + structure.n_effects)
     return bool(np.all(np.abs(step[place]) <= 1e-12 + np.sqrt(np.maximum(np.diag(fit.covariance)[place], 0.0))))
 

@@ -122,9 +122,7 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     >>> rt.diagnosis.hold_out(fit, fit, measured(2)).outcome.code
     'predicted'
     """
-    base = after.structure.base
-    data = without_glitches(base, as_measured(base, validation, "validation", operating_point), after.floor.noise)
-    refuse_seen(after.structure.data, data)
+    data = unseen_data(after, validation, operating_point)
     gap = _unseen_gap(before, after, data)
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
@@ -132,6 +130,15 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
             f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed.")
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
+
+
+def unseen_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
+                ) -> list[Data | ResponseData]:
+    """Validation data without glitches; refused if the fit has seen them."""
+    base = fit.structure.base
+    data = without_glitches(base, as_measured(base, validation, "validation", operating_point), fit.floor.noise)
+    refuse_seen(fit.structure.data, data)
+    return list(data)
 
 
 def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Data | ResponseData]) -> None:
@@ -192,6 +199,28 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData])
     rss = float(left @ left) / max(reference.variance, 1e-12)
     known = reference.degrees_of_freedom * reference.structure.certainty
     return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
+
+
+def surprise(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> float:
+    """-2 log predictive density of unseen records given the trained parameters' covariance, but for a constant.
+
+    Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
+    """
+    try:
+        structure, only, n = _own_unknowns(fit, reference, data)
+    except Diverged:
+        return float("inf")
+    left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
+    scale = np.linalg.norm(only.J, axis=0)
+    J = only.J / np.where(scale > 0, scale, 1.0)
+    narrowed = _log_volume(J) - _log_volume(J[n:])
+    return float(left @ left) / max(reference.variance, 1e-12) + narrowed
+
+
+def _log_volume(J: Array) -> float:
+    """log det JᵀJ; directions that nothing determines count as much with as without data."""
+    s = np.linalg.svd(J, compute_uv=False)
+    return 2.0 * float(np.sum(np.log(np.maximum(s, 1e-9))))
 
 
 def _own_unknowns(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[Structure, Descent, int]:

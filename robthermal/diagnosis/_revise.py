@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 from ..errors import InputError
 from ._decide import Decision, settled
-from ._effect import Candidate
 from ._refit import Refit
 from ._refitting import extended, relinearised
 from ._score import BIC_GAP, score
@@ -36,12 +35,9 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
     for _ in range(_SWEEPS):
         changed = False
         for place in range(len(decisions) - 1, -1, -1):
-            others, values = _without(fit, place)
-            try:
-                structure = nominal.structure.with_effects(others)
-            except InputError:  # another effect acts on a part that this one adds
+            before = without(fit, place, nominal)
+            if before is None:
                 continue
-            before = relinearised(extended(fit, structure, structure.carried(fit.structure, fit.v, values)))
             short = refit_short_list(before, score(before, names), length=_LENGTH)
             if not short.entries or short.entries[0].delta_bic < BIC_GAP:
                 decisions.pop(place)
@@ -61,6 +57,12 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
     return tuple(decisions), fit
 
 
-def _without(fit: Refit, place: int) -> tuple[tuple[Candidate, ...], list[dict[str, float]]]:
+def without(fit: Refit, place: int, nominal: Refit) -> Refit | None:
+    """The fit without one of its effects; None where another effect acts on a part that this one adds."""
     effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
-    return effects[:place] + effects[place + 1:], values[:place] + values[place + 1:]
+    try:
+        structure = nominal.structure.with_effects(effects[:place] + effects[place + 1:])
+    except InputError:
+        return None
+    v = structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])
+    return relinearised(extended(fit, structure, v))

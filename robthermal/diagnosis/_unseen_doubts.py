@@ -1,0 +1,40 @@
+"""An accepted effect that the unseen records speak against is taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .._fitting._data import Data
+from ._decide import Decision
+from ._frequency_data import ResponseData
+from ._hold_out import surprise
+from ._refit import Refit
+from ._refitting import fitted
+from ._revise import without
+from ._score import BIC_GAP
+
+
+def supported(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, data: Sequence[Data | ResponseData]
+              ) -> tuple[tuple[Decision, ...], Refit]:
+    """Drop effects, the worst first, without which the unseen records are predicted beyond doubt better.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In the order of the effects of the fit.
+    fit, nominal : Refit
+        With them, without any.
+    data : sequence of Data or ResponseData
+        Unseen. They only take names back: no parameter and no name comes from them.
+    """
+    while rounds:
+        lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal) for place in range(len(rounds))]
+        with_all = surprise(fit, fit, data)
+        gains = [0.0 if less is None else with_all - surprise(less, fit, data) for less in lesser]
+        worst = max(range(len(gains)), key=gains.__getitem__)
+        less = lesser[worst]
+        if less is None or not gains[worst] > BIC_GAP:
+            return rounds, fit
+        rounds = rounds[:worst] + rounds[worst + 1:]
+        fit = fitted(less.structure, less.v, less.floor, less.levels) if rounds else nominal
+    return rounds, fit
