@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import io
-from scipy.io.matlab import MatReadError
 
+from robthermal._matfile import kind_of, read_matlab
 from robthermal.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,11 +36,11 @@ _ARRAYS = (
 )
 _LISTS = ("input_names", "output_names", "notes")
 _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
-# What the readers of json, numpy and scipy raise for damaged files. NotImplementedError: MATLAB's 7.3 format, or a
-# compression that zipfile does not know. RecursionError: nesting.
+# What the readers of json, zip archives and numpy raise for damaged files, and the conversions below for content of
+# another form. NotImplementedError: a compression that zipfile does not know. RecursionError: nesting.
 _UNREADABLE = (
     *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError, RecursionError),
-    *(MatReadError, zipfile.BadZipFile, zlib.error),
+    *(zipfile.BadZipFile, zlib.error),
 )
 _LARGEST = 500_000_000  # bytes, unpacked
 _SUFFIXES = (".json", ".mat", ".npz")
@@ -101,9 +101,13 @@ def _refuse_large(path: Path) -> None:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
     if size > _LARGEST:
-        raise InputError(f"it is {size / 1e6:.0f} MB large", where=str(path),
-                         expected=f"at most {_LARGEST / 1e6:.0f} MB",
-                         remedy="Keep fewer frequencies or channels in one file.")
+        raise _too_large(path, size)
+
+
+def _too_large(path: Path, size: float) -> InputError:
+    how_large = f"{size / 1e6:.0f} MB large" if math.isfinite(size) else "larger when unpacked"
+    return InputError(f"it is {how_large}", where=str(path), expected=f"at most {_LARGEST / 1e6:.0f} MB",
+                      remedy="Keep fewer frequencies or channels in one file.")
 
 
 def _texts(value: Any, name: str, path: Path) -> list[str]:
@@ -170,13 +174,22 @@ def _read_npz(path: Path) -> dict[str, Any]:
 
 
 def _read_mat(path: Path) -> dict[str, Any]:
+    stored = path.read_bytes()
+    if stored.startswith(b"MATLAB 7.3"):
+        raise ValueError("it has MATLAB's format 7.3; save it with save(..., '-v7')")
+    try:
+        variables = read_matlab(stored, _LARGEST)
+    except MemoryError:
+        raise _too_large(path, math.inf) from None
     content: dict[str, Any] = {}
-    for name, value in io.loadmat(path, chars_as_strings=True).items():
+    for name, value in variables.items():
         if name in _LISTS:
-            content[name] = [str(cell.item()) if cell.size else "" for cell in value.ravel()]
+            content[name] = value if isinstance(value, list) else [value]
         elif name in _SCALARS or name == "format":
-            content[name] = value.item()
+            content[name] = value.item() if isinstance(value, np.ndarray) else value
         elif name in _ARRAYS:
+            if not isinstance(value, np.ndarray):
+                raise ValueError(f"{name} is a {kind_of(value)}, not a matrix")
             content[name] = value
     return _without_matlab_padding(content)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from .._matfile import Value, kind_of, read_matlab
 from ..errors import InputError
 from ._checks import Array
-from ._matfile import Other, Value, read_matlab
 from ._source import equally_long, memory_limit, numeric, refuse_large
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -49,9 +49,9 @@ class MatlabSource:
         return f"row {index}"
 
     def _vector(self, header: str, value: Value) -> Array:
-        if not isinstance(value, np.ndarray):
-            kind = value.kind if isinstance(value, Other) else "struct"
-            raise InputError(f"variable {header!r} is a {kind}", where=f"{self.path}", expected="a real numeric vector")
+        if not isinstance(value, np.ndarray) or value.dtype.kind == "c":
+            raise InputError(f"variable {header!r} is a {kind_of(value)}", where=f"{self.path}",
+                             expected="a real numeric vector")
         if value.ndim != 2 or 1 not in value.shape:
             raise InputError(
                 f"{header!r} has shape {value.shape}", where=f"{self.path}", expected="a numeric vector, one column"

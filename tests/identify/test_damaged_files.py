@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import io
 
 import robthermal as rt
 
@@ -71,3 +72,59 @@ def test_large_files_are_refused_also_when_they_are_large_only_unpacked(
     for path in (zeros, text):
         with pytest.raises(rt.InputError, match="MB large"):
             rt.identify.FrequencyResponse.load(path)
+
+
+def test_a_damaged_index_of_an_archive(content: dict[str, Any], tmp_path: Path) -> None:
+    path, archive = tmp_path / "G.json", tmp_path / "G.npz"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    rt.identify.FrequencyResponse.load(path).save(archive)
+    stored = bytearray(archive.read_bytes())
+    place = stored.rindex(b"PK\x01\x02")  # head of the last entry of the central directory
+    stored[place:place + 4] = b"XXXX"
+    archive.write_bytes(stored)
+    with pytest.raises(rt.InputError, match=r"G\.npz.*cannot be read"):
+        rt.identify.FrequencyResponse.load(archive)
+
+
+def test_ten_thousand_damaged_matlab_files_never_crash(content: dict[str, Any], tmp_path: Path) -> None:
+    """Bytes overwritten, cut off or doubled: loaded if it still can be, refused in words otherwise."""
+    path, mat = tmp_path / "G.json", tmp_path / "G.mat"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    rt.identify.FrequencyResponse.load(path).save(mat)
+    stored = mat.read_bytes()
+    rng = np.random.default_rng(4)
+    refusals = 0
+    for _ in range(10_000):
+        damaged = bytearray(stored)
+        for _ in range(rng.integers(1, 5)):
+            place = int(rng.integers(len(damaged)))
+            damaged[place] = int(rng.integers(256))
+        cut = int(rng.integers(len(damaged)))
+        kind = rng.integers(10)
+        damaged = damaged[:cut] if kind == 0 else damaged[:cut] + damaged[cut // 2:] if kind == 1 else damaged
+        mat.write_bytes(damaged)
+        try:
+            rt.identify.FrequencyResponse.load(mat)
+        except rt.InputError as error:
+            refusals += 1
+            assert "G.mat" in str(error) or "argument" in str(error)
+    assert refusals > 1000
+
+
+def test_matlab_files_of_another_kind(tmp_path: Path) -> None:
+    path = tmp_path / "G.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(600))
+    with pytest.raises(rt.InputError, match="-v7"):
+        rt.identify.FrequencyResponse.load(path)
+    io.savemat(path, {"format": "robthermal frequency response 1", "response": "text"})
+    with pytest.raises(rt.InputError, match="response is a char"):
+        rt.identify.FrequencyResponse.load(path)
+
+
+def test_names_of_any_letters_survive_matlab(content: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / "G.json"
+    path.write_text(json.dumps({**content, "output_names": ["Tµ_größe"], "notes": ["", "α → β"]}), encoding="utf-8")
+    G = rt.identify.FrequencyResponse.load(path)
+    G.save(tmp_path / "G.mat")
+    again = rt.identify.FrequencyResponse.load(tmp_path / "G.mat")
+    assert (again.output_names, again.notes) == (G.output_names, G.notes)

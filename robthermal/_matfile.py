@@ -1,8 +1,8 @@
-"""Numeric variables of MATLAB files, format 4 and 5 to 7, read with every length checked.
+"""Variables of MATLAB files, format 4 and 5 to 7, read with every length checked.
 
 Written out because `scipy.io.loadmat` crashes the interpreter on some damaged files. Format: MathWorks,
-MAT-File Format (document R2019b), chapters 1 and 2. Only what a record can be made of is decoded: real numeric
-matrices, and structs of them; of everything else the kind is told.
+MAT-File Format (document R2019b), chapters 1 and 2. Decoded are numeric matrices, texts, cells of them and structs of
+them; of everything else the kind is told.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _MATRIX, _COMPRESSED = 14, 15
-_STRUCT = 2
+_CELL, _STRUCT, _CHAR = 1, 2, 4
+_TEXTS = {1: "latin-1", 2: "latin-1", 3: "utf-16", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 _KINDS = {1: "cell", 2: "struct", 3: "object", 4: "char", 5: "sparse matrix", 16: "function", 17: "opaque object"}
 _COMPLEX = 0x0800
 _NUMBERS_4 = {0: "f8", 1: "f4", 2: "i4", 3: "i2", 4: "u2", 5: "u1"}
@@ -28,12 +29,19 @@ _KINDS_4 = {1: "char", 2: "sparse matrix"}
 
 @dataclass(frozen=True)
 class Other:
-    """A variable that is no real numeric matrix."""
+    """A variable of a kind that is not decoded."""
 
     kind: str
 
 
-Value = NDArray[Any] | Other | dict[str, Any]
+Value = NDArray[Any] | str | Other | list[Any] | dict[str, Any]
+
+
+def kind_of(value: Value) -> str:
+    """What MATLAB calls it."""
+    if isinstance(value, np.ndarray):
+        return "complex matrix" if value.dtype.kind == "c" else "matrix"
+    return value.kind if isinstance(value, Other) else {str: "char", list: "cell", dict: "struct"}[type(value)]
 
 
 def read_matlab(content: bytes, most: float) -> dict[str, Value]:
@@ -101,14 +109,45 @@ def _matrix(data: bytes, order: str, *, fields: bool) -> tuple[str, Value]:
     name = _text(parts)
     if kind == _STRUCT and fields and math.prod(shape) == 1:
         return name, _struct(parts, order)
+    if kind == _CELL and fields:
+        return name, _cell(parts, order, math.prod(shape))
+    if kind == _CHAR and len(shape) == 2 and (shape[0] == 1 or not math.prod(shape)):
+        return name, _characters(parts, order, math.prod(shape))
     if kind in _KINDS:
         return name, Other(_KINDS[kind])
-    if int(flags[0]) & _COMPLEX:
-        return name, Other("complex matrix")
     numbers = _numbers(parts, order)
+    if int(flags[0]) & _COMPLEX:
+        imaginary = _numbers(parts, order)
+        if len(imaginary) != len(numbers):
+            raise ValueError(f"variable {name!r} has {len(numbers)} real and {len(imaginary)} imaginary parts")
+        both = np.empty(len(numbers), np.complex128)  # not real + 1j imaginary: that turns an infinity into NaN
+        both.real, both.imag = numbers, imaginary
+        numbers = both
     if len(shape) < 2 or min(shape) < 0 or math.prod(shape) != len(numbers):
         raise ValueError(f"variable {name!r} of shape {shape} holds {len(numbers)} numbers")
     return name, numbers.reshape(shape, order="F")
+
+
+def _cell(parts: Iterator[tuple[int, bytes]], order: str, count: int) -> list[Any]:
+    """Values of a cell array, column by column; what is nested in them is not opened."""
+    found = []
+    for kind, data in parts:
+        if kind != _MATRIX:
+            raise ValueError(f"element of type {kind} in a cell")
+        found.append(_matrix(data, order, fields=False)[1] if data else Other("nothing"))
+    if len(found) != count:
+        raise ValueError(f"a cell of {count} holds {len(found)}")
+    return found
+
+
+def _characters(parts: Iterator[tuple[int, bytes]], order: str, count: int) -> str:
+    if not count:
+        return ""
+    kind, data = _next(parts)
+    if kind not in _TEXTS:
+        raise ValueError(f"characters of unknown type {kind}")
+    coding = _TEXTS[kind] if kind in (1, 2, 16) else _TEXTS[kind] + ("-le" if order == "<" else "-be")
+    return data.decode(coding)
 
 
 def _struct(parts: Iterator[tuple[int, bytes]], order: str) -> dict[str, Any]:
