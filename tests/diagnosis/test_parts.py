@@ -105,6 +105,25 @@ def test_descent_with_bounds_is_non_negative_least_squares() -> None:
     assert np.any(found.v == 0.0)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_descent_converges_where_the_time_of_a_change_has_kinks(seed: int) -> None:
+    # A ramp that starts at s: the sum of squares bends wherever s passes a sample. Compared with a fine grid of s.
+    rng = np.random.default_rng(seed)
+    t = np.arange(100.0)
+    y = 0.3 + 0.02 * np.maximum(t - 40.0, 0.0) + 0.1 * rng.standard_normal(100)
+
+    def evaluate(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        ramp = np.maximum(t - v[2], 0.0)
+        return y - v[0] - v[1] * ramp, np.column_stack([np.ones(100), ramp, -v[1] * (ramp > 0)])
+
+    free = np.full(3, np.inf)
+    found = descend(evaluate, np.array([0.0, 0.01, 35.0]), (-free, free), 40, 3e-5)
+    best = min(np.linalg.lstsq(np.column_stack([np.ones(100), np.maximum(t - s, 0.0)]), y, rcond=None)[1][0]
+               for s in np.arange(10.0, 80.0, 0.02))
+    assert found.converged
+    assert found.z @ found.z < best * (1 + 3e-3)
+
+
 def test_scores_of_noise_follow_their_distribution(plant: rt.System, hide: Callable) -> None:
     # Under H0 the projected statistic is F(1, ν): over many noises and candidates its mean is 1, and few exceed 6.6.
     fit = rt.diagnosis.refit(plant, hide(n=300)[0])

@@ -43,10 +43,10 @@ def print_rate(what: str, wanted: str, rows: Iterable[Row], hit: Callable[[Row],
     rows = list(rows)
     k, n = sum(bool(hit(row)) for row in rows), len(rows)
     if n == 0:
-        print(f"{what:<66} none")
+        print(f"{what:<72} none")
         return
     low, high = interval(k, n)
-    print(f"{what:<66} {100 * k / n:6.1f} %  {k:4d} of {n:<4d} [{100 * low:.1f}, {100 * high:.1f}]  aim {wanted}")
+    print(f"{what:<72} {100 * k / n:6.1f} %  {k:4d} of {n:<4d} [{100 * low:.1f}, {100 * high:.1f}]  aim {wanted}")
 
 
 def print_rates(rows: list[Row]) -> None:
@@ -65,6 +65,9 @@ def print_rates(rows: list[Row]) -> None:
     print_rate("unique, ΔBIC > 300", ">= 92 %", (r for r in seen if strength(r) > 300), all_named)
     print_rate("  unique, or in a set of near aliases of one family", "", (r for r in seen if strength(r) > 300),
                near_aliases)
+    print_rate("  of the others: the same inputs once more would add less than ΔBIC 10", "",
+               (r for r in seen if strength(r) > 300 and not all_named(r) and "expected" in r.get("follow", {})),
+               lambda r: r["follow"]["present"] < 10)
     print_rate("unique, ΔBIC 50 to 300", ">= 60 %", (r for r in seen if 50 < strength(r) <= 300), all_named)
     for low, high, aim in ((0, 0.7, ""), (0.7, 1.3, ""), (1.3, np.inf, ">= 90 %"), (3.0, np.inf, "")):
         print_rate(f"detected at {low} to {high} times the declared limit", aim,
@@ -105,7 +108,7 @@ def print_excess(rows: list[Row]) -> None:
     """Excess variance on unseen records."""
     ratios = [value for row in rows if (value := excess(row)) is not None]
     if ratios:
-        print(f"{'excess variance of unseen records, after over before':<66} median {np.median(ratios):.3f}, 90 % "
+        print(f"{'excess variance of unseen records, after over before':<72} median {np.median(ratios):.3f}, 90 % "
               f"{np.quantile(ratios, 0.9):.3f}, worst {max(ratios):.3f} of {len(ratios)}  aim <= 0.05, worst <= 0.3")
 
 

@@ -1,0 +1,59 @@
+"""Names that unseen records speak against are taken back; the density behind it is the dense Gaussian one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis._hold_out import _own_unknowns, surprise, unseen_data
+from robthermal.diagnosis._unseen_doubts import supported
+
+Hide = Callable[..., tuple[rt.Record, rt.Record]]
+FEW = ["missing_ambient_link", "natural_convection", "sensor_lag", "heat_source"]
+
+
+@pytest.fixture(scope="module")
+def late(hide: Hide, rate: Callable[..., np.ndarray]) -> tuple[rt.Record, rt.Record]:
+    """Records with a plate sensor that lags by fifteen seconds."""
+    def lagged(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.append(rate(T[:2], u), (T[0] - T[2]) / 15.0)
+
+    return hide(lagged, extra_states=1, read=lambda T: T[:, [2, 1]])
+
+
+@pytest.fixture(scope="module")
+def found(plant: rt.System, late: tuple[rt.Record, rt.Record]) -> rt.diagnosis.Diagnosis:
+    return rt.diagnose(plant, late[0], validation=late[1], effects=FEW)
+
+
+def test_a_name_that_holds_is_kept(found: rt.diagnosis.Diagnosis, late: tuple[rt.Record, rt.Record]) -> None:
+    assert [effect.effect for effect in found.effects] == ["sensor_lag"]
+    data = unseen_data(found.fit, late[1], None)
+    rounds, fit = supported(found.rounds, found.fit, found.nominal, data)
+    assert rounds == found.rounds and fit is found.fit
+    assert surprise(found.nominal, found.fit, data) - surprise(found.fit, found.fit, data) > 100.0
+
+
+def test_a_name_that_is_gone_on_unseen_records_is_taken_back(
+        plant: rt.System, hide: Hide, late: tuple[rt.Record, rt.Record], found: rt.diagnosis.Diagnosis) -> None:
+    without = hide()[1]  # the sensor was changed in between
+    data = unseen_data(found.fit, without, None)
+    assert supported(found.rounds, found.fit, found.nominal, data) == ((), found.nominal)
+    again = rt.diagnose(plant, late[0], validation=without, effects=FEW)
+    assert (again.verdict, again.effects, again.provisional) == ("unexplained", (), ())
+
+
+def test_surprise_is_the_dense_gaussian_density(found: rt.diagnosis.Diagnosis, hide: Hide) -> None:
+    data = unseen_data(found.fit, hide(n=120)[1], None)
+    fit = found.fit
+    _, only, n = _own_unknowns(fit, fit, data)
+    p = fit.structure.n_parameters + fit.structure.n_effects
+    own = np.concatenate([np.zeros(p), only.v[p:]])
+    at_prior = only.z + only.J @ own  # initial temperatures act linearly here: back to their prior mean
+    J, prior = only.J[:n], only.J[n:]
+    S = np.eye(n) + J @ np.linalg.inv(prior.T @ prior) @ J.T
+    dense = at_prior[:n] @ np.linalg.solve(S, at_prior[:n]) / fit.variance + np.linalg.slogdet(S)[1]
+    assert surprise(fit, fit, data) == pytest.approx(dense, rel=1e-6)
