@@ -37,11 +37,10 @@ _ARRAYS = (
 _LISTS = ("input_names", "output_names", "notes")
 _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
 # What the readers of json, zip archives and numpy raise for damaged files, and the conversions below for content of
-# another form. NotImplementedError: a compression that zipfile does not know. RecursionError: nesting.
-_UNREADABLE = (
-    *(ValueError, TypeError, KeyError, OSError, NotImplementedError, EOFError, RecursionError),
-    *(zipfile.BadZipFile, zlib.error),
-)
+# another form. RuntimeError: an archive that is encrypted, or packed in a way that zipfile does not know; nesting.
+# MemoryError: a damaged shape.
+_UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile,
+               zlib.error)
 _LARGEST = 500_000_000  # bytes, unpacked
 _SUFFIXES = (".json", ".mat", ".npz")
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import mminfo, mmread
 from scipy.sparse import csr_array, load_npz
 
 from ..errors import InputError
+from ._matrix_market import read_market
 
-_MOST_ROWS, _MOST_ENTRIES = 20_000_000, 500_000_000  # a corrupt header must not ask for all memory
+_MOST_BYTES = 8e9  # unpacked: a small archive must not ask for all memory
 _NPZ_SPARSE = {"format", "data", "shape"}
+# What the readers of text, gzip and zip files, numpy and scipy raise. RuntimeError: an archive that is encrypted, or
+# packed in a way that zipfile does not know. MemoryError: a damaged shape.
+_UNREADABLE = (ValueError, OSError, OverflowError, EOFError, KeyError, AttributeError, TypeError, RuntimeError,
+               MemoryError, zipfile.BadZipFile, zlib.error)
 
 
 def read_matrices(E: str | Path, A: str | Path | None = None,
@@ -72,12 +77,15 @@ def _together(path: Path, B: str | Path | None) -> tuple[csr_array, csr_array, c
 
 def _read(path: Path) -> csr_array:
     if path.name.endswith((".mtx", ".mtx.gz")):
-        return _matrix(_market(path), str(path))
+        with _reading(path):
+            return read_market(path)
     if path.suffix == ".npz":
         arrays = _npz(path)
         if _NPZ_SPARSE <= set(arrays):
             with _reading(path):
                 stored = load_npz(path)
+                if hasattr(stored, "check_format"):  # indices outside would crash the interpreter
+                    stored.check_format(full_check=True)
             return _matrix(stored, str(path))
         if len(arrays) == 1:
             return _matrix(next(iter(arrays.values())), str(path))
@@ -87,19 +95,15 @@ def _read(path: Path) -> csr_array:
                      remedy="Write it with scipy.io.mmwrite or scipy.sparse.save_npz.")
 
 
-def _market(path: Path) -> csr_array | NDArray[np.float64]:
-    with _reading(path):
-        rows, columns, entries, _, field, _ = mminfo(path)
-    if max(rows, columns) > _MOST_ROWS or entries > _MOST_ENTRIES or field not in ("real", "integer"):
-        raise InputError(f"declares {rows} by {columns} and {entries} entries of type {field}", where=str(path),
-                         expected=f"real numbers, at most {_MOST_ROWS} rows", remedy="Is this the right file?")
-    with _reading(path):
-        return mmread(path, spmatrix=False)
-
-
 def _npz(path: Path) -> dict[str, NDArray[np.generic]]:
-    with _reading(path), np.load(path, allow_pickle=False) as file:  # a pickle could run code
-        return {key: file[key] for key in file.files}
+    with _reading(path):
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > _MOST_BYTES:
+            raise InputError(f"is {size / 1e9:.0f} GB large when unpacked", where=str(path),
+                             expected=f"at most {_MOST_BYTES / 1e9:.0f} GB", remedy="Is this the right file?")
+        with np.load(path, allow_pickle=False) as file:  # a pickle could run code
+            return {key: file[key] for key in file.files}
 
 
 @contextmanager
@@ -107,7 +111,9 @@ def _reading(path: Path) -> Iterator[None]:
     """Turn what readers raise on bad files into one message."""
     try:
         yield
-    except (ValueError, OSError, OverflowError, EOFError, KeyError, AttributeError, TypeError, BadZipFile) as error:
+    except InputError:
+        raise
+    except _UNREADABLE as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise InputError(f"cannot be read ({reason})", where=str(path), expected="a Matrix Market or .npz file",
                          remedy="Check the path, and that the file is complete.") from None
