@@ -16,6 +16,8 @@ from ._matrices import Matrices, dot
 from ._modules import Array
 from ._numbers import numbers, positive
 
+_LARGEST = 50_000_000  # bytes: the matrices of a hundred states are a hundredth of it
+
 
 @dataclass(frozen=True)
 class MatrixController(Controller):
@@ -89,9 +91,13 @@ def load_controller(path: str | Path) -> MatrixController:
     """
     where = ascii(str(path))
     try:
+        if Path(path).stat().st_size > _LARGEST:
+            raise InputError(f"is larger than {_LARGEST / 1e6:.0f} MB", where=where, remedy="Is this the right file?")
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=where, remedy="Check the path.") from None
+    except InputError:
+        raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not JSON: {error}", where=where) from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -99,7 +105,7 @@ def load_controller(path: str | Path) -> MatrixController:
                          remedy="Write one with controller.export(path).")
     try:
         return _controller(content)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"is not a complete controller: {type(error).__name__}: {error}", where=where) from None
 
 

@@ -267,7 +267,7 @@ def test_refusals(exports, pi, plant, tmp_path):
     ({"format": "robthermal-law/1"}, "not a controller"), ({"heat": [[1.0]]}, "not a complete controller"),
     ({"start": None}, "not a complete controller"), ({"sample_time": -1.0}, "sample_time"),
     ({"advance": [["x"]]}, "advance"), ({"indices": [3, 4]}, "contradict"), ({"modules": 0}, "controller"),
-    ({"heat": [[float("nan")] * 6] * 2}, "heat")])
+    ({"modules": float("inf")}, "not a complete controller"), ({"heat": [[float("nan")] * 6] * 2}, "heat")])
 def test_bad_controller_files_are_refused(change, message, pi, tmp_path):
     path = tmp_path / "c.json"
     pi.export(path)
@@ -277,6 +277,10 @@ def test_bad_controller_files_are_refused(change, message, pi, tmp_path):
 
 
 def test_files_that_are_no_controller_are_refused(exports, tmp_path):
+    with (tmp_path / "c.json").open("wb") as file:
+        file.truncate(60_000_000)
+    with pytest.raises(rt.InputError, match="larger than 50 MB"):
+        rt.design.load_controller(tmp_path / "c.json")
     (tmp_path / "c.json").write_text("[" * 100_000)
     with pytest.raises(rt.InputError, match="is not JSON"):
         rt.design.load_controller(tmp_path / "c.json")
