@@ -1,8 +1,8 @@
-"""Gauss-Newton with bounds; where a step fails, Marquardt's damping."""
+"""Gauss-Newton with bounds; where a step fails, shorter ones, then Marquardt's damping."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +12,7 @@ from ..errors import Diverged, InputError
 
 Array = NDArray[np.float64]
 _FLAT = 1e-10  # relative singular value that is rounding
-_DAMPING = 1e-3  # the least, relative to the squares of the derivatives
-_STIFFEST = 1e5
+_DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squares of the derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +28,8 @@ class Descent:
     J : ndarray, shape (m, p)
         Derivative of the model, - ∂z/∂v.
     converged : bool
-        Whether a further step would change the sum of squares by less than `enough`.
+        Whether a further step, shortened or damped where longer ones fail, would change the sum of squares by less
+        than `enough`.
     iterations : int
         Evaluations.
     """
@@ -61,28 +61,34 @@ def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: 
     """
     v = np.clip(v, *bounds)
     z, J = evaluate(v)
-    count, damping = 1, 0.0
+    count = 1
     while True:
         power = float(z @ z)
         little = enough * power * (1.0 + 10.0 * np.log(max(power / z.size, 1.0)))
-        while True:
-            step = _step(z, J, v, bounds, damping)
+        for step in _trials(z, J, v, bounds):
             decrease = power - float(np.sum((z - J @ step) ** 2))
             if decrease <= little:
                 return Descent(v, z, J, True, count)
-            if count >= limit or damping > _STIFFEST:
+            if count >= limit:
                 return Descent(v, z, J, False, count)
             count += 1
             try:
                 new_z, new_J = evaluate(v + step)
             except (Diverged, InputError):  # beyond what the system accepts or survives
-                damping = max(10.0 * damping, _DAMPING)
                 continue
             if new_z @ new_z < power - 1e-4 * decrease:
                 break
-            damping = max(10.0 * damping, _DAMPING)
+        else:
+            return Descent(v, z, J, False, count)
         v, z, J = v + step, new_z, new_J
-        damping = damping / 100.0 if damping > 100.0 * _DAMPING else 0.0
+
+
+def _trials(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Iterator[Array]:
+    """The full step, shorter ones in its direction, then ones that turn away from what the data hardly determine."""
+    full = _step(z, J, v, bounds, 0.0)
+    yield from (full, full / 2, full / 4)
+    for damping in _DAMPINGS:
+        yield _step(z, J, v, bounds, damping)
 
 
 def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], damping: float) -> Array:
