@@ -186,9 +186,10 @@ class Refit:
         """Covariance of the unknowns, (p, p), in the optimiser's coordinates, scaled by the whitened variance."""
         scale = np.linalg.norm(self.J, axis=0)
         scale[scale == 0] = 1.0
-        J = self.J / scale
-        inverse = np.linalg.pinv(J.T @ J, rcond=_FLAT**2, hermitian=True)
-        return np.asarray(inverse / np.outer(scale, scale) * max(self.variance, 1.0), np.float64)
+        # of J, not of JᵀJ: its rounding would make variances negative where the data tell next to nothing
+        _, s, Vt = np.linalg.svd(self.J / scale, full_matrices=False)
+        root = (Vt[s > _FLAT * s[0]] / s[s > _FLAT * s[0], None]).T / scale[:, None]
+        return np.asarray(root @ root.T * max(self.variance, 1.0), np.float64)
 
     @property
     def contradictions(self) -> tuple[str, ...]:

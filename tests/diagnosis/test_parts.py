@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -136,6 +137,17 @@ def test_scores_of_noise_follow_their_distribution(plant: rt.System, hide: Calla
     T = (J.T @ z) ** 2 / (np.sum(z**2, axis=0) / fit.degrees_of_freedom)
     assert T.mean() == pytest.approx(1.0, abs=0.15)
     assert np.mean(T > 6.635) < 0.03
+
+
+def test_no_variance_is_negative_where_a_direction_is_flat(plant: rt.System, hide: Callable) -> None:
+    fit = rt.diagnosis.refit(plant, hide(n=300)[0])
+    exact = np.linalg.inv(fit.J.T @ fit.J) * max(fit.variance, 1.0)
+    np.testing.assert_allclose(fit.covariance, exact, rtol=1e-6, atol=1e-9 * np.abs(exact).max())
+    rng = np.random.default_rng(8)
+    for size in 10.0 ** -np.arange(6.0, 12.0):
+        J = fit.J.copy()
+        J[:, -1] = J[:, 0] + size * np.linalg.norm(J[:, 0]) * rng.standard_normal(len(J)) / np.sqrt(len(J))
+        assert np.all(np.diag(replace(fit, J=J).covariance) >= 0.0)
 
 
 def test_aliases_and_limits_need_no_readings(plant: rt.System, hide: Callable) -> None:
