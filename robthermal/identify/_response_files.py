@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import zipfile
 import zlib
 from os import PathLike
@@ -39,8 +40,8 @@ _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method":
 # What the readers of json, zip archives and numpy raise for damaged files, and the conversions below for content of
 # another form. RuntimeError: an archive that is encrypted, or packed in a way that zipfile does not know; nesting.
 # MemoryError: a damaged shape.
-_UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, RuntimeError, MemoryError, zipfile.BadZipFile,
-               zlib.error)
+_UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, RuntimeError, MemoryError,
+               zipfile.BadZipFile, zlib.error)
 _LARGEST = 500_000_000  # bytes, unpacked
 _SUFFIXES = (".json", ".mat", ".npz")
 
@@ -121,7 +122,7 @@ def _scalar(value: Any, name: str, kind: type, path: Path) -> Any:
         good = isinstance(value, str)
     else:
         numeric = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-        good = numeric and math.isfinite(value) and value == kind(value)
+        good = numeric and abs(value) <= sys.float_info.max and value == kind(value)
         good = good and (value > 0 or (name == "half_width" and value == 0))
     if not good:
         raise InputError(f"its {name} is {str(value)[:40]!r}", where=str(path),
@@ -151,6 +152,8 @@ def _numbers(array: NDArray[Any]) -> list[Any]:
 def _from_json(coded: Any) -> NDArray[Any]:
     if "real" in coded:
         real, imag = (np.array([float(x) for x in coded[part]]) for part in ("real", "imag"))
+        if real.size != imag.size:  # one value would be repeated
+            raise ValueError(f"{real.size} real and {imag.size} imaginary parts")
         flat = np.empty(real.size, dtype=complex)  # not real + 1j*imag: that turns an infinity into NaN
         flat.real, flat.imag = real, imag
     else:

@@ -14,7 +14,8 @@ from ._checks import Array
 from ._source import equally_long, numeric, refuse_large
 
 # What npTDMS raises for damaged files, by what its parser trips over. NotImplementedError: data it does not know.
-_DAMAGED = (ValueError, KeyError, TypeError, OSError, EOFError, IndexError, struct.error, NotImplementedError)
+# OverflowError: a damaged place in the file, or a damaged date.
+_DAMAGED = (ValueError, KeyError, OSError, OverflowError, struct.error, NotImplementedError)
 
 
 class TdmsSource:

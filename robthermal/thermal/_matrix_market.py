@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,7 +100,8 @@ def _line(file: gzip.GzipFile | io.BufferedReader) -> str:
 def _numbers(text: bytes, width: int, entries: int) -> Array:
     if not entries:
         return np.zeros((0, width))
-    table = np.loadtxt(io.StringIO(text.decode("ascii")), comments="%", max_rows=entries + 1, ndmin=2)
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # of no numbers at all, refused below
+        table = np.loadtxt(io.StringIO(text.decode("ascii")), comments="%", ndmin=2)
     if table.shape != (entries, width) or not np.isfinite(table).all():
         raise ValueError(f"not {entries} lines of {width} finite numbers")
     return table

@@ -29,7 +29,7 @@ def refused(text: str, path: Path) -> None:
         rt.identify.FrequencyResponse.load(path)
 
 
-NONE = ["x", None, [], {}, -3, True, "1" * 5000, float("nan"), float("inf")]
+NONE = ["x", None, [], {}, -3, True, "1" * 5000, float("nan"), float("inf"), 10**400]
 
 
 @pytest.mark.parametrize(("key", "value"), [
@@ -43,6 +43,17 @@ def test_numbers_that_are_none(content: dict[str, Any], key: str, value: Any, tm
 @pytest.mark.parametrize("key", ["input_names", "output_names"])
 def test_names_that_are_none(content: dict[str, Any], key: str, value: Any, tmp_path: Path) -> None:
     refused(json.dumps({**content, key: value}), tmp_path / "G.json")
+
+
+NOTHING = [1, "x", [], {}, [None], ["a"], [10**400], [2**70], [[1, 2], [3]]]
+
+
+@pytest.mark.parametrize(("part", "value"), [
+    *(("shape", value) for value in NOTHING), *(("values", value) for value in [*NOTHING, None, [-1]])])
+def test_arrays_that_are_none(content: dict[str, Any], part: str, value: Any, tmp_path: Path) -> None:
+    refused(json.dumps({**content, "frequencies": {**content["frequencies"], part: value}}), tmp_path / "G.json")
+    if part == "values":
+        refused(json.dumps({**content, "response": {**content["response"], "imag": value}}), tmp_path / "G.json")
 
 
 @pytest.mark.parametrize("text", ["[1]", "null", "{", "[" * 100_000, '{"a":' * 100_000])

@@ -226,6 +226,24 @@ def write_tdms(path: Path, channels: list[tuple[str, str, Any, dict[str, Any]]])
         file.write_segment([nptdms.ChannelObject(*channel) for channel in channels])
 
 
+def test_no_byte_of_the_head_of_a_tdms_file_ends_in_a_traceback(tmp_path: Path) -> None:
+    path = tmp_path / "run.tdms"
+    write_tdms(path, [("a", name, column, {}) for name, column in {"time": TIME, "u": U, "T": T}.items()])
+    sound = path.read_bytes()
+    head = len(sound) - 8 * (len(TIME) + len(U) + len(T))
+    refused = 0
+    for place in range(head):
+        for value in (0, 128, 255):
+            path.write_bytes(sound[:place] + bytes([value]) + sound[place + 1:])
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                try:
+                    assert np.isfinite(read(path)["T"]).all()
+                except InputError:
+                    refused += 1
+    assert refused > head
+
+
 def test_tdms_with_a_time_channel(tmp_path: Path) -> None:
     path = tmp_path / "run.tdms"
     write_tdms(path, [("a", "Time [s]", TIME, {}), ("b", "u", U, {}), ("b", "T [K]", T, {})])

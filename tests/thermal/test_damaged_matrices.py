@@ -112,3 +112,17 @@ def test_texts_that_are_no_matrix(tmp_path: Path, text: str) -> None:
 def test_an_empty_matrix_is_a_matrix(tmp_path: Path) -> None:
     mmwrite(tmp_path / "A.mtx", coo_array((3, 3)))
     assert read_market(tmp_path / "A.mtx").nnz == 0
+
+
+@pytest.mark.parametrize("body", ["", "\n", "% nothing\n"])
+def test_a_matrix_without_its_entries_is_refused_without_a_warning(tmp_path: Path, body: str) -> None:
+    path = tmp_path / "A.mtx"
+    path.write_text("%%MatrixMarket matrix coordinate real general\n2 2 1\n" + body, encoding="utf-8")
+    with pytest.raises(rt.InputError, match="not 1 lines of 3"):
+        read_matrices(path, path)
+
+
+def test_comments_and_empty_lines_between_entries(tmp_path: Path) -> None:
+    path = tmp_path / "A.mtx"
+    path.write_text("%%MatrixMarket matrix coordinate real general\n2 2 2\n\n1 1 3\n% here\n2 2 4\n", encoding="utf-8")
+    assert read_market(path).toarray().tolist() == [[3.0, 0.0], [0.0, 4.0]]
