@@ -27,12 +27,15 @@ class Decision:
         The best candidate, noise levels and filters renewed; None without an alarm.
     contenders : tuple of Entry
         Others whose BIC is within 10 of the best: the records cannot exclude them.
+    ruled_out : tuple of Entry
+        Those among them that the unseen records exclude.
     """
 
     alarm: bool
     before: Refit
     best: Entry | None
     contenders: tuple[Entry, ...]
+    ruled_out: tuple[Entry, ...] = ()
 
     def __str__(self) -> str:
         if self.best is None:

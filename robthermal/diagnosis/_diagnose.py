@@ -28,6 +28,7 @@ from ._score import Scores, promising, score
 from ._sessions import SessionGain
 from ._setting import setting_of
 from ._short_list import Entry, quantities_of, refit_short_list
+from ._told_apart import told_apart
 from ._unknown_heat import unknown_heat
 from ._unseen_doubts import supported
 from ._wider_noise import with_wider_noise
@@ -114,7 +115,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         rounds, fit, joint = checked_jointly(rounds, fit, nominal, scores, effects)
     if rounds and validation is not None and not hopeless:
         progress("asking the unseen records whether they speak against an effect")
-        rounds, fit = supported(rounds, fit, nominal, unseen_data(fit, validation, operating_point))
+        data = unseen_data(fit, validation, operating_point)
+        rounds, fit = told_apart(*supported(rounds, fit, nominal, data), data)
     progress("testing whether anything is left")
     checks = adequacy(fit)
     if validation is not None:
@@ -206,7 +208,9 @@ def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen:
     if any(_others(round_) for round_ in rounds):
         return "ambiguous", Outcome(False, "ambiguous", "The records cannot tell some effects apart: see alternatives, "
                                     "and next_experiment for what separates them.")
-    return "named", Outcome(True, "named", "One set of effects explains the records.")
+    ruled_out = [entry.candidate.label for round_ in rounds for entry in round_.ruled_out]
+    by_unseen = f" The unseen records rule out {', '.join(ruled_out)}, which the others could not." if ruled_out else ""
+    return "named", Outcome(True, "named", f"One set of effects explains the records.{by_unseen}")
 
 
 def _still(fit: Refit) -> bool:

@@ -18,7 +18,7 @@ from ._descent import Descent, descend
 from ._frequency_data import Measured, ResponseData, as_measured
 from ._frequency_locate import response_rms
 from ._glitches import without_glitches
-from ._refit import Refit
+from ._refit import Refit, White
 from ._refitting import filters, paths_of, whitened
 from ._structure import Structure, start_of
 from ._whitening import gathered
@@ -179,7 +179,7 @@ def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:
     sessions = fit.structure.sessions
     if not sessions.inputs:
         return [fit.system] * len(data)
-    structure, own, _ = _own_unknowns(fit, fit, data)
+    structure, own, _ = _own_unknowns(fit, data, _filters(fit, fit, data))
     return [sessions.applied(fit.system, g) for g in structure.gains(own.v)]
 
 
@@ -191,7 +191,7 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData])
     there are readings, fewer where the noise is itself an estimate.
     """
     try:
-        structure, only, n = _own_unknowns(fit, reference, data)
+        structure, only, n = _own_unknowns(fit, data, _filters(fit, reference, data))
     except Diverged:
         return float("inf"), 0.0
     # the trained parameters move by a standard deviation or so: one linear step is their optimum
@@ -205,9 +205,10 @@ def surprise(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) 
     """-2 log predictive density of unseen records given the trained parameters' covariance, but for a constant.
 
     Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
+    The filters are those of `reference`, so that all fits compared with it have the constant in common.
     """
     try:
-        structure, only, n = _own_unknowns(fit, reference, data)
+        structure, only, n = _own_unknowns(fit, data, _filters(reference, reference, data))
     except Diverged:
         return float("inf")
     left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
@@ -223,15 +224,25 @@ def _log_volume(J: Array) -> float:
     return 2.0 * float(np.sum(np.log(np.maximum(s, 1e-9))))
 
 
-def _own_unknowns(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[Structure, Descent, int]:
+def _over(fit: Refit, data: Sequence[Data | ResponseData]) -> tuple[Structure, Array]:
+    """The structure over unseen data, and its unknowns: those trained, the data's own at zero."""
+    structure = replace(fit.structure, data=tuple(data), starts=tuple(start_of(fit.system, one) for one in data))
+    p = structure.n_parameters + structure.n_effects
+    return structure, np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
+
+
+def _filters(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...]:
+    """Whiteners of unseen data along the trained model, with the noise of `reference`."""
+    return filters(*_over(fit, data), reference.floor, reference.levels)[1]
+
+
+def _own_unknowns(fit: Refit, data: Sequence[Data | ResponseData], whiteners: Sequence[White]
+                  ) -> tuple[Structure, Descent, int]:
     """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
-    starts = tuple(start_of(fit.system, one) for one in data)
-    structure = replace(fit.structure, data=tuple(data), starts=starts)
-    p = fit.structure.n_parameters + fit.structure.n_effects
+    structure, v = _over(fit, data)
+    p = structure.n_parameters + structure.n_effects
     trained = fit.v[:p]
-    v = np.concatenate([trained, np.zeros(structure.n_own)])
     R = _information_root(fit.J, p)
-    _, whiteners = filters(structure, v, reference.floor, reference.levels)
     n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
 
     def evaluate(v: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._hold_out import _own_unknowns, surprise, unseen_data
+from robthermal.diagnosis._hold_out import _filters, _own_unknowns, surprise, unseen_data
 from robthermal.diagnosis._unseen_doubts import supported
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
@@ -49,7 +49,7 @@ def test_a_name_that_is_gone_on_unseen_records_is_taken_back(
 def test_surprise_is_the_dense_gaussian_density(found: rt.diagnosis.Diagnosis, hide: Hide) -> None:
     data = unseen_data(found.fit, hide(n=120)[1], None)
     fit = found.fit
-    _, only, n = _own_unknowns(fit, fit, data)
+    _, only, n = _own_unknowns(fit, data, _filters(fit, fit, data))
     p = fit.structure.n_parameters + fit.structure.n_effects
     own = np.concatenate([np.zeros(p), only.v[p:]])
     at_prior = only.z + only.J @ own  # initial temperatures act linearly here: back to their prior mean
