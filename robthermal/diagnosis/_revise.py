@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from ..errors import InputError
 from ._decide import Decision, settled
 from ._refit import Refit
 from ._refitting import extended, relinearised
 from ._score import BIC_GAP, score
-from ._short_list import refit_short_list
+from ._short_list import Entry, delta_bic, refit_short_list
 
 _SWEEPS = 2
 _LENGTH = 4
@@ -38,15 +39,16 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
             before = without(fit, place, nominal)
             if before is None:
                 continue
+            old = decisions[place].best
+            assert old is not None
             short = refit_short_list(before, score(before, names), length=_LENGTH)
-            if not short.entries or short.entries[0].delta_bic < BIC_GAP:
+            entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
+            if entries[0].delta_bic < BIC_GAP:
                 decisions.pop(place)
                 fit, changed = before, True
                 break
-            decision = settled(before, short.entries)
+            decision = settled(before, entries)
             assert decision.best is not None
-            old = decisions[place].best
-            assert old is not None
             # the effect chosen again stands last in the new structure: keep the order of the decisions the same
             decisions.append(decision)
             decisions.pop(place)
@@ -55,6 +57,21 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
         if not changed:
             break
     return tuple(decisions), fit
+
+
+def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, before: Refit) -> tuple[Entry, ...]:
+    """The list with the accepted effect as it is: far from the truth its score may be too low to be listed."""
+    fit = accepted.fit
+    values = fit.structure.quantities(fit.v)
+    structure = before.structure.with_effect(fit.structure.effects[place])
+    v = structure.carried(fit.structure, fit.v, [*values[:place], *values[place + 1:], values[place]])
+    again = extended(before, structure, v)
+    own = replace(accepted, fit=again, delta_bic=delta_bic(before, again))
+    twice = [entry for entry in entries if entry.candidate.key == own.candidate.key]
+    if any(entry.delta_bic >= own.delta_bic for entry in twice):
+        return entries
+    others = [entry for entry in entries if entry.candidate.key != own.candidate.key]
+    return tuple(sorted([own, *others], key=lambda entry: -entry.delta_bic))
 
 
 def without(fit: Refit, place: int, nominal: Refit) -> Refit | None:

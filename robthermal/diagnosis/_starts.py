@@ -17,11 +17,13 @@ from ..errors import Diverged, InputError
 from ._effect import Candidate
 from ._refit import Refit
 from ._refitting import extended, paths_of, whitened
-from ._score import columns
+from ._score import BIC_GAP, columns
 
 Array = NDArray[np.float64]
 _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
+_MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
+_MANY = 12  # evaluations along a bent valley
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,35 +51,66 @@ def started(origin: Origin, candidate: Candidate, size: float) -> Refit:
     """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best."""
     fit = origin.fit
     tried: list[Refit] = []
-    for at, trial, v, beta, promise in _starts(origin, candidate, size):
-        if at is fit and tried and min(new.rss for new in tried) < fit.rss:
-            break  # from nothing is the last resort
-        structure = at.structure.with_effect(trial)
-        values = [*at.structure.quantities(v), {**trial.shape, trial.effect.size.name: beta}]
-        try:
-            new = extended(fit, structure, structure.carried(at.structure, v, values), _FEW)
-        except (Diverged, InputError):
-            continue
-        tried.append(new)
-        if promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - promise):
-            return new
-    if not tried:
-        raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
+    least = fit.rss
+    for start in _starts(origin, candidate, size):
+        new = _refitted(fit, start)
+        if new is not None:
+            if start.promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - start.promise):
+                return new
+            tried.append(new)
+            least = min(least, start.promise)
+    if not any(new.rss < fit.rss for new in tried):
+        nothing = float(np.sign(size)) * candidate.effect.size.typical
+        new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
+        if new is None and not tried:
+            raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
+        further = _along_the_valley(fit, tried, least, fit.rss if new is None else new.rss)
+        tried += [one for one in (new, further) if one is not None]
     return min(tried, key=lambda new: new.rss)
 
 
-def _starts(origin: Origin, candidate: Candidate, size: float
-            ) -> Iterator[tuple[Refit, Candidate, Array, float, float]]:
-    """Linearised at, trial, unknowns, size, and the sum of squares that the linearisation promises."""
-    fit = origin.fit
-    yield fit, candidate, *_linear(fit, candidate, size)
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Linearised at a fit: trial values, unknowns, size, and the sum of squares that the linearisation promises."""
+
+    at: Refit
+    trial: Candidate
+    v: Array
+    size: float
+    promise: float
+
+
+def _starts(origin: Origin, candidate: Candidate, size: float) -> Iterator[_Start]:
+    """From the fit, and from the declared parameters."""
+    yield _Start(origin.fit, candidate, *_linear(origin.fit, candidate, size))
     try:
         declared = origin.declared
     except (Diverged, InputError):
-        declared = fit
+        declared = origin.fit
     trial, best = _best_trial(declared, candidate)
-    yield declared, trial, *_linear(declared, trial, best)
-    yield fit, candidate, fit.v, float(np.sign(size)) * candidate.effect.size.typical, fit.rss
+    yield _Start(declared, trial, *_linear(declared, trial, best))
+
+
+def _refitted(fit: Refit, start: _Start) -> Refit | None:
+    """A few evaluations from a start; None if it does not survive its simulation."""
+    structure = start.at.structure.with_effect(start.trial)
+    values = [*start.at.structure.quantities(start.v), {**start.trial.shape, start.trial.effect.size.name: start.size}]
+    try:
+        return extended(fit, structure, structure.carried(start.at.structure, start.v, values), _FEW)
+    except (Diverged, InputError):
+        return None
+
+
+def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
+    """The best of the starts iterated on, where a start from nothing stands still and much more is promised.
+
+    A capacity beside a capacity lies in a bent valley: from nothing no step along its tangent survives.
+    """
+    promised = fit.rss - least
+    if not tried or fit.rss - stands > _MOVES * promised or fit.n_readings * np.log(fit.rss / least) < 2.0 * BIC_GAP:
+        return None
+    best = min(tried, key=lambda new: new.rss)
+    return extended(best, best.structure, best.v, _MANY)
 
 
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
