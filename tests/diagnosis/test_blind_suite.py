@@ -78,6 +78,15 @@ def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
     assert "CPU seconds" in capsys.readouterr().out
 
 
+def test_a_small_mass_in_a_bent_valley_is_found():
+    """Beside a capacity that gives way no step from nothing along the tangent survives: the neighbour got the name."""
+    given, truth = made(Case("C", "hidden", "hidden_mass", 12))
+    found = rt.diagnose(given.system, given.train, validation=given.unseen, effects=["hidden_mass", "sensor_lag"])
+    assert [effect.effect for effect in found.effects] == ["hidden_mass"] and found.effects[0].where == ("left",)
+    value, std, _ = found.effects[0].values["capacity"]
+    assert abs(value - truth.effects[0][2]["capacity"]) < 3.0 * std
+
+
 def test_the_workflow_gets_no_answer():
     given, truth = made(Case("C", "hidden", "sensor_lag", 3))
     assert not any(sensor.time_constant for sensor in given.system.sensors.values())

@@ -280,3 +280,23 @@ def test_an_effect_that_another_stands_on_stays(plant: rt.System, hide: Hide, mo
     monkeypatch.setattr(_revise, "settled", lambda *a: second)
     kept, _ = _revise.revised((first, second), nominal, ["heat_source"])
     assert [decision.best.candidate.key for decision in kept] == [mass.key, warm.key]
+
+
+def test_choosing_again_does_not_lose_what_was_accepted(
+        plant: rt.System, hide: Hide, rate: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far from the truth the score of the true effect may be too low for the short list."""
+    def lagged(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.append(rate(T[:2], u), (T[0] - T[2]) / 15.0)
+
+    train, _ = hide(lagged, extra_states=1, read=lambda T: T[:, [2, 1]], n=200)
+    names = ["sensor_lag", "heat_source"]
+    nominal = rt.diagnosis.refit(plant, train)
+    decision = rt.diagnosis.decide(rt.diagnosis.refit_short_list(nominal, rt.diagnosis.score(nominal, names)))
+    assert decision.best is not None and decision.best.candidate.label == "sensor_lag(Tp)"
+    rivals = rt.diagnosis.refit_short_list(nominal, rt.diagnosis.score(nominal, ["heat_source"])).entries
+    assert rivals
+    for listed in ((), rivals):
+        monkeypatch.setattr(_revise, "refit_short_list", lambda *a, ls=listed, **k: ShortList(nominal, ls, {}))
+        (kept,), fit = _revise.revised((decision,), nominal, names)
+        assert kept.best is not None and kept.best.candidate.label == "sensor_lag(Tp)" and fit is kept.best.fit
+        assert kept.best.values["time_constant"][0] == pytest.approx(15.0, rel=0.1)
