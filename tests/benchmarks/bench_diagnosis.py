@@ -1,7 +1,8 @@
 """Blind suite of the diagnosis: effects hidden by another integrator, and how often the workflow names them.
 
 Run: python tests/benchmarks/bench_diagnosis.py [--seeds 20] [--first 0] [--topologies ABC] [--effects NAME ...]
-[--jobs 2] [--out FILE]. Results are appended to FILE as they come; started again, finished data sets are skipped.
+[--jobs 2] [--candidates N] [--out FILE]. Results are appended to FILE as they come; started again, finished data sets
+are skipped.
 """
 
 from __future__ import annotations
@@ -29,11 +30,12 @@ def main() -> None:
     parser.add_argument("--effects", nargs="*", help="also nothing, two, and names of noises and of outside effects")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--peers", type=int, default=2, help="compare with peers on every nth seed")
+    parser.add_argument("--candidates", type=int, help="try at most so many: for the time only")
     parser.add_argument("--out", type=Path, default=Path(tempfile.gettempdir()) / "blind_diagnosis.jsonl")
     chosen = parser.parse_args()
     cases = all_cases(chosen.seeds, list(chosen.topologies), chosen.effects, chosen.first)
     header(f"blind suite of the diagnosis, {chosen.seeds} seeds from {chosen.first} on, results in {chosen.out}")
-    rows = run(cases, chosen.out, chosen.jobs, chosen.peers)
+    rows = run(cases, chosen.out, chosen.jobs, chosen.peers, chosen.candidates)
     rows.sort(key=lambda row: row["key"])
     print_rates(rows)
     print_matrix(rows)

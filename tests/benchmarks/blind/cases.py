@@ -130,5 +130,9 @@ def all_cases(seeds: int, topologies: list[str], effects: list[str] | None = Non
             for effect in own if effect != "polarity_memory" or PLANTS[where]().modules
             for seed in range(counts[group])]
     counts["hidden"] = seeds
-    out.sort(key=lambda case: case.seed / counts[case.group])  # a run that is cut short has seen a share of everything
+
+    def share(case: Case) -> float:  # a run that is cut short has seen as much of every group
+        return (case.seed - (first if case.group == "hidden" else 2 * first)) / counts[case.group]
+
+    out.sort(key=share)
     return [case for case in out if effects is None or case.effect in effects]

@@ -31,26 +31,42 @@ def version() -> str:
     return hashlib.sha1(b"".join(file.read_bytes() for file in files)).hexdigest()[:10]
 
 
-def judged(case: Case, version: str, compare: bool) -> Row:
-    """Make the data, diagnose, follow an ambiguous answer up with the recommended experiment, compare with peers."""
+def judged(case: Case, version: str, compare: bool, most: int | None = None) -> Row:
+    """Make the data, diagnose, follow an ambiguous answer up with the recommended experiment, compare with peers.
+
+    With `most`, only so many candidates are tried, those of the true effects among them, and nothing is followed up.
+    """
     row: Row = {"key": case.key, "version": version, "topology": case.topology, "group": case.group,
                 "effect": case.effect, "seed": case.seed}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         given, truth = made(case)
         row["truth"] = [[name, list(where), values] for name, where, values in truth.effects]
+        names = None if most is None else short_catalogue(given.system, truth, most, case.seed)
         start = time.process_time()
         try:
-            found = rt.diagnose(given.system, given.train, validation=given.unseen)
+            found = rt.diagnose(given.system, given.train, validation=given.unseen, effects=names)
         except Exception as error:  # a crash is a result of the suite, with its message
             return row | {"verdict": "crashed", "error": f"{type(error).__name__}: {error}",
                           "seconds": time.process_time() - start}
         row |= {"seconds": time.process_time() - start, **_said(found, truth)}
+        if most is not None:
+            return row
         if case.group == "hidden" and found.verdict == "ambiguous" and found.next_experiment is not None:
             row["follow"] = _followed(given, truth, found)
         if compare and case.group in ("hidden", "nothing"):
             row["peers"] = peers(found, truth.effects)
     return row
+
+
+def short_catalogue(system: rt.System, truth: Truth, most: int, seed: int) -> list[str]:
+    """Names of the true effects and, in random order, of others, as many as fit."""
+    names = list(dict.fromkeys(name for name, _, _ in truth.effects if name in rt.diagnosis.effects()))
+    others = [name for name in rt.diagnosis.effects() if name not in names]
+    for name in np.random.default_rng(seed).permutation(others):
+        if len(rt.diagnosis.candidates(system, [*names, str(name)])) <= most:
+            names.append(str(name))
+    return names
 
 
 def _said(found: rt.diagnosis.Diagnosis, truth: Truth) -> Row:
@@ -97,15 +113,15 @@ def _followed(given: Given, truth: Truth, found: rt.diagnosis.Diagnosis) -> Row:
             "measured": asked and asked.parameter, **_said(again, truth)}
 
 
-def run(cases: Iterable[Case], out: Path, jobs: int, every: int) -> list[Row]:
+def run(cases: Iterable[Case], out: Path, jobs: int, every: int, most: int | None = None) -> list[Row]:
     """Rows of all cases: those in the file already, and the others, appended as they come; peers on every nth seed."""
-    now, wanted = version(), {case.key: case for case in cases}
+    now, wanted = version() + (f" of {most}" if most else ""), {case.key: case for case in cases}
     rows = {row["key"]: row for row in rows_in(out) if row["version"] == now and row["key"] in wanted}
     left = [case for key, case in wanted.items() if key not in rows]
     print(f"{len(wanted)} data sets, {len(rows)} of them done before, version {now}", flush=True)
     start = time.time()
     results = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
-        delayed(judged)(case, now, case.seed % every == 0) for case in left)
+        delayed(judged)(case, now, case.seed % every == 0, most) for case in left)
     with out.open("a", encoding="utf-8") as file:
         for number, row in enumerate(results, start=1):
             rows[row["key"]] = row
