@@ -13,13 +13,13 @@ import pytest
 import robthermal as rt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from blind.cases import Case, made  # noqa: E402 - beside the benchmarks, not on the path before
+from blind.cases import Case, all_cases, made  # noqa: E402 - beside the benchmarks, not on the path before
 from blind.hidden import with_effects  # noqa: E402
 from blind.integrate import Hidden, integrate  # noqa: E402
 from blind.judge import all_named, answer, has_truth, same, stray, wrong  # noqa: E402
 from blind.plants import PLANTS, H, excitation, nominal  # noqa: E402
 from blind.rates import interval, print_matrix, print_rates  # noqa: E402
-from blind.run import judged, rows_in, run  # noqa: E402
+from blind.run import judged, rows_in, run, short_catalogue  # noqa: E402
 from blind.sizes import SIZES, drawn  # noqa: E402
 
 KINDS = {effect: topology for topology in "BAC" for effect in SIZES[topology]}  # each once, in the quickest plant
@@ -136,9 +136,23 @@ def test_interval_is_clopper_and_pearsons():
     assert interval(100, 100) == (pytest.approx(0.025 ** (1 / 100)), 1.0)
 
 
+def test_a_short_catalogue_holds_the_truth():
+    for case in (Case("B", "hidden", "input_lag", 20), Case("A", "outside", "fan", 40)):
+        given, truth = made(case)
+        names = short_catalogue(given.system, truth, 40, case.seed)
+        assert 35 <= len(rt.diagnosis.candidates(given.system, names)) <= 40
+        assert ("input_lag" in names) or case.group == "outside"
+
+
+def test_later_seeds_come_in_the_same_order():
+    early, late = (all_cases(4, ["C"], None, first) for first in (0, 4))
+    assert [(c.group, c.effect) for c in early] == [(c.group, c.effect) for c in late]
+    assert not {c.key for c in early} & {c.key for c in late}
+
+
 def test_a_second_run_skips_what_is_done_and_survives_a_cut_line(tmp_path, monkeypatch):
     out, case = tmp_path / "rows.jsonl", Case("C", "nothing", "nothing", 0)
-    monkeypatch.setattr("blind.run.judged", lambda case, version, compare: {"key": case.key, "version": version})
+    monkeypatch.setattr("blind.run.judged", lambda case, version, *_: {"key": case.key, "version": version})
     first = run([case], out, 1, 1)
     out.write_text(out.read_text() + '{"key": "C/no')
     assert run([case], out, 1, 1) == first == rows_in(out)

@@ -42,10 +42,10 @@ def judged(case: Case, version: str, compare: bool, most: int | None = None) -> 
         warnings.simplefilter("ignore")
         given, truth = made(case)
         row["truth"] = [[name, list(where), values] for name, where, values in truth.effects]
-        names = None if most is None else short_catalogue(given.system, truth, most, case.seed)
+        short = {} if most is None else {"effects": short_catalogue(given.system, truth, most, case.seed)}
         start = time.process_time()
         try:
-            found = rt.diagnose(given.system, given.train, validation=given.unseen, effects=names)
+            found = rt.diagnose(given.system, given.train, validation=given.unseen, **short)
         except Exception as error:  # a crash is a result of the suite, with its message
             return row | {"verdict": "crashed", "error": f"{type(error).__name__}: {error}",
                           "seconds": time.process_time() - start}
