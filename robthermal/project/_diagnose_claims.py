@@ -26,10 +26,13 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
     """
     found = result.diagnosis
     names = ", ".join(effect.label for effect in found.effects)
+    ruled_out = ", ".join(entry.candidate.label for round_ in found.rounds for entry in round_.ruled_out)
     yield _claim(f"Verdict: {found.verdict}", _SENTENCE[found.verdict].format(names=names), found.outcome.ok,
                  found.outcome.text, _records(result, "train"), _margin(found),
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "
-                 "within ΔBIC 10 of it are alternatives.")
+                 "within ΔBIC 10 of it are alternatives"
+                 + (f", but {ruled_out}: more than 10 behind with the density of the unseen records added." if ruled_out
+                    else "."))
     yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
                  "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),
                  f"p = {found.adequacy.p_value:.2g}, must be above 0.001",
@@ -40,7 +43,8 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
                      "training records are fitted, give or take the uncertainty of the parameters.", outcome.ok,
                      outcome.text, _records(result, "validation"),
                      f"p = {found.hold_out.p_value:.2g}, must be above 0.0001",
-                     "F test of the whitened prediction errors against those of the training records.")
+                     "F test of the whitened prediction errors against those of the training records."
+                     + (f" The same records ruled out {ruled_out}; p is not corrected for that." if ruled_out else ""))
 
 
 def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:

@@ -12,6 +12,8 @@ import robthermal as rt
 from robthermal.diagnosis._hold_out import surprise, unseen_data
 from robthermal.diagnosis._refitting import extended
 from robthermal.diagnosis._told_apart import told_apart
+from robthermal.project._diagnose import Diagnosed
+from robthermal.project._diagnose_claims import diagnosis_claims
 from robthermal.project._diagnose_ranking import ranking
 
 LATE = ["input_delay", "input_lag", "sensor_offset"]
@@ -65,6 +67,8 @@ def test_strong_unseen_inputs_decide(plant: rt.System, train: rt.Record, strong:
     assert [entry.candidate.key for entry in told.ruled_out] == [LAG] and not told.contenders
     answers = ranking(found).set_index("candidate")["answer"]
     assert answers["input_lag(heater)"].endswith("the unseen ones could")
+    verdict, _, predicted = diagnosis_claims(Diagnosed(found, (), (), ()))
+    assert "but input_lag(heater)" in verdict.how and "not corrected" in predicted.how
 
 
 def test_weak_unseen_inputs_do_not(plant: rt.System, train: rt.Record, delayed: Run) -> None:
