@@ -16,13 +16,15 @@ from ._augmented import augment
 from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
 from ._equations import Equations
 from ._layout import Layout
+from ._mixing import mixed
 from ._ports import PortHeat
 from ._schedule import Schedule
 from ._terms import Array
 
 WINDOW = 16
 FINEST = 14  # a sample is halved at most this many times
-_ITERATIONS = 12
+_ITERATIONS = 20
+_SLOW = 0.3  # of the change before
 _HOTTEST = 3000.0  # K
 _TAIL = 20.0  # the last kept coefficients are at least this much larger than what is cut off (measured: 1000 times)
 
@@ -163,24 +165,31 @@ class Integrator:
         return np.array(states), worst
 
     def solve_ports(self, base: Array, M: Array, start: Array, w: Array, samples: int) -> tuple[Array, bool]:
-        """Fixed point q = heat(base + M q), by Picard iteration: heats (samples, p + 1, n_q), whether it converged."""
+        """Fixed point q = heat(base + M q): heats (samples, p + 1, n_q), whether it converged.
+
+        By Picard's iteration; Anderson's mixing takes over where that is slow, as after a large step of a conductance.
+        """
         if not self.nq:
             return np.zeros((samples, DEGREE + 1, 0)), True
         np_ = self.ports.size
         V = np.empty((samples, DEGREE + 1, np_ + w.shape[1]))
         V[..., :np_] = start[self.ports]
         V[..., np_:] = w[:, None]
-        shape, last = (samples, DEGREE + 1, np_), np.inf
+        points, changes = [V[..., :np_].flatten()], []
+        last, slow = np.inf, False
         for _ in range(_ITERATIONS):
             q = self.port_heat(V)
-            new = (base + M @ q.ravel()).reshape(shape)
-            change = np.abs(new - V[..., :np_]).max(initial=0.0)
-            V[..., :np_] = new
+            new = base + M @ q.ravel()
+            changes.append(new - points[-1])
+            change = np.abs(changes[-1]).max(initial=0.0)
             if change < 1e-3 * self.tolerance:
                 return q, True
-            if not change < 2 * last:  # grows, or is not a number
+            if not change < (_HOTTEST if slow else 2 * last):  # grows, or is not a number
                 return q, False
+            slow = slow or (len(changes) > 2 and change > _SLOW * last)
             last = change
+            points.append(mixed(points, changes) if slow else new)
+            V[..., :np_] = points[-1].reshape(samples, DEGREE + 1, np_)
         return q, False
 
     def _give_up(self, z: Array, time: float) -> None:
