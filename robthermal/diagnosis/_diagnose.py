@@ -55,7 +55,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         Measured. Records may come from a closed loop. Of a frequency response (from `rt.identify`, with its covariance)
         the linearisation at `operating_point` is compared.
     validation : Record, FrequencyResponse, or list of them, optional
-        Not seen by any fit.
+        Not seen by any fit. They test the prediction, may take a name back, and may tell names of a set apart.
     parameters : iterable or mapping, optional
         Nominal parameters to refit, as in `rt.calibrate`. Default: the fit table; without one they are taken as known.
     effects : iterable of str, optional
