@@ -128,8 +128,8 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
     text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
-            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed. If nothing "
-            "has changed in between, diagnose with them among the training records.")
+            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
+            "nothing has changed in between, diagnose with them among the training records.")
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
 
 
