@@ -28,7 +28,7 @@ from ._score import Scores, promising, score
 from ._sessions import SessionGain
 from ._setting import setting_of
 from ._short_list import Entry, quantities_of, refit_short_list
-from ._told_apart import told_apart
+from ._told_apart import ruled_out, told_apart
 from ._unknown_heat import unknown_heat
 from ._unseen_doubts import supported
 from ._wider_noise import with_wider_noise
@@ -205,11 +205,11 @@ def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen:
     if not rounds:
         return "consistent", Outcome(True, "consistent", "Nothing is missing that these records could show: see "
                                      "not_testable and the detection limits in scores.")
+    labels = ", ".join(candidate.label for candidate in ruled_out(rounds))
+    by_unseen = f" The unseen records rule out {labels}, which the others could not." if labels else ""
     if any(_others(round_) for round_ in rounds):
         return "ambiguous", Outcome(False, "ambiguous", "The records cannot tell some effects apart: see alternatives, "
-                                    "and next_experiment for what separates them.")
-    ruled_out = [entry.candidate.label for round_ in rounds for entry in round_.ruled_out]
-    by_unseen = f" The unseen records rule out {', '.join(ruled_out)}, which the others could not." if ruled_out else ""
+                                    f"and next_experiment for what separates them.{by_unseen}")
     return "named", Outcome(True, "named", f"One set of effects explains the records.{by_unseen}")
 
 

@@ -12,6 +12,7 @@ from ..errors import Outcome
 from ..thermal import System
 from ._adequacy import Adequacy
 from ._decide import Decision
+from ._effect import Candidate
 from ._file import write_json
 from ._hold_out import Gap, HoldOut
 from ._joint_check import JointCheck
@@ -20,6 +21,7 @@ from ._next_experiment import NextExperiment
 from ._noise_floor import NoiseFloor
 from ._refit import Refit
 from ._score import Scores
+from ._told_apart import ruled_out
 from ._unknown_heat import UnknownHeat
 
 Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
@@ -109,6 +111,11 @@ class Diagnosis:
     hold_out: HoldOut | None
     joint: JointCheck | None = None
     unknown_heat: UnknownHeat | None = None
+
+    @property
+    def ruled_out(self) -> tuple[Candidate, ...]:
+        """What training could not tell from the accepted effects, and the unseen records could."""
+        return ruled_out(self.rounds)
 
     def __str__(self) -> str:
         lines = [f"verdict: {self.verdict}"]

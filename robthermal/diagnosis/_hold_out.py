@@ -11,6 +11,7 @@ from scipy.stats import f as f_distribution
 
 from .._fitting._data import Data, refuse_same
 from .._fitting._free_run import validate
+from .._fitting._start import Start
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import System
 from ._along import Along
@@ -202,14 +203,27 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData])
     return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
 
 
-def surprise(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> float:
-    """-2 log predictive density of unseen records given the trained parameters' covariance, but for a constant.
+def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[Data | ResponseData]) -> list[float]:
+    """-2 log predictive densities of unseen records given the trained parameters' covariance, but for one constant.
 
     Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
-    The filters are those of `reference`, so that all fits compared with it have the constant in common.
+    One filter serves all fits, with the noise of `reference` and along the first model that survives the records; for
+    a fit that does not it is infinite.
     """
+    whiteners = next((found for fit in (reference, *fits) if (found := _surviving(fit, reference, data))), None)
+    return [float("inf") if whiteners is None else _surprise(fit, whiteners, reference, data) for fit in fits]
+
+
+def _surviving(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...] | None:
     try:
-        structure, only, n = _own_unknowns(fit, data, _filters(reference, reference, data))
+        return _filters(fit, reference, data)
+    except Diverged:
+        return None
+
+
+def _surprise(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[Data | ResponseData]) -> float:
+    try:
+        _, only, n = _own_unknowns(fit, data, whiteners)
     except Diverged:
         return float("inf")
     left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
@@ -225,9 +239,10 @@ def _log_volume(J: Array) -> float:
     return 2.0 * float(np.sum(np.log(np.maximum(s, 1e-9))))
 
 
-def _over(fit: Refit, data: Sequence[Data | ResponseData]) -> tuple[Structure, Array]:
+def _over(fit: Refit, data: Sequence[Data | ResponseData], start: Start = "free") -> tuple[Structure, Array]:
     """The structure over unseen data, and its unknowns: those trained, the data's own at zero."""
-    structure = replace(fit.structure, data=tuple(data), starts=tuple(start_of(fit.system, one) for one in data))
+    starts = tuple(start_of(fit.system, one, start) for one in data)
+    structure = replace(fit.structure, data=tuple(data), starts=starts)
     p = structure.n_parameters + structure.n_effects
     return structure, np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
 
@@ -267,13 +282,7 @@ def _information_root(J: Array, p: int) -> Array:
 
 def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
     """Free-run rms that sensor noise and random heat alone would give [K]; 1 of frequency responses alone."""
-    structure = fit.structure
-    paths = fit.paths
-    if data is not None:
-        starts = tuple(start_of(fit.system, one, "measured") for one in data)
-        structure = replace(structure, data=tuple(data), starts=starts)
-        v = np.concatenate([fit.v[:structure.n_parameters + structure.n_effects], np.zeros(structure.n_own)])
-        paths = paths_of(structure, v)
+    paths = fit.paths if data is None else paths_of(*_over(fit, data, "measured"))
     total, count = 0.0, 0
     for path in paths:
         if not isinstance(path, Along):

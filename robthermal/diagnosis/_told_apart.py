@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from .._fitting._data import Data
 from ._decide import Decision
+from ._effect import Candidate
 from ._frequency_data import ResponseData
-from ._hold_out import surprise
+from ._hold_out import surprises
 from ._refit import Refit
 from ._refitting import fitted
 from ._score import BIC_GAP
@@ -40,23 +41,29 @@ def told_apart(rounds: tuple[Decision, ...], fit: Refit, data: Sequence[Data | R
     return tuple(sorted(rounds, key=lambda one: places.index(_best(one).candidate.key))), fit
 
 
+def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
+    """Everything that the unseen records have dropped from the sets."""
+    return tuple(entry.candidate for round_ in rounds for entry in round_.ruled_out)
+
+
 def _weighed(round_: Decision, rivals: Sequence[Entry], fit: Refit, data: Sequence[Data | ResponseData]
              ) -> tuple[Decision, Refit]:
     """One set with all records, and the fit with its best name."""
     best = _best(round_)
     own = replace(best, fit=fit, delta_bic=delta_bic(round_.before, fit))
     entries = [own, *refiltered(round_.before, fit, rivals)]
-    evidence = [surprise(entry.fit, fit, data) - entry.delta_bic for entry in entries]
+    unseen = surprises([entry.fit for entry in entries], fit, data)
+    evidence = [density - entry.delta_bic for density, entry in zip(unseen, entries, strict=True)]
     order = sorted(range(len(entries)), key=evidence.__getitem__)
     most = evidence[order[0]] + BIC_GAP
     alike = [entries[i] for i in order if evidence[i] <= most]
-    ruled_out = tuple(entries[i] for i in order if evidence[i] > most)
+    worse = tuple(entries[i] for i in order if evidence[i] > most)
     first = alike[0]
     if first is not own:
         fit = fitted(first.fit.structure, first.fit.v, first.fit.floor, first.fit.levels)
     first = replace(first, fit=fit, delta_bic=best.delta_bic + first.delta_bic - own.delta_bic)
     unweighed = (entry for entry in round_.contenders if not any(entry is rival for rival in rivals))
-    return replace(round_, best=first, contenders=(*alike[1:], *unweighed), ruled_out=ruled_out), fit
+    return replace(round_, best=first, contenders=(*alike[1:], *unweighed), ruled_out=worse), fit
 
 
 def _takes_the_place(entry: Entry, round_: Decision, fit: Refit) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .._fitting._data import Data
 from ._decide import Decision
 from ._frequency_data import ResponseData
-from ._hold_out import surprise
+from ._hold_out import surprises
 from ._refit import Refit
 from ._refitting import fitted
 from ._revise import without
@@ -29,8 +29,8 @@ def supported(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, data: Se
     """
     while rounds:
         lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal) for place in range(len(rounds))]
-        with_all = surprise(fit, fit, data)
-        gains = [0.0 if less is None else with_all - surprise(less, fit, data) for less in lesser]
+        with_all, *others = surprises([fit, *(fit if less is None else less for less in lesser)], fit, data)
+        gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
         worst = max(range(len(gains)), key=gains.__getitem__)
         less = lesser[worst]
         if less is None or not gains[worst] > BIC_GAP:

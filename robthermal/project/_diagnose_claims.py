@@ -26,7 +26,7 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
     """
     found = result.diagnosis
     names = ", ".join(effect.label for effect in found.effects)
-    ruled_out = ", ".join(entry.candidate.label for round_ in found.rounds for entry in round_.ruled_out)
+    ruled_out = ", ".join(candidate.label for candidate in found.ruled_out)
     yield _claim(f"Verdict: {found.verdict}", _SENTENCE[found.verdict].format(names=names), found.outcome.ok,
                  found.outcome.text, _records(result, "train"), _margin(found),
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "

@@ -40,7 +40,7 @@ def _reason(found: Diagnosis, i: int) -> str:
             return f"accepted, ΔBIC {effect.delta_bic:.0f}"
         if candidate.key in others:
             return f"these records cannot tell it from {effect.label}"
-    if any(entry.candidate.key == candidate.key for round_ in found.rounds for entry in round_.ruled_out):
+    if any(other.key == candidate.key for other in found.ruled_out):
         return "the records fitted could not tell it from an accepted one, the unseen ones could"
     if any((effect.effect, effect.where) == candidate.key for effect in found.provisional):
         return "helps, but does not explain everything"

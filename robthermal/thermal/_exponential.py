@@ -25,6 +25,7 @@ WINDOW = 16
 FINEST = 14  # a sample is halved at most this many times
 _ITERATIONS = 20
 _SLOW = 0.3  # of the change before
+_TRIED = 3  # iterations with mixing, after which their rate tells whether the rest will do
 _HOTTEST = 3000.0  # K
 _TAIL = 20.0  # the last kept coefficients are at least this much larger than what is cut off (measured: 1000 times)
 
@@ -167,7 +168,8 @@ class Integrator:
     def solve_ports(self, base: Array, M: Array, start: Array, w: Array, samples: int) -> tuple[Array, bool]:
         """Fixed point q = heat(base + M q): heats (samples, p + 1, n_q), whether it converged.
 
-        By Picard's iteration; Anderson's mixing takes over where that is slow, as after a large step of a conductance.
+        By Picard's iteration; Anderson's mixing takes over where that is slow, as after a large step of a conductance;
+        what will not converge in time is given up early.
         """
         if not self.nq:
             return np.zeros((samples, DEGREE + 1, 0)), True
@@ -175,20 +177,22 @@ class Integrator:
         V = np.empty((samples, DEGREE + 1, np_ + w.shape[1]))
         V[..., :np_] = start[self.ports]
         V[..., np_:] = w[:, None]
-        points, changes = [V[..., :np_].flatten()], []
-        last, slow = np.inf, False
-        for _ in range(_ITERATIONS):
+        points, changes, sizes = [V[..., :np_].flatten()], [], [np.inf]
+        goal, slow_since = 1e-3 * self.tolerance, _ITERATIONS
+        for k in range(_ITERATIONS):
             q = self.port_heat(V)
             new = base + M @ q.ravel()
             changes.append(new - points[-1])
-            change = np.abs(changes[-1]).max(initial=0.0)
-            if change < 1e-3 * self.tolerance:
+            sizes.append(np.abs(changes[-1]).max(initial=0.0))
+            if sizes[-1] < goal:
                 return q, True
-            if not change < (_HOTTEST if slow else 2 * last):  # grows, or is not a number
+            if not sizes[-1] < (_HOTTEST if k > slow_since else 2 * sizes[-2]):  # grows, or is not a number
                 return q, False
-            slow = slow or (len(changes) > 2 and change > _SLOW * last)
-            last = change
-            points.append(mixed(points, changes) if slow else new)
+            if k > 1 and sizes[-1] > _SLOW * sizes[-2]:
+                slow_since = min(slow_since, k)
+            if k >= slow_since + _TRIED and not _in_time(sizes[-1 - _TRIED:], goal, _ITERATIONS - 1 - k):
+                return q, False
+            points.append(mixed(points, changes) if k >= slow_since else new)
             V[..., :np_] = points[-1].reshape(samples, DEGREE + 1, np_)
         return q, False
 
@@ -199,6 +203,12 @@ class Integrator:
         raise Diverged(f"the simulation runs away at {time:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
                        "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
                        "limit the current (rt.certify.largest_current tells how much is safe).", time=time)
+
+
+def _in_time(sizes: list[float], goal: float, left: int) -> bool:
+    """Whether changes that shrink at the rate of these reach the goal in the iterations left."""
+    rate = (sizes[-1] / sizes[0]) ** (1.0 / (len(sizes) - 1))
+    return bool(sizes[-1] * rate**left <= goal)
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:

@@ -10,10 +10,13 @@ import sys
 import time
 
 import numpy as np
-from _timing import header, row
+from _timing import best_of, header, row
+from blind import plants
 from scipy.integrate import solve_ivp
 
 import robthermal as rt
+from robthermal.thermal import _exponential
+from robthermal.thermal._effect_parts import Step
 
 HOURS, PART, TIGHT = 48, 1500, 400
 
@@ -78,6 +81,37 @@ def embedded():
                 f"error {1e3 * error:.2g} mK, {scaled / ours:.0f} times robthermal")
 
 
+def steps_of_a_conductance():
+    """A link that changes by a multiple of itself in the middle of an hour at 3 s, with and without mixing."""
+    eight = plants.two_modules()
+    inputs = plants.excitation(eight, plants.N_TRAIN, np.random.default_rng(0))
+    currents = np.random.default_rng(0).uniform(-1.0, 1.5, (plants.N_TRAIN // 40, 2)).repeat(40, axis=0)
+    air = np.full(plants.N_TRAIN, 298.15)
+    _step_of("two-module system", rt.systems.two_module(), ["x3", "x6"], np.column_stack([currents, air]),
+             ["m1", "m2", "room"])
+    _step_of("plant B of the blind suite", plants.nominal(eight, dict.fromkeys(eight.sensors, 0.01), {}),
+             ["left", "cold1"], inputs, eight.columns)
+
+
+def _step_of(name, base, pair, inputs, columns):
+    header(f"1 h of the {name} at 3 s, the link {'-'.join(pair)} changes at half time")
+    record = rt.Record(sample_time=3.0, inputs=inputs, outputs=np.zeros((len(inputs), 0)), input_names=columns,
+                       output_names=[])
+    slow = _exponential._SLOW
+    for relative in (0.3, -0.9, 3.0, 20.0):
+        step = Step(relative=relative, time=1801.0)
+        links = [link.model_copy(update={"step": step}) if set(link.between) == set(pair) else link
+                 for link in base.links]
+        system = base.model_copy(update={"links": links})
+        ours, run = best_of(lambda system=system: rt.thermal.trajectory(system, record))
+        _exponential._SLOW = np.inf
+        picard, other = best_of(lambda system=system: rt.thermal.trajectory(system, record))
+        _exponential._SLOW = slow
+        apart = np.abs(run.lumps - other.lumps).max()
+        row(f"robthermal, by {relative:+g} of itself", ours,
+            f"Picard alone {picard:.3f} s, {picard / ours:.1f} times; {1e3 * apart:.2g} mK apart")
+
+
 def network(side=316, steps=1000):
     """A plate of side x side lumps, heated by steps, cooled at the rim."""
     header(f"network of {side * side} lumps, {steps} steps")
@@ -106,5 +140,6 @@ def network(side=316, steps=1000):
 
 if __name__ == "__main__":
     embedded()
+    steps_of_a_conductance()
     if "--no-network" not in sys.argv:
         network()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._hold_out import surprise, unseen_data
+from robthermal.diagnosis._hold_out import surprises, unseen_data
 from robthermal.diagnosis._refitting import extended
 from robthermal.diagnosis._told_apart import told_apart
 from robthermal.project._diagnose import Diagnosed
@@ -65,6 +65,7 @@ def test_strong_unseen_inputs_decide(plant: rt.System, train: rt.Record, strong:
     assert abs(value - 2.0) < 4.0 * std
     told = found.rounds[0]
     assert [entry.candidate.key for entry in told.ruled_out] == [LAG] and not told.contenders
+    assert [candidate.key for candidate in found.ruled_out] == [LAG]
     answers = ranking(found).set_index("candidate")["answer"]
     assert answers["input_lag(heater)"].endswith("the unseen ones could")
     verdict, _, predicted = diagnosis_claims(Diagnosed(found, (), (), ()))
@@ -88,7 +89,8 @@ def test_the_first_name_gives_way(unsure: rt.diagnosis.Diagnosis, strong: rt.Rec
     # both were fitted with the same filters and have as many quantities: ΔBIC is the logarithm of the sums of squares
     lag, delay = entries[LAG].fit, entries[DELAY].fit
     by_training = lag.n_readings * np.log(lag.rss / delay.rss)
-    assert abs(by_training) < 10.0 < by_training + surprise(lag, lag, data) - surprise(delay, lag, data)
+    by_unseen = np.subtract(*surprises([lag, delay], lag, data))
+    assert abs(by_training) < 10.0 < by_training + by_unseen
     assert told.best.delta_bic - entries[LAG].delta_bic == pytest.approx(by_training, abs=0.1)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._hold_out import _filters, _own_unknowns, surprise, unseen_data
+from robthermal.diagnosis._hold_out import _filters, _own_unknowns, surprises, unseen_data
+from robthermal.diagnosis._refit import Refit
 from robthermal.diagnosis._unseen_doubts import supported
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
@@ -34,7 +35,8 @@ def test_a_name_that_holds_is_kept(found: rt.diagnosis.Diagnosis, late: tuple[rt
     data = unseen_data(found.fit, late[1], None)
     rounds, fit = supported(found.rounds, found.fit, found.nominal, data)
     assert rounds == found.rounds and fit is found.fit
-    assert surprise(found.nominal, found.fit, data) - surprise(found.fit, found.fit, data) > 100.0
+    without, with_it = surprises([found.nominal, found.fit], found.fit, data)
+    assert without - with_it > 100.0
 
 
 def test_a_name_that_is_gone_on_unseen_records_is_taken_back(
@@ -56,4 +58,26 @@ def test_surprise_is_the_dense_gaussian_density(found: rt.diagnosis.Diagnosis, h
     J, prior = only.J[:n], only.J[n:]
     S = np.eye(n) + J @ np.linalg.inv(prior.T @ prior) @ J.T
     dense = at_prior[:n] @ np.linalg.solve(S, at_prior[:n]) / fit.variance + np.linalg.slogdet(S)[1]
-    assert surprise(fit, fit, data) == pytest.approx(dense, rel=1e-6)
+    assert surprises([fit], fit, data) == [pytest.approx(dense, rel=1e-6)]
+
+
+def test_a_name_whose_model_runs_away_on_unseen_records_is_taken_back(
+        found: rt.diagnosis.Diagnosis, late: tuple[rt.Record, rt.Record], monkeypatch: pytest.MonkeyPatch) -> None:
+    data = unseen_data(found.fit, late[1], None)
+    first, second = found.nominal, found.fit
+
+    def runs_away(fit: Refit, *others: object) -> object:
+        if fit.structure is second.structure:
+            raise rt.errors.Diverged("runs away", time=3.0)
+        return _own_unknowns(fit, *others)
+
+    def no_filter(fit: Refit, *others: object) -> object:
+        if fit.structure is second.structure:
+            raise rt.errors.Diverged("runs away", time=3.0)
+        return _filters(fit, *others)
+
+    monkeypatch.setattr("robthermal.diagnosis._hold_out._own_unknowns", runs_away)
+    monkeypatch.setattr("robthermal.diagnosis._hold_out._filters", no_filter)
+    assert surprises([second], second, data) == [np.inf]
+    assert np.isfinite(surprises([second, first], second, data)[1])
+    assert supported(found.rounds, second, first, data) == ((), first)
