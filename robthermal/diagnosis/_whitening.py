@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,11 +75,19 @@ class Whitener:
         flat = np.ascontiguousarray(r.reshape(*r.shape[:2], -1))
         if not self.gains.any():
             return (self.roots @ flat).reshape(r.shape)
-        e, x = np.empty_like(flat), np.zeros((self.A.shape[1], flat.shape[2]))
-        for k in range(len(flat)):
-            e[k] = flat[k] - self.C @ x
-            x = self.A[k] @ (x + self.gains[k] @ e[k])
-        return (self.roots @ e).reshape(r.shape)
+        n, rest = self.A.shape[1], flat.shape[1:]
+        state, after, out = np.zeros((n + rest[0], rest[1])), np.empty((n + rest[0], rest[1])), np.empty_like(flat)
+        for k in range(len(flat)):  # this loop is the hot one: one product, three copies
+            state[n:] = flat[k]
+            np.matmul(self._joint[k], state, out=after)
+            state[:n], out[k] = after[:n], after[n:]
+        return out.reshape(r.shape)
+
+    @cached_property
+    def _joint(self) -> Array:
+        """One matrix a sample: (δ̂(k), r(k)) to (δ̂(k + 1), z(k))."""
+        inject, weighed = self.A @ self.gains, self.roots @ self.C
+        return np.block([[self.A - inject @ self.C, inject], [-weighed, self.roots]])
 
 
 def whitener(path: Along, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:

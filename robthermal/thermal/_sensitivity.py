@@ -133,26 +133,28 @@ class Sensitivity:
 
     def _of_length(self, z: Array, w: Array, held: Mapping[str, Array], kind: int, level: int) -> tuple[Array, Array]:
         step, ports = self.by.step(kind, level), self.by.ports
-        nodes, n, np_ = DEGREE * ports.size, self.n_free, ports.size
+        nodes, n = DEGREE * ports.size, self.n_free
         V = self._at_ports(step, z, w)
         q = self.by.port_heat(V)
         G = self.by.port_heat.slopes(V)  # (S, p+1, nq, np + nw)
         direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, parameters that act)
-        S = len(z)
-        M = step.M.reshape(step.M.shape[0], DEGREE + 1, self.by.nq)
-        coupled = np.empty((S, nodes, DEGREE + 1, np_))
+        S, nodes_by, end_by = len(z), *self._by_ports(step, G)  # derivatives by the port states at start and nodes
+        A = np.eye(nodes) - nodes_by[:, :, 1:].reshape(S, nodes, nodes)
+        # The transposed system: as many right-hand sides as states, however many parameters there are.
+        through = np.linalg.solve(A.transpose(0, 2, 1), end_by[:, :, 1:].reshape(S, n, nodes).transpose(0, 2, 1))
+        through = np.ascontiguousarray(through.transpose(0, 2, 1))
+        F = step.K[nodes:nodes + n, :n] + through @ step.K[:nodes, :n]
+        F[:, :, ports] += end_by[:, :, 0] + through @ nodes_by[:, :, 0]
+        return F, direct[:, nodes:nodes + n] + through @ direct[:, :nodes]
+
+    def _by_ports(self, step: Step, G: Array) -> tuple[Array, Array]:
+        """Derivatives of the nodes (S, nodes, p + 1, ports) and of the end, by the port states at start and nodes."""
+        nodes, n, np_ = DEGREE * self.by.ports.size, self.n_free, self.by.ports.size
+        M = step.M[:nodes + n].reshape(nodes + n, DEGREE + 1, self.by.nq)
+        out = np.empty((len(G), nodes + n, DEGREE + 1, np_))
         for j in range(DEGREE + 1):
-            coupled[:, :, j] = M[:nodes, j] @ G[:, j, :, :np_]
-        A = np.eye(nodes) - coupled[:, :, 1:].reshape(S, nodes, nodes)
-        rhs = np.concatenate([np.broadcast_to(step.K[:nodes, :n], (S, nodes, n)), direct[:, :nodes]], axis=2)
-        rhs[:, :, ports] += coupled[:, :, 0]
-        dV = np.linalg.solve(A, rhs) if nodes else rhs
-        at_start = np.zeros((S, np_, dV.shape[2]))
-        at_start[:, np.arange(np_), ports] = 1.0
-        dV = np.concatenate([at_start, dV], axis=1).reshape(S, DEGREE + 1, np_, dV.shape[2])
-        dq = (G[..., :np_] @ dV).reshape(S, (DEGREE + 1) * self.by.nq, dV.shape[-1])
-        end = step.M[nodes:nodes + n] @ dq
-        return step.K[nodes:nodes + n, :n] + end[:, :, :n], direct[:, nodes:nodes + n] + end[:, :, n:]
+            out[:, :, j] = M[:, j] @ G[:, j, :, :np_]
+        return out[:, :nodes], out[:, nodes:]
 
     def _at_ports(self, step: Step, z: Array, w: Array) -> Array:
         """Nodal port states and drives of a batch of steps, by the same fixed point as the integrator's."""
