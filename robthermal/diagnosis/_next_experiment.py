@@ -210,15 +210,16 @@ def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequ
     record = simulate(search.system, best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
     faster = best.record.sample_time < search.setting.one.record.sample_time
-    besides = _besides(best.record if faster else None, times, best.measurement)
+    besides = _besides(best.record, faster, times, best.measurement)
     text = _advice(named, alike, apart, expected, now, besides)
     return NextExperiment(record, expected, now, best.pairs, alike, text, best.measurement)
 
 
-def _besides(faster: Record | None, times: int, measurement: Measurement | None) -> str:
+def _besides(record: Record, faster: bool, times: int, measurement: Measurement | None) -> str:
     """What more than other inputs the plan asks for."""
-    asked = [f"sample every {faster.sample_time:.3g} s"] if faster is not None else []
-    asked += [f"measure {times} times as many samples as before"] if times > 1 else []
+    asked = [f"sample every {record.sample_time:.3g} s"] if faster else []
+    hours = len(record) * record.sample_time / 3600.0
+    asked += [f"measure {times} times as many samples as before, {hours:.2g} h"] if times > 1 else []
     asked += [str(measurement)] if measurement is not None else []
     return f" Also {' and '.join(asked)}." if asked else ""
 

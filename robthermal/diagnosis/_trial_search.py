@@ -118,6 +118,13 @@ class Search:
 
 
 def search_of(entries: Sequence[Entry], temperature: tuple[float, float] | None) -> Search:
+    """What the trials for these entries share.
+
+    Raises
+    ------
+    InputError
+        Fewer than two entries; no record, and no noise declared of any sensor.
+    """
     if len(entries) < 2:
         raise InputError(f"{len(entries)} candidates", where="argument entries", expected="two or more to tell apart")
     best = entries[0].fit
