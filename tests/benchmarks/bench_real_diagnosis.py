@@ -62,6 +62,11 @@ def two_heaters() -> None:
     again = board.read_run(DATA, board.REPEATED)
     seconds, found = best_of(lambda: board.diagnose(again, unseen), repeats=1)
     row("  the same inputs on another day, 10 effects", seconds, one_line(found))
+    both = [window, board.means(again).between(*board.WINDOW)]
+    for what, gains in (("", {}), (", a gain of every heater in every run", {"session_gain": True})):
+        seconds, found = best_of(lambda gains=gains: rt.diagnose(board.nominal(room), both, validation=other,
+                                                                 effects=board.EFFECTS, **gains), repeats=1)
+        row(f"  both days, 10 effects{what}", seconds, one_line(found))
     seconds, found = best_of(lambda: rt.diagnose(board.nominal(room), train, validation=other, effects=board.EFFECTS),
                              repeats=1)
     row("  the whole training run, 10 effects", seconds, one_line(found))
