@@ -7,6 +7,7 @@ import pandas as pd
 
 from ..diagnosis import Diagnosis
 
+NOT_NEEDED = "not needed: no more than noise"
 _SURE = 0.01  # family-wise
 _ALIKE = 0.5  # cosine of the signatures after the nominal parameters
 
@@ -47,7 +48,7 @@ def _reason(found: Diagnosis, i: int) -> str:
     if candidate.key in found.not_testable:
         return f"not testable: {found.not_testable[candidate.key]}"
     if scores.p_value[i] >= _SURE:
-        return "not needed: no more than noise"
+        return NOT_NEEDED
     if not scores.possible[i]:
         return "the size it would need is not possible"
     return _behind(found, i)

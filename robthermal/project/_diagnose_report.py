@@ -15,7 +15,7 @@ from ..signals import Record
 from ..thermal import write_system
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._diagnose_claims import diagnosis_assumptions, diagnosis_claims
-from ._diagnose_ranking import ranking
+from ._diagnose_ranking import NOT_NEEDED, ranking
 from ._evidence import write_report
 from ._folder import output_folder
 from ._now import now
@@ -87,11 +87,19 @@ def _sections(result: Diagnosed) -> Iterator[Section]:
     yield Section("Candidates", "Every effect of the catalogue at every place of the system, ranked by what it "
                   "explains after the nominal parameters were refitted. The limit is the size that would have been "
                   "seen with a probability of 0.9 beside the misfit of the nominal system.",
-                  tables=(Table(ranking(found), "Candidates, and why each was taken or not.", digits=3),),
-                  anchor="candidates")
+                  tables=_candidate_tables(ranking(found)), anchor="candidates")
     yield _located_section(found)
     yield _unseen_section(found)
     yield _next_section(found)
+
+
+def _candidate_tables(ranked: pd.DataFrame) -> tuple[Table, ...]:
+    """Those that explain more than noise with the reason, and the others without one."""
+    noise = ranked["answer"] == NOT_NEEDED
+    tables = [Table(ranked[~noise].reset_index(drop=True), "Candidates, and why each was taken or not.", digits=3),
+              Table(ranked[noise].drop(columns="answer").reset_index(drop=True),
+                    "Not needed: they explain no more than noise would.", digits=3)]
+    return tuple(table for table in tables if len(table.frame))
 
 
 def _effect_section(found: Diagnosis) -> Section:
