@@ -53,6 +53,8 @@ class NextExperiment:
         In words.
     measurement : Measurement or None
         A parameter to measure by itself besides; `expected` and `pairs` count on it.
+    inputs : tuple of str
+        Inputs to apply; the others of the record are ambients, as they were.
     """
 
     record: Record
@@ -62,13 +64,18 @@ class NextExperiment:
     inseparable: tuple[Pair, ...]
     advice: str
     measurement: Measurement | None = None
+    inputs: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return self.advice
 
     def plot(self) -> Any:
-        """Plot the inputs to apply; returns the matplotlib axes."""
-        return self.record.plot()
+        """Plot the inputs to apply and the readings that the best candidate predicts; returns the matplotlib axes."""
+        axes = self.record.select(inputs=self.inputs or None).plot()
+        axes[0].figure.suptitle("Next experiment")
+        axes[0].set_ylabel("inputs to apply")
+        axes[1].set_ylabel("predicted readings [K]")
+        return axes
 
 
 def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0,
@@ -212,7 +219,8 @@ def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequ
     faster = best.record.sample_time < search.setting.one.record.sample_time
     besides = _besides(best.record, faster, times, best.measurement)
     text = _advice(named, alike, apart, expected, now, besides)
-    return NextExperiment(record, expected, now, best.pairs, alike, text, best.measurement)
+    return NextExperiment(record, expected, now, best.pairs, alike, text, best.measurement,
+                          tuple(search.limits))
 
 
 def _besides(record: Record, faster: bool, times: int, measurement: Measurement | None) -> str:

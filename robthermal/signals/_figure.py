@@ -24,7 +24,8 @@ def draw(record: Record) -> NDArray[Any]:
         axis.set_ylabel(kind)
         axis.grid(True, alpha=0.3)
         if names:
-            axis.legend(loc="best", fontsize="small")
+            axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(names), 6), fontsize="small",
+                        frameon=False, borderaxespad=0.2)  # above the curves, on none of them
     axes[1].set_xlabel("time [s]")
     if record.name:
         figure.suptitle(record.name)

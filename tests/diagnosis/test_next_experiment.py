@@ -95,6 +95,9 @@ def test_recommended_experiment_makes_the_name_unique(bench: rt.System, case: st
     plan = found.next_experiment
     assert plan is not None and plan.expected > 10.0 * max(plan.present, 1.0)
     heater = plan.record["heater"]
+    above, below = plan.plot()
+    assert above.get_legend_handles_labels()[1] == list(plan.inputs) and "heater" in plan.inputs
+    assert not set(plan.inputs) & set(found.system.ambients) and below.get_ylabel() == "predicted readings [K]"
     assert heater.min() >= 0.0 and heater.max() <= 12.0
     again = rt.diagnose(bench, [first, measured(run, heater, 500 + seed)])
     assert again.verdict == "named"
