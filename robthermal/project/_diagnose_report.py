@@ -169,16 +169,18 @@ def _located_section(found: Diagnosis) -> Section:
                           "p": list(where.lumps.values())}).sort_values("F of an extra heat", ascending=False,
                                                                         ignore_index=True)
     sensors = pd.DataFrame({"sensor": list(where.sensors), "p of whiteness": list(where.sensors.values())})
-    text = ("Of the nominal system, refitted. An extra heat into a lump stands for anything that acts there. The "
-            "misfit over operating conditions:\n\n" + "\n\n".join(where.conditions))
+    conditions = pd.DataFrame([line.split(": ", 1) for line in where.conditions], columns=["condition", "misfit"])
     with house_style():
         figures = [_from_axes(where.plot(), "Evidence of an extra heat by lump.", "F statistic of an extra heat.")]
         if found.unknown_heat is not None:
             caption = (f"Heat into {found.unknown_heat.lump} that would explain the residual, smoothed: mean and 95 % "
                        "band. It is located, not named.")
             figures.append(_from_axes(found.unknown_heat.plot(), caption, caption))
-    return Section("Where the misfit sits", text, figures=tuple(figures),
-                   tables=(Table(lumps, "Lumps.", digits=3), Table(sensors, "Sensors.", digits=3)), anchor="located")
+    tables = [Table(lumps, "Lumps.", digits=3), Table(sensors, "Sensors.", digits=3)]
+    if where.conditions:
+        tables.append(Table(conditions, "Operating conditions."))
+    return Section("Where the misfit sits", "Of the nominal system, refitted. An extra heat into a lump stands for "
+                   "anything that acts there.", figures=tuple(figures), tables=tuple(tables), anchor="located")
 
 
 def _unseen_section(found: Diagnosis) -> Section:
