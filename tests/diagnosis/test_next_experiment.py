@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._next_experiment import rivals
+from robthermal.diagnosis._next_experiment import _clearest, rivals
 from robthermal.diagnosis._separation import hypotheses_of, separation
 from robthermal.diagnosis._setting import setting_of
 from robthermal.diagnosis._trial_inputs import limits_of
+from robthermal.diagnosis._trial_search import LONGEST, Trial, search_of
 
 Array = np.ndarray
 H, ROOM = 5.0, 298.15
@@ -147,6 +148,33 @@ def test_temperature_limits_are_kept(bench: rt.System, convective: tuple[rt.diag
     assert max(free.record["Tp"].max(), free.record["Tb"].max()) > 312.0  # otherwise the test could not fail
     assert 0.0 < kept.expected < free.expected
     assert max(kept.record["Tp"].max(), kept.record["Tb"].max()) <= 312.0
+
+
+def test_a_longer_record_promises_about_as_many_times_more(convective: tuple[rt.diagnosis.Entry, ...]) -> None:
+    search = search_of(convective, None)
+    short = search.at(search.setting.one.record)
+    (pair, gain), = short.pairs.items()
+    assert 0.5 < gain < 40.0 / LONGEST  # otherwise the test says little
+    longer = search.prolonged(short, gain)
+    np.testing.assert_array_equal(longer.record.inputs, np.tile(short.record.inputs, (LONGEST, 1)))
+    assert 0.5 * LONGEST * gain < longer.pairs[pair] < 2.0 * LONGEST * gain
+    too_warm = search_of(convective, (290.0, float(short.record["Tb"].max()) - 1.0))
+    assert too_warm.prolonged(short, gain) is short
+    for enough_or_hopeless in (45.0, 0.01):
+        kept = Trial(short.record, {pair: enough_or_hopeless})
+        assert search.prolonged(kept, enough_or_hopeless) is kept
+
+
+def test_length_decides_which_sample_time_is_best() -> None:
+    def trial(sample_time: float, *gains: float) -> Trial:
+        record = rt.Record(sample_time=sample_time, inputs=np.zeros((4, 1)), outputs=np.zeros((4, 0)),
+                           input_names=["heater"], output_names=[])
+        return Trial(record, dict(zip((("a", "b"), ("a", "c"), ("b", "c")), gains, strict=bool(gains))))
+
+    slow, none = trial(3.0, 30.0, 30.0, 0.0), trial(0.1)
+    fast, other = trial(0.3, 3.4, 2.2, 5.4), trial(0.3, 1.0, 4.2, 5.1)
+    assert _clearest([none, slow, fast, other], 1) == [slow, other]  # as they are; the slow one never tells b from c
+    assert _clearest([none, slow, fast, other], LONGEST) == [fast, slow]  # as long as may be, the fast one tells all
 
 
 def test_inputs_without_limits_stay_within_the_record(bench: rt.System) -> None:
