@@ -102,6 +102,13 @@ def towards_rest(record: Record, limits: Mapping[str, Limits], share: float) -> 
                                 for name, own in limits.items()})
 
 
+def repeated(record: Record, times: int) -> Record:
+    """The same record several times, one after the other."""
+    return Record(sample_time=record.sample_time, inputs=np.tile(record.inputs, (times, 1)),
+                  outputs=np.tile(record.outputs, (times, 1)), input_names=record.input_names,
+                  output_names=record.output_names, name=record.name)
+
+
 def with_inputs(record: Record, values: Mapping[str, Array], sample_time: float | None = None) -> Record:
     """The same record with other inputs and, where given, another sample time [s]."""
     inputs = np.array(record.inputs, np.float64)

@@ -16,7 +16,7 @@ from ._score import BIC_GAP
 from ._separation import Hypothesis, Pair, hypotheses_of, separation
 from ._setting import Setting, setting_of
 from ._short_list import Entry
-from ._trial_inputs import Limits, limits_of, towards_rest
+from ._trial_inputs import Limits, limits_of, repeated, towards_rest
 
 MOST = 6  # candidates that one experiment is designed for
 _ENOUGH = 40.0  # expected ΔBIC that exceeds 10 with a probability of 0.99
@@ -99,10 +99,7 @@ class Search:
         times = int(np.clip(np.ceil(_ENOUGH / max(expected, 1e-9)), 1, LONGEST))
         if trial.worth(times) < trial.worth() + _MORE:
             return trial
-        r = trial.record
-        long = Record(sample_time=r.sample_time, inputs=np.tile(r.inputs, (times, 1)),
-                      outputs=np.tile(r.outputs, (times, 1)), input_names=r.input_names, output_names=r.output_names,
-                      name=r.name)
+        long = repeated(trial.record, times)
         try:
             if not self._allowed(long):
                 return trial
