@@ -15,18 +15,14 @@ from ..errors import Diverged
 from ._augmented import augment
 from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
 from ._equations import Equations
+from ._fixed_point import HOTTEST, FixedPoint
 from ._layout import Layout
-from ._mixing import mixed
 from ._ports import PortHeat
 from ._schedule import Schedule
 from ._terms import Array
 
 WINDOW = 16
 FINEST = 14  # a sample is halved at most this many times
-_ITERATIONS = 20
-_SLOW = 0.3  # of the change before
-_TRIED = 3  # iterations with mixing, after which their rate tells whether the rest will do
-_HOTTEST = 3000.0  # K
 _TAIL = 20.0  # the last kept coefficients are at least this much larger than what is cut off (measured: 1000 times)
 
 
@@ -77,7 +73,13 @@ class Integrator:
         self.layout = Layout(self.eq)
         self.port_heat = PortHeat.of(self.eq, self.layout)
         self.nz, self.nq = self.parts.F.shape[0], self.parts.N.shape[1]
-        self._window: tuple[Step, Array] | None = None
+        self._fixed: dict[tuple[int, int], FixedPoint] = {}
+        self._window: tuple[Step, Array, FixedPoint] | None = None
+
+    @property
+    def goal(self) -> float:
+        """Change of a temperature at which a fixed point is found [K]."""
+        return 1e-3 * self.tolerance
 
     def step(self, kind: int, level: int) -> Step:
         """Matrices of a step of lengths[kind] / 2**level."""
@@ -90,10 +92,20 @@ class Integrator:
         lumps = slice(DEGREE * self.ports.size, DEGREE * self.ports.size + len(self.eq.capacity))
         return np.abs(self.step(kind, level).M[lumps]).reshape(len(self.eq.capacity), DEGREE + 1, self.nq).sum(1).max(0)
 
-    def window(self) -> tuple[Step, Array]:
-        """Matrices of a window of samples, and the gain of a sample."""
+    def fixed(self, kind: int, level: int) -> FixedPoint:
+        """Fixed point of a step of lengths[kind] / 2**level; the ports at its start are known."""
+        if (kind, level) not in self._fixed:
+            nodes = self.step(kind, level).M[:DEGREE * self.ports.size]
+            known = np.zeros((self.ports.size, nodes.shape[1]))
+            self._fixed[kind, level] = FixedPoint(self.port_heat, np.concatenate([known, nodes]), 1, self.goal)
+        return self._fixed[kind, level]
+
+    def window(self) -> tuple[Step, Array, FixedPoint]:
+        """Matrices of a window of samples, the gain of a sample, and the fixed point."""
         if self._window is None:
-            self._window = window_matrices(self.step(0, 0), self.ports, WINDOW), self.gain(0, 0)
+            step = window_matrices(self.step(0, 0), self.ports, WINDOW)
+            at_ports = step.M[:WINDOW * (DEGREE + 1) * self.ports.size]
+            self._window = step, self.gain(0, 0), FixedPoint(self.port_heat, at_ports, WINDOW, self.goal)
         return self._window
 
     def run(self, z0: Array, plan: Schedule) -> Path:
@@ -120,12 +132,12 @@ class Integrator:
         return _path(z, refined)
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:
-        matrices, gain = self.window()
+        matrices, gain, fixed = self.window()
         inputs = w[k:k + WINDOW]
         base = matrices.K @ z[k] + matrices.Ku @ inputs.ravel()
         rows = WINDOW * (DEGREE + 1) * self.ports.size
-        q, change = self.solve_ports(base[:rows], matrices.M[:rows], z[k], inputs, WINDOW)
-        if not change or np.max(np.abs(TAIL @ q).sum(axis=1) @ gain, initial=0.0) > _TAIL * self.tolerance:
+        q, converged = fixed.solve(base[:rows], z[k], inputs)
+        if not converged or np.max(np.abs(TAIL @ q).sum(axis=1) @ gain, initial=0.0) > _TAIL * self.tolerance:
             return False
         z[k + 1:k + 1 + WINDOW] = (base[rows:] + matrices.M[rows:] @ q.ravel()).reshape(WINDOW, self.nz)
         return True
@@ -141,7 +153,7 @@ class Integrator:
             if level > FINEST:
                 self._give_up(z[k], time)
         states, tail = done
-        if not np.abs(states[-1, :len(self.eq.capacity)]).max() < _HOTTEST:
+        if not np.abs(states[-1, :len(self.eq.capacity)]).max() < HOTTEST:
             self._give_up(states[-1], time)
         z[k + 1] = states[-1]
         if level:
@@ -149,52 +161,19 @@ class Integrator:
         return level - 1 if level and tail < _TAIL * self.tolerance / 300 else level
 
     def _try_segment(self, start: Array, w: Array, kind: int, level: int) -> tuple[Array, float] | None:
-        step, gain = self.step(kind, level), self.gain(kind, level)
+        step, gain, fixed = self.step(kind, level), self.gain(kind, level), self.fixed(kind, level)
         nodes = DEGREE * self.ports.size
         states, worst = [start], 0.0
-        own = np.zeros((self.ports.size, step.M.shape[1]))
-        M = np.concatenate([own, step.M[:nodes]])
         for _ in range(2**level):
             base = step.K @ states[-1] + step.Ku @ w[0]
             at_ports = np.concatenate([states[-1][self.ports], base[:nodes]])
-            q, converged = self.solve_ports(at_ports, M, states[-1], w, 1)
+            q, converged = fixed.solve(at_ports, states[-1], w)
             tail = np.max(np.abs(TAIL @ q).sum(axis=1) @ gain, initial=0.0)
             if not converged or not tail <= _TAIL * self.tolerance:
                 return None
             worst = max(worst, float(tail))
             states.append(base[nodes:] + step.M[nodes:] @ q.ravel())
         return np.array(states), worst
-
-    def solve_ports(self, base: Array, M: Array, start: Array, w: Array, samples: int) -> tuple[Array, bool]:
-        """Fixed point q = heat(base + M q): heats (samples, p + 1, n_q), whether it converged.
-
-        By Picard's iteration; Anderson's mixing takes over where that is slow, as after a large step of a conductance;
-        what will not converge in time is given up early.
-        """
-        if not self.nq:
-            return np.zeros((samples, DEGREE + 1, 0)), True
-        np_ = self.ports.size
-        V = np.empty((samples, DEGREE + 1, np_ + w.shape[1]))
-        V[..., :np_] = start[self.ports]
-        V[..., np_:] = w[:, None]
-        points, changes, sizes = [V[..., :np_].flatten()], [], [np.inf]
-        goal, slow_since = 1e-3 * self.tolerance, _ITERATIONS
-        for k in range(_ITERATIONS):
-            q = self.port_heat(V)
-            new = base + M @ q.ravel()
-            changes.append(new - points[-1])
-            sizes.append(np.abs(changes[-1]).max(initial=0.0))
-            if sizes[-1] < goal:
-                return q, True
-            if not sizes[-1] < (_HOTTEST if k > slow_since else 2 * sizes[-2]):  # grows, or is not a number
-                return q, False
-            if k > 1 and sizes[-1] > _SLOW * sizes[-2]:
-                slow_since = min(slow_since, k)
-            if k >= slow_since + _TRIED and not _in_time(sizes[-1 - _TRIED:], goal, _ITERATIONS - 1 - k):
-                return q, False
-            points.append(mixed(points, changes) if k >= slow_since else new)
-            V[..., :np_] = points[-1].reshape(samples, DEGREE + 1, np_)
-        return q, False
 
     def _give_up(self, z: Array, time: float) -> None:
         lumps = np.nan_to_num(z[:len(self.eq.capacity)], nan=np.inf)
@@ -203,12 +182,6 @@ class Integrator:
         raise Diverged(f"the simulation runs away at {time:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
                        "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
                        "limit the current (rt.certify.largest_current tells how much is safe).", time=time)
-
-
-def _in_time(sizes: list[float], goal: float, left: int) -> bool:
-    """Whether changes that shrink at the rate of these reach the goal in the iterations left."""
-    rate = (sizes[-1] / sizes[0]) ** (1.0 / (len(sizes) - 1))
-    return bool(sizes[-1] * rate**left <= goal)
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:

@@ -57,10 +57,14 @@ class PortHeat:
 
     def __call__(self, V: Array) -> Array:
         """Heats (..., n_q) at V (..., n_ports + n_w)."""
-        flows: list[Array] = []
+        return self.flows(V) @ self.scatter
+
+    def flows(self, V: Array) -> Array:
+        """Heats before they are added up by target (..., n_flows) at V (..., n_ports + n_w)."""
+        flows: list[Array] = [np.zeros((*V.shape[:-1], 0))]
         for term, (a, b, drive) in zip(self.eq.terms, self.places, strict=True):
             flows.extend(term.heat(V[..., a], V[..., b], V[..., drive]))
-        return np.concatenate(flows, axis=-1) @ self.scatter if flows else np.zeros((*V.shape[:-1], 0))
+        return np.concatenate(flows, axis=-1)
 
     def slopes(self, V: Array) -> Array:
         """Derivative (..., n_q, n_ports + n_w) of the heats with respect to V."""

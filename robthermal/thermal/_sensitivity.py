@@ -120,16 +120,25 @@ class Sensitivity:
             P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
         return Transitions(F, P)
 
-    def rate_slope(self, name: str, states: Array, w: Array) -> Array:
-        """Derivative (n, n_free) of ż with respect to a parameter at fixed states (n, n_free) and drives."""
-        n, parts = self.n_free, self.by.parts
-        V = np.concatenate([states[:, self.by.ports], w], axis=1)
-        out: Array = np.zeros((len(states), n))
-        if name in self._linear:
-            d = self._linear[name]
-            out = states @ d.F.T + w @ d.B.T + self.by.port_heat(V) @ d.N.T
-        heat = self.by.port_heat.parameter(name, V)
-        return out if heat is None else out + heat @ parts.N[:n].T
+    def rate_slopes(self, states: Array, w: Array, slopes: Array, held: Mapping[str, Array]) -> Array:
+        """Derivative (n, n_free, n_parameters) of ż at states (n, n_free) that move by slopes, and drives by held."""
+        n, parts, ports = self.n_free, self.by.parts, self.by.ports
+        V = np.concatenate([states[:, ports], w], axis=1)
+        q, G, into = self.by.port_heat(V), self.by.port_heat.slopes(V), parts.N[:n]
+        by_state = np.broadcast_to(parts.F[:n, :n], (len(states), n, n)).copy()
+        by_state[:, :, ports] += into @ G[:, :, :ports.size]
+        out = by_state @ slopes
+        for column, name in enumerate(self.names):
+            if name in self._linear:
+                d = self._linear[name]
+                out[..., column] += states @ d.F.T + w @ d.B.T + q @ d.N.T
+            if name in held:
+                through = np.einsum("nqw,nw->nq", G[..., ports.size:], held[name])
+                out[..., column] += held[name] @ parts.B[:n].T + through @ into.T
+            heat = self.by.port_heat.parameter(name, V)
+            if heat is not None:
+                out[..., column] += heat @ into.T
+        return out
 
     def _of_length(self, z: Array, w: Array, held: Mapping[str, Array], kind: int, level: int) -> tuple[Array, Array]:
         step, ports = self.by.step(kind, level), self.by.ports

@@ -229,7 +229,7 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
         held = held_slopes(eq, record, names, plan)
         along = Sensitivity(by, names, held, jump_slopes(by, names, path.z, plan))
         slopes = along.along(path, plan, start_slope(eq, record, initial, names, held))[at]
-        rate_slopes = around and _rate_slopes(along, states, plan, slopes)
+        rate_slopes = _rate_slopes(along, states, plan, slopes) if delayed else None
         sensitivity = reading_slopes(eq, states, around, slopes, rate_slopes, names, h)
     lumps, meters = states[:, :n], path.z[at]
     return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
@@ -250,12 +250,7 @@ def _rates(by: Integrator, states: Array, plan: Schedule) -> tuple[Array, Array]
 
 
 def _rate_slopes(along: Sensitivity, states: Array, plan: Schedule, slopes: Array) -> tuple[Array, Array]:
-    """Derivative of `_rates` along the sensitivities (n, n_states, n_parameters), by complex steps."""
-    after, before = np.zeros_like(slopes), np.zeros_like(slopes)
-    segments = plan.samples, np.maximum(plan.samples - 1, 0)
-    for out, w, segment in zip((after, before), _around(plan), segments, strict=True):
-        for column, name in enumerate(along.names):
-            dw = along.held[name][segment] if name in along.held else np.zeros_like(w)
-            moved = rates(along.by, states + 1e-40j * slopes[..., column], w + 1e-40j * dw)
-            out[..., column] = moved.imag / 1e-40 + along.rate_slope(name, states, w)
+    """Derivative of `_rates` along the sensitivities (n, n_states, n_parameters)."""
+    after, before = (along.rate_slopes(states, w, slopes, {name: held[segment] for name, held in along.held.items()})
+                     for w, segment in zip(_around(plan), (plan.samples, np.maximum(plan.samples - 1, 0)), strict=True))
     return after, before
