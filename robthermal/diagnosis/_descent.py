@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +17,50 @@ _FLAT = 1e-10  # relative singular value that is rounding
 _DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squares of the derivatives
 
 
+class Problem(Protocol):
+    """What is minimised."""
+
+    def residual(self, v: Array) -> Array:
+        """Weighted residuals, (m,)."""
+
+    def slopes(self, v: Array) -> Array:
+        """Derivative of the model, - ∂z/∂v, (m, p)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Residuals at some unknowns, and derivatives once they are asked for: they cost more, and few points need them.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is minimised.
+    v : ndarray, shape (p,)
+        Unknowns.
+    """
+
+    problem: Problem
+    v: Array
+
+    @cached_property
+    def z(self) -> Array:
+        """Weighted residuals, (m,)."""
+        return self.problem.residual(self.v)
+
+    @cached_property
+    def J(self) -> Array:
+        """Derivative of the model, - ∂z/∂v, (m, p)."""
+        return self.problem.slopes(self.v)
+
+
 @dataclass(frozen=True, eq=False)
 class Descent:
     """Where a minimisation ended.
 
     Parameters
     ----------
-    v : ndarray, shape (p,)
-        Unknowns.
-    z : ndarray, shape (m,)
-        Weighted residuals there.
-    J : ndarray, shape (m, p)
-        Derivative of the model, - ∂z/∂v.
+    at : Point
+        The best one.
     converged : bool
         Whether a further step, shortened or damped where longer ones fail, would change the sum of squares by less
         than `enough`.
@@ -34,53 +68,58 @@ class Descent:
         Evaluations.
     """
 
-    v: Array
-    z: Array
-    J: Array
+    at: Point
     converged: bool
     iterations: int
 
 
-def descend(evaluate: Callable[[Array], tuple[Array, Array]], v: Array, bounds: tuple[Array, Array],
-            limit: int, enough: float) -> Descent:
+def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int, enough: float) -> Descent:
     """Minimise |z(v)|² from v.
 
     Parameters
     ----------
-    evaluate : callable
-        v to (z, J).
+    problem : Problem
+        What to minimise.
     v : ndarray
         Start; moved inside the bounds.
     bounds : tuple of ndarray
         Lower and upper.
     limit : int
-        Evaluations.
+        Evaluations; whether the last one has converged is not looked at.
     enough : float
         Predicted decrease of the sum of squares, relative to it, at which to stop; ten times as much per factor e by
         which the mean square exceeds 1: what is hopeless is not polished.
     """
-    v = np.clip(v, *bounds)
-    z, J = evaluate(v)
-    count = 1
-    while True:
-        power = float(z @ z)
-        little = enough * power * (1.0 + 10.0 * np.log(max(power / z.size, 1.0)))
-        for step in _trials(z, J, v, bounds):
-            decrease = power - float(np.sum((z - J @ step) ** 2))
+    now, count = Point(problem, np.clip(v, *bounds)), 1
+    now.z  # noqa: B018  # a start that does not survive its simulation raises here
+    while count < limit:
+        power = float(now.z @ now.z)
+        little = enough * power * (1.0 + 10.0 * np.log(max(power / now.z.size, 1.0)))
+        for step in _trials(now.z, now.J, now.v, bounds):
+            decrease = power - float(np.sum((now.z - now.J @ step) ** 2))
             if decrease <= little:
-                return Descent(v, z, J, True, count)
+                return Descent(now, True, count)
             if count >= limit:
-                return Descent(v, z, J, False, count)
+                return Descent(now, False, count)
             count += 1
-            try:
-                new_z, new_J = evaluate(v + step)
-            except (Diverged, InputError):  # beyond what the system accepts or survives
-                continue
-            if new_z @ new_z < power - 1e-4 * decrease:
+            if (new := _better(Point(problem, now.v + step), power - 1e-4 * decrease, count < limit)) is not None:
                 break
         else:
-            return Descent(v, z, J, False, count)
-        v, z, J = v + step, new_z, new_J
+            return Descent(now, False, count)
+        now = new
+    return Descent(now, False, count)
+
+
+def _better(new: Point, power: float, goes_on: bool) -> Point | None:
+    """The point if it survives, as its derivatives must if they will be needed, and its sum of squares is smaller."""
+    try:
+        if not new.z @ new.z < power:
+            return None
+        if goes_on:
+            new.J  # noqa: B018
+    except (Diverged, InputError):  # beyond what the system accepts or survives
+        return None
+    return new
 
 
 def _trials(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Iterator[Array]:

@@ -22,7 +22,7 @@ from ._locate import locate
 from ._next_experiment import NextExperiment, next_experiment, rivals
 from ._noise_floor import noise_floor
 from ._refit import Refit
-from ._refitting import refit, whitened
+from ._refitting import refit
 from ._revise import revised
 from ._score import Scores, promising, score
 from ._sessions import SessionGain
@@ -31,6 +31,7 @@ from ._short_list import Entry, quantities_of, refit_short_list
 from ._told_apart import ruled_out, told_apart
 from ._unknown_heat import unknown_heat
 from ._unseen_doubts import supported
+from ._whitened import Whitened
 from ._wider_noise import with_wider_noise
 
 MOST_EFFECTS = 3
@@ -216,7 +217,7 @@ def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen:
 def _still(fit: Refit) -> bool:
     """Whether the sizes stay within a standard deviation when the simulation is ten times finer."""
     structure = replace(fit.structure, tolerance=fit.structure.tolerance / 10.0)
-    finer, _ = whitened(structure, fit.v, fit.whiteners)
+    finer = Whitened(structure, fit.whiteners).residual(fit.v)
     scale = np.linalg.norm(fit.J, axis=0)
     scale[scale == 0] = 1.0
     step = np.linalg.lstsq(fit.J / scale, finer - fit.z, rcond=1e-10)[0] / scale

@@ -12,8 +12,8 @@ from .._fitting._data import Data
 from ._frequency_data import ResponseData
 from ._frequency_model import AlongResponse
 from ._refit import Refit
-from ._refitting import whitened
 from ._structure import start_of
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 _BANDS = 5
@@ -55,5 +55,5 @@ def response_rms(fit: Refit, data: Sequence[Data | ResponseData]) -> float:
     own = tuple(one for one in data if isinstance(one, ResponseData))
     structure = replace(fit.structure, data=own, starts=tuple(start_of(fit.system, one) for one in own))
     known = fit.structure.n_parameters + fit.structure.n_effects
-    z, _ = whitened(structure, fit.v[:known], [one.white for one in own])
+    z = Whitened(structure, [one.white for one in own]).residual(fit.v[:known])
     return float(np.sqrt(np.mean(z[:structure.n_readings] ** 2)))

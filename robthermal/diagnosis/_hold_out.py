@@ -15,16 +15,18 @@ from .._fitting._start import Start
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import System
 from ._along import Along
-from ._descent import Descent, descend
+from ._descent import Point, descend
 from ._frequency_data import Measured, ResponseData, as_measured
 from ._frequency_locate import response_rms
 from ._glitches import without_glitches
-from ._refit import Refit, White
-from ._refitting import filters, paths_of, whitened
+from ._refit import Refit
+from ._refitting import filters, paths_of
 from ._structure import Structure, start_of
+from ._whitened import White, Whitened
 from ._whitening import gathered
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 SMALLEST_P = 1e-4
 
 
@@ -252,25 +254,42 @@ def _filters(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) 
     return filters(*_over(fit, data), reference.floor, reference.levels)[1]
 
 
+@dataclass(frozen=True, eq=False)
+class _Unseen:
+    """Whitened residuals of unseen data, and what training says about the first unknowns: R (v - trained)."""
+
+    of: Whitened
+    R: Array
+    trained: Array
+
+    @property
+    def _kept(self) -> Places:
+        """All rows but the parameters' own priors, which are in R already."""
+        structure = self.of.structure
+        n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
+        return np.r_[0:n, n + n_known:n + n_known + structure.n_own]
+
+    def residual(self, v: Array) -> Array:
+        """As `Problem.residual`."""
+        return np.concatenate([self.of.residual(v)[self._kept], -self.R @ (v[:self.trained.size] - self.trained)])
+
+    def slopes(self, v: Array) -> Array:
+        """As `Problem.slopes`."""
+        prior = np.zeros((len(self.R), v.size))
+        prior[:, :self.trained.size] = self.R
+        return np.concatenate([self.of.slopes(v)[self._kept], prior])
+
+
 def _own_unknowns(fit: Refit, data: Sequence[Data | ResponseData], whiteners: Sequence[White]
-                  ) -> tuple[Structure, Descent, int]:
+                  ) -> tuple[Structure, Point, int]:
     """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
     structure, v = _over(fit, data)
     p = structure.n_parameters + structure.n_effects
     trained = fit.v[:p]
-    R = _information_root(fit.J, p)
-    n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
-
-    def evaluate(v: Array) -> tuple[Array, Array]:
-        z, J = whitened(structure, v, whiteners)
-        prior = np.zeros((len(R), v.size))
-        prior[:, :p] = R
-        keep = np.r_[0:n, n + n_known:z.size]  # the parameters' own priors are in R already
-        return np.concatenate([z[keep], -R @ (v[:p] - trained)]), np.concatenate([J[keep], prior])
-
     low, high = (bound.copy() for bound in structure.bounds)
     low[:p], high[:p] = trained, trained
-    return structure, descend(evaluate, v, (low, high), 20, 1e-4), n
+    problem = _Unseen(Whitened(structure, whiteners), _information_root(fit.J, p), trained)
+    return structure, descend(problem, v, (low, high), 20, 1e-4).at, structure.n_readings
 
 
 def _information_root(J: Array, p: int) -> Array:

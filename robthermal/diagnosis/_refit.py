@@ -15,16 +15,14 @@ from ..thermal import System
 from ._along import Along
 from ._effect import Candidate
 from ._frequency_model import AlongResponse
-from ._frequency_whitening import ResponseWhitener
 from ._levels import Levels
 from ._noise_floor import NoiseFloor
 from ._sessions import session_table
 from ._structure import Structure
-from ._whitening import Whitener
+from ._whitened import White, Whitened
 
 Array = NDArray[np.float64]
 Path = Along | AlongResponse
-White = Whitener | ResponseWhitener
 _FLAT = 1e-9  # relative size of a direction of J that counts as none
 _CONTRADICTED = 6.0  # standard deviations of a prior
 
@@ -49,8 +47,6 @@ class Refit:
         One per record or frequency response.
     z : ndarray, shape (m,)
         Whitened residuals of all readings, then of the priors.
-    J : ndarray, shape (m, p)
-        Whitened derivatives.
     outcome : Outcome
         Codes "converged", "not_converged" (not ok).
     """
@@ -62,8 +58,12 @@ class Refit:
     paths: tuple[Path, ...]
     whiteners: tuple[White, ...]
     z: Array
-    J: Array
     outcome: Outcome
+
+    @cached_property
+    def J(self) -> Array:
+        """Whitened derivatives, (m, p)."""
+        return Whitened(self.structure, self.whiteners).slopes(self.v)
 
     @cached_property
     def system(self) -> System:

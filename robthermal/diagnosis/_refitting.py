@@ -18,9 +18,10 @@ from ._frequency_model import AlongResponse, along_response
 from ._glitches import without_glitches
 from ._levels import Levels, refined
 from ._noise_floor import NoiseFloor, noise_floor
-from ._refit import Path, Refit, White
+from ._refit import Path, Refit
 from ._sessions import SessionGain, sessions_of
 from ._structure import Structure, start_of, structure_of
+from ._whitened import White, Whitened
 from ._whitening import whitener
 
 Array = NDArray[np.float64]
@@ -96,21 +97,21 @@ def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) ->
     for _ in range(_ROUNDS):
         paths, whiteners = filters(structure, v, floor, levels)
         found = minimised(structure, v, whiteners)
-        v = found.v
+        v = found.at.v
         paths = paths_of(structure, v)
         new = _refined(paths, floor, levels)
         if new.close_to(levels):
             break
         levels = new
     paths, whiteners = filters(structure, v, floor, levels)
-    z, J = whitened(structure, v, whiteners)
-    return Refit(structure, v, floor, levels, paths, whiteners, z, J, _outcome(found))
+    z = Whitened(structure, whiteners).residual(v)
+    return Refit(structure, v, floor, levels, paths, whiteners, z, _outcome(found))
 
 
 def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
     """Fit another structure with the same filters, so that sums of squares can be compared."""
     found = minimised(structure, v, fit.whiteners, limit)
-    return replace(fit, structure=structure, v=found.v, z=found.z, J=found.J, outcome=_outcome(found))
+    return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
 
 
 def relinearised(fit: Refit) -> Refit:
@@ -144,18 +145,7 @@ def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels
 
 def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
-    return descend(lambda v: whitened(structure, v, whiteners), v, structure.bounds, limit, _ENOUGH)
-
-
-def whitened(structure: Structure, v: Array, whiteners: Sequence[White]) -> tuple[Array, Array]:
-    """Whitened residuals of all readings, then of the priors, and the derivative of the model."""
-    z, J = [], []
-    for run, w in zip(structure.runs(v), whiteners, strict=True):
-        both = w(np.concatenate([run.residual[..., None], run.slopes], axis=2)).reshape(-1, 1 + v.size)
-        z.append(both[:, 0])
-        J.append(both[:, 1:])
-    prior, prior_J = structure.prior(v)
-    return np.concatenate([*z, prior]), np.concatenate([*J, prior_J])
+    return descend(Whitened(structure, whiteners), v, structure.bounds, limit, _ENOUGH)
 
 
 def _outcome(found: Descent) -> Outcome:

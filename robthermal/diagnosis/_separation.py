@@ -13,10 +13,11 @@ from scipy.linalg import qr
 from .._fitting._data import Data
 from ..signals import Record
 from ._measurement import Measurement
-from ._refitting import filters, whitened
+from ._refitting import filters
 from ._setting import Setting
 from ._short_list import Entry
 from ._structure import Structure
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]
@@ -55,7 +56,7 @@ def hypotheses_of(entries: Sequence[Entry]) -> tuple[Hypothesis, ...]:
     """Every entry with what the present records say about its unknowns, by the filters of the first."""
     out = []
     for entry in entries:
-        J = whitened(entry.fit.structure, entry.fit.v, entries[0].fit.whiteners)[1]
+        J = Whitened(entry.fit.structure, entries[0].fit.whiteners).slopes(entry.fit.v)
         out.append(Hypothesis(entry.candidate.label, entry.fit.structure, entry.fit.v, qr(J, mode="r")[0][:J.shape[1]]))
     return tuple(out)
 
@@ -129,9 +130,9 @@ def separation(hypotheses: Sequence[Hypothesis], setting: Setting, record: Recor
     _, whiteners = filters(*on[0], setting.floor, setting.levels)
     n, z, rows = trial.readings.size, [], []
     for hypothesis, (own, v) in zip(hypotheses, on, strict=True):
-        residual, J = whitened(own, v, whiteners)
-        z.append(residual[:n])
-        rows.append(_stacked(hypothesis, own, J, n))
+        problem = Whitened(own, whiteners)
+        z.append(problem.residual(v)[:n])
+        rows.append(_stacked(hypothesis, own, problem.slopes(v), n))
     return Separation(tuple(hypotheses), tuple(z), tuple(rows))
 
 

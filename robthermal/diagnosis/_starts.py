@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ..errors import Diverged, InputError
 from ._effect import Candidate
 from ._refit import Refit
-from ._refitting import extended, paths_of, whitened
+from ._refitting import extended, paths_of
 from ._score import BIC_GAP, columns
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 _FEW = 3  # evaluations of every start
@@ -43,8 +44,8 @@ class Origin:
         """The structure at the declared parameters, with the filters of the fit and its effects as they are."""
         structure = self.fit.structure
         v = structure.start(structure.ranges.start, structure.quantities(self.fit.v))
-        z, J = whitened(structure, v, self.fit.whiteners)
-        return replace(self.fit, v=v, z=z, J=J, paths=paths_of(structure, v))
+        z = Whitened(structure, self.fit.whiteners).residual(v)
+        return replace(self.fit, v=v, z=z, paths=paths_of(structure, v))
 
 
 def started(origin: Origin, candidate: Candidate, size: float) -> Refit:

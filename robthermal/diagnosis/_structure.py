@@ -16,7 +16,7 @@ from .._fitting._data import Data
 from .._fitting._ranges import Ranges
 from .._fitting._start import Initial, Start, initial_of, start_values
 from ..errors import InputError
-from ..thermal import System, trajectory
+from ..thermal import System, Trajectory, trajectory
 from ._along import Along, along
 from ._effect import Candidate
 from ._frequency_data import ResponseData
@@ -32,14 +32,22 @@ NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temp
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One record simulated: residual measured - modelled (n, n_sensors) [K] and derivatives of the model.
+    """One record simulated: residual measured - modelled, (n, n_sensors) [K].
 
     Of a frequency response: (2 n_b, m), see `ResponseData.readings`.
     """
 
     residual: Array
-    slopes: Array
+    trajectory: Trajectory | None = None
     path: Along | None = None
+
+
+@dataclass(eq=False)
+class _Lately:
+    """What has been computed at some unknowns."""
+
+    runs: list[Run]
+    slopes: list[Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +79,7 @@ class Structure:
     effects: tuple[Candidate, ...] = ()
     tolerance: float = 1e-4
     sessions: Sessions = Sessions()
-    _last: dict[bytes, list[Run]] = field(default_factory=dict, init=False, repr=False)
+    _last: dict[bytes, _Lately] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def n_parameters(self) -> int:
@@ -187,44 +195,57 @@ class Structure:
         return out
 
     def runs(self, v: Array) -> list[Run]:
-        """Residuals of all records and derivatives (n, n_sensors, n_unknowns) of the modelled readings.
+        """All records simulated; the last few are kept: filters and noise levels change more often than unknowns."""
+        return self._lately(v).runs
 
-        The last few are kept: filters and noise levels change more often than the unknowns.
-        """
+    def slopes(self, v: Array) -> list[Array]:
+        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all records; kept too."""
+        lately = self._lately(v)
+        if lately.slopes is None:
+            lately.slopes = self._slopes(v, lately.runs)
+        return lately.slopes
+
+    def _lately(self, v: Array) -> _Lately:
         key = v.tobytes()
         if key not in self._last:
             while len(self._last) >= _KEPT:
                 del self._last[next(iter(self._last))]
-            self._last[key] = self._simulated(v)
+            self._last[key] = _Lately([self._run(*each) for each in zip(self.systems(v), self.data, strict=True)])
         return self._last[key]
 
-    def _simulated(self, v: Array) -> list[Run]:
+    def _run(self, system: System, one: Data | ResponseData) -> Run:
+        if isinstance(one, ResponseData):
+            return Run(one.readings - one.model(system))
+        run = trajectory(system, one.record, tolerance=self.tolerance)
+        return Run(one.readings - run.readings[:, one.columns], run, along(system, one, run))
+
+    def _slopes(self, v: Array, runs: Sequence[Run]) -> list[Array]:
         names, chain = self._chain(v)
         at, gain_at, out = self.n_parameters + self.n_effects, v.size - (self.n_own - self.n_starts), []
         own = [number for number in self.sessions.numbers if number not in names]
         gains = [[*names, *own].index(number) for number in self.sessions.numbers]
-        for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
+        for run, one, start in zip(runs, self.data, self.starts, strict=True):
             if isinstance(one, ResponseData):
-                out.append(self._response_run(v, one))
+                out.append(self._response_slopes(v, one))
                 continue
-            initial = [f"lumps.{lump}.initial" for lump in system.lumps] if start.n_free else []
-            run = trajectory(system, one.record, tolerance=self.tolerance, sensitivities=[*names, *own, *initial])
-            J = run.sensitivity[:, one.columns]
+            assert run.trajectory is not None
+            initial = [f"lumps.{lump}.initial" for lump in run.trajectory.system.lumps] if start.n_free else []
+            J = run.trajectory.derivative([*names, *own, *initial])[:, one.columns]
             slopes = np.zeros((*J.shape[:2], v.size))
             slopes[..., :chain.shape[1]] = J[..., :len(names)] @ chain
             slopes[..., at:at + start.n_free] = J[..., len(names) + len(own):] * start.sigma
             slopes[..., gain_at:gain_at + len(gains)] = J[..., gains] * self.sessions.sigma
-            out.append(Run(one.readings - run.readings[:, one.columns], slopes, along(system, one, run)))
+            out.append(slopes)
             at, gain_at = at + start.n_free, gain_at + len(gains)
         return out
 
-    def _response_run(self, v: Array, one: ResponseData) -> Run:
-        """A frequency response: derivatives by differences of second order."""
+    def _response_slopes(self, v: Array, one: ResponseData) -> Array:
+        """Of a frequency response: differences of second order."""
         n = self.n_parameters + self.n_effects
         steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
         slopes = np.zeros((*one.readings.shape, v.size))
         slopes[..., :n] = response_slopes(lambda moved: one.model(self.system(moved)), v, steps, self.bounds)
-        return Run(one.readings - one.model(self.system(v)), slopes)
+        return slopes
 
     @property
     def _typical(self) -> Array:

@@ -17,7 +17,8 @@ from ._along import Along
 from ._frequency_data import ResponseData
 from ._locate import locate
 from ._refit import Refit
-from ._refitting import filters, whitened
+from ._refitting import filters
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 _PROBE = "extra heat"
@@ -178,8 +179,8 @@ def _heated(fit: Refit, v: Array, lump: str, knots: list[Array], heat: tuple[Arr
             data.append(one)
     structure = replace(fit.structure, base=base, data=tuple(data))
     paths, whiteners = filters(structure, v, fit.floor, fit.levels)
-    z, J = whitened(structure, v, whiteners)
-    return replace(fit, structure=structure, v=v, paths=paths, whiteners=whiteners, z=z, J=J)
+    z = Whitened(structure, whiteners).residual(v)
+    return replace(fit, structure=structure, v=v, paths=paths, whiteners=whiteners, z=z)
 
 
 def _knots(time: Array) -> Array:

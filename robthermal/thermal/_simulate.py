@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..errors import InputError
 from ..signals import Record
 from ._drive import Initial, held_inputs, held_slopes, start_lumps, start_slope, start_state
 from ._equations import Equations
-from ._exponential import Integrator
+from ._exponential import Integrator, Path
 from ._implicit import refuse_memory, run_implicit
 from ._jumps import jump_slopes, rates
 from ._layout import Layout
@@ -47,8 +48,8 @@ class Trajectory:
         Cumulative heat of all other sources: constant and periodic ones, sensors, condensation, hysteresis [J].
     parameters : tuple of str
         Names of the sensitivities.
-    sensitivity : ndarray, shape (n, n_sensors, n_parameters)
-        Derivative of the readings.
+    derivative : callable
+        Parameter names to the derivative of the readings, (n, n_sensors, n_parameters).
     method : str
         "exponential" or "implicit".
     """
@@ -63,8 +64,13 @@ class Trajectory:
     electrical_energy: Array
     source_heat: Array
     parameters: tuple[str, ...]
-    sensitivity: Array
+    derivative: Callable[[Sequence[str]], Array] = field(repr=False)
     method: str
+
+    @cached_property
+    def sensitivity(self) -> Array:
+        """Derivative of the readings by `parameters`, (n, n_sensors, n_parameters); computed when first asked for."""
+        return self.derivative(self.parameters)
 
     @property
     def energy_residual(self) -> Array:
@@ -188,13 +194,11 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     eq = equations(system)
     u = held_inputs(eq, record)
     for name in sensitivities:
-        system.parameter(name)
+        system.parameter(name)  # a misspelt name is refused at once
     if is_small(eq):
         return _exponential(eq, record, u, initial, tolerance, list(sensitivities))
     if sensitivities:
-        raise InputError(f"sensitivities of a network of {len(system.lumps)} lumps", where="argument sensitivities",
-                         expected=f"at most {_DENSE_STATES} states",
-                         remedy="Reduce the model first (rt.thermal.reduce), or difference two simulations.")
+        _refuse_large(system, sensitivities)
     everything = np.arange(len(system.lumps))
     refuse_memory(eq)
     start = start_lumps(eq, record, initial)
@@ -203,7 +207,13 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     readings = read_sampled(eq, measured, record.sample_time)
     return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
                       run.heater_heat, run.electrical_energy, run.source_heat, (),
-                      np.zeros((len(u), readings.shape[1], 0)), "implicit")
+                      partial(_refuse_large, system), "implicit")
+
+
+def _refuse_large(system: System, names: Sequence[str]) -> NoReturn:
+    raise InputError(f"sensitivities of a network of {len(system.lumps)} lumps", where="argument sensitivities",
+                     expected=f"at most {_DENSE_STATES} states",
+                     remedy="Reduce the model first (rt.thermal.reduce), or difference two simulations.")
 
 
 def is_small(eq: Equations) -> bool:
@@ -220,22 +230,40 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
     layout, at = by.layout, plan.samples
     path = by.run(start_state(eq, record, initial, plan), plan)
     states = path.z[at, :layout.n_free]
-    delayed = any(s.delay for s in eq.system.sensors.values())
-    by_rate = delayed or any(name.endswith((".delay", ".time_constant")) for name in names)
-    around = _rates(by, states, plan) if by_rate else None
-    readings = read_sensors(eq, states, around, h)
-    sensitivity: Array = np.zeros((len(u), readings.shape[1], 0))
-    if names:
-        held = held_slopes(eq, record, names, plan)
-        along = Sensitivity(by, names, held, jump_slopes(by, names, path.z, plan))
-        slopes = along.along(path, plan, start_slope(eq, record, initial, names, held))[at]
-        rate_slopes = _rate_slopes(along, states, plan, slopes) if delayed else None
-        sensitivity = reading_slopes(eq, states, around, slopes, rate_slopes, names, h)
+    derivative = _Derivative(record, initial, by, plan, path)
+    readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, h)
     lumps, meters = states[:, :n], path.z[at]
     return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
                       meters[:, layout.ambient_meters], meters[:, layout.heater_meters],
-                      meters[:, layout.module_meters], meters[:, layout.source_meter], tuple(names), sensitivity,
+                      meters[:, layout.module_meters], meters[:, layout.source_meter], tuple(names), derivative,
                       "exponential")
+
+
+@dataclass(frozen=True)
+class _Derivative:
+    """Derivative (n, n_sensors, n_parameters) of the readings of a run by named parameters."""
+
+    record: Record
+    initial: Initial
+    by: Integrator
+    plan: Schedule
+    path: Path
+
+    @property
+    def delayed(self) -> bool:
+        """Whether a sensor reads what was between the samples."""
+        return any(sensor.delay for sensor in self.by.eq.system.sensors.values())
+
+    def __call__(self, names: Sequence[str]) -> Array:
+        by, plan, eq, at = self.by, self.plan, self.by.eq, self.plan.samples
+        states = self.path.z[at, :by.layout.n_free]
+        by_rate = self.delayed or any(name.endswith((".delay", ".time_constant")) for name in names)
+        held = held_slopes(eq, self.record, names, plan)
+        along = Sensitivity(by, names, held, jump_slopes(by, names, self.path.z, plan))
+        slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))[at]
+        return reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, slopes,
+                              _rate_slopes(along, states, plan, slopes) if self.delayed else None, names,
+                              self.record.sample_time)
 
 
 def _around(plan: Schedule) -> tuple[Array, Array]:

@@ -93,17 +93,39 @@ def test_strong_effect_is_reached_although_the_nominal_fit_is_far_off(plant: rt.
 
 def test_descent_does_not_polish_what_is_hopeless() -> None:
     # Rosenbrock's valley with a misfit that nothing removes: fewer evaluations than without it.
-    def valley(offset: float) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        def evaluate(v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            z = np.array([10.0 * (v[1] - v[0] ** 2), 1.0 - v[0], offset])
-            return z, np.array([[20.0 * v[0], -10.0], [1.0, 0.0], [0.0, 0.0]])
-        return evaluate
-
     bounds = np.full(2, -10.0), np.full(2, 10.0)
-    exact = descend(valley(0.0), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
-    rough = descend(valley(1e4), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
-    assert np.allclose(exact.v, 1.0, atol=1e-4)
+    exact = descend(Valley(0.0), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
+    rough = descend(Valley(1e4), np.array([-1.2, 1.0]), bounds, 100, 1e-6)
+    assert np.allclose(exact.at.v, 1.0, atol=1e-4)
     assert rough.converged and rough.iterations < exact.iterations
+
+
+def test_derivatives_are_computed_only_where_a_step_is_taken_from() -> None:
+    bounds, start = (np.full(2, -10.0), np.full(2, 10.0)), np.array([-1.2, 1.0])
+    whole, short = Valley(0.0), Valley(0.0)
+    found = descend(whole, start, bounds, 100, 1e-6)
+    assert whole.slopes_of == [v for v in whole.residual_of if v in whole.slopes_of]  # each once, in that order
+    assert len(whole.slopes_of) < len(whole.residual_of) == found.iterations  # some steps were too long
+    ended = descend(short, np.array([0.9, 0.8]), bounds, 2, 1e-6)
+    assert not ended.converged and len(short.slopes_of) == 1
+    assert ended.at.J.shape == (3, 2) and len(short.slopes_of) == 2
+
+
+class Valley:
+    """Rosenbrock's, with a constant misfit; it notes where it was asked for residuals and for derivatives."""
+
+    def __init__(self, offset: float):
+        self.offset = offset
+        self.residual_of: list[tuple[float, ...]] = []
+        self.slopes_of: list[tuple[float, ...]] = []
+
+    def residual(self, v: np.ndarray) -> np.ndarray:
+        self.residual_of.append(tuple(v))
+        return np.array([10.0 * (v[1] - v[0] ** 2), 1.0 - v[0], self.offset])
+
+    def slopes(self, v: np.ndarray) -> np.ndarray:
+        self.slopes_of.append(tuple(v))
+        return np.array([[20.0 * v[0], -10.0], [1.0, 0.0], [0.0, 0.0]])
 
 
 # Glitches
