@@ -204,7 +204,7 @@ def test_slopes_are_the_derivative_of_a_closed_form() -> None:
         return (1.0 - pole) / g / (z - pole)
 
     change = (exact(g * 1.001) - exact(g * 0.999)) / 0.002  # d/d log g
-    J = as_complex(fit.structure.runs(fit.v)[0].slopes[:, 0, 0])
+    J = as_complex(fit.structure.slopes(fit.v)[0][:, 0, 0])
     assert np.allclose(J, change, rtol=1e-5)
     assert np.allclose(as_complex(fit.paths[0].readings)[:, 0], exact(g), rtol=1e-9)
     one_sided = slope(lambda x: np.array([np.exp(x)]), 0.0, 1e-4, 0.0, 1.0)

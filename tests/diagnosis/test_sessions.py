@@ -66,8 +66,9 @@ def test_derivatives_by_session_gains_are_those_of_the_simulation(plant: rt.Syst
         moved[k] += step
         before, after = structure.runs(v), structure.runs(moved)
         change = -(after[own].residual - before[own].residual) / step
-        assert np.allclose(before[own].slopes[..., k], change, rtol=1e-2, atol=1e-3 * np.abs(change).max())
-        assert not before[1 - own].slopes[..., k].any()
+        slopes = structure.slopes(v)
+        assert np.allclose(slopes[own][..., k], change, rtol=1e-2, atol=1e-3 * np.abs(change).max())
+        assert not slopes[1 - own][..., k].any()
 
 
 @pytest.mark.parametrize("wrong", ["yes", {"fan": 0.05}, {"heater": -0.1}, {"heater": True}])
