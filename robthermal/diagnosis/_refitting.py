@@ -26,7 +26,7 @@ from ._whitening import whitener
 
 Array = NDArray[np.float64]
 LIMIT = 40  # evaluations of a refit
-_ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
+ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
 _ROUNDS = 3  # of filter and noise levels
 
 
@@ -145,7 +145,7 @@ def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels
 
 def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
-    return descend(Whitened(structure, whiteners), v, structure.bounds, limit, _ENOUGH)
+    return descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH)
 
 
 def _outcome(found: Descent) -> Outcome:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..errors import Diverged, InputError
 from ._effect import Candidate
 from ._refit import Refit
 from ._refitting import extended
+from ._scan import scanned
 from ._score import BIC_GAP, Scores
 from ._starts import Origin, started
 
@@ -142,7 +143,8 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
                                     aliases))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    return ShortList(fit, tuple(sorted(map(finished, hopeful(entries)), key=lambda e: -e.delta_bic)), failed)
+    best, *others = sorted(map(finished, hopeful(entries)), key=lambda e: -e.delta_bic) or (None,)
+    return ShortList(fit, () if best is None else (replaced(best, scanned(best.fit)), *others), failed)
 
 
 def hopeful(entries: Sequence[Entry]) -> list[Entry]:
@@ -155,9 +157,13 @@ def finished(entry: Entry) -> Entry:
     """The same, iterated until it converges."""
     if entry.converged:
         return entry
-    before_bic = entry.delta_bic + entry.fit.n_readings * math.log(entry.fit.rss)
-    fit = extended(entry.fit, entry.fit.structure, entry.fit.v, _LAST)
-    return Entry(entry.candidate, fit, before_bic - fit.n_readings * math.log(fit.rss), entry.p_value, entry.aliases)
+    return replaced(entry, extended(entry.fit, entry.fit.structure, entry.fit.v, _LAST))
+
+
+def replaced(entry: Entry, fit: Refit) -> Entry:
+    """The same candidate with a better fit."""
+    gain = fit.n_readings * math.log(entry.fit.rss / fit.rss)
+    return replace(entry, fit=fit, delta_bic=entry.delta_bic + gain)
 
 
 def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,

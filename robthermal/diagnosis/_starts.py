@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Diverged, InputError
+from ._descent import descend
 from ._effect import Candidate
 from ._refit import Refit
-from ._refitting import extended, paths_of
+from ._refitting import ENOUGH, extended, paths_of
 from ._score import BIC_GAP, columns
+from ._structure import Structure
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
+_SETTLING = 2  # evaluations before what shapes an effect is moved
 _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
 _MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
@@ -96,10 +99,25 @@ def _refitted(fit: Refit, start: _Start) -> Refit | None:
     """A few evaluations from a start; None if it does not survive its simulation."""
     structure = start.at.structure.with_effect(start.trial)
     values = [*start.at.structure.quantities(start.v), {**start.trial.shape, start.trial.effect.size.name: start.size}]
+    v = structure.carried(start.at.structure, start.v, values)
     try:
-        return extended(fit, structure, structure.carried(start.at.structure, start.v, values), _FEW)
+        if len(start.trial.effect.free) > 1:
+            v = descend(Whitened(structure, fit.whiteners), v, _held(structure, v), _SETTLING, ENOUGH).at.v
+        return extended(fit, structure, v, _FEW)
     except (Diverged, InputError):
         return None
+
+
+def _held(structure: Structure, v: Array) -> tuple[Array, Array]:
+    """Bounds that hold what shapes the last effect, but not its size, where the trial put it.
+
+    Until the nominal parameters have settled around it their misfit would move a time across the record.
+    """
+    low, high = (bound.copy() for bound in structure.bounds)
+    last = structure.n_parameters + structure.n_effects
+    shape = slice(last - len(structure.effects[-1].effect.free) + 1, last)
+    low[shape] = high[shape] = np.clip(v[shape], low[shape], high[shape])
+    return low, high
 
 
 def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
