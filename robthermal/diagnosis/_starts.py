@@ -102,13 +102,13 @@ def _refitted(fit: Refit, start: _Start) -> Refit | None:
     v = structure.carried(start.at.structure, start.v, values)
     try:
         if len(start.trial.effect.free) > 1:
-            v = descend(Whitened(structure, fit.whiteners), v, _held(structure, v), _SETTLING, ENOUGH).at.v
+            v = descend(Whitened(structure, fit.whiteners), v, held(structure, v), _SETTLING, ENOUGH).at.v
         return extended(fit, structure, v, _FEW)
     except (Diverged, InputError):
         return None
 
 
-def _held(structure: Structure, v: Array) -> tuple[Array, Array]:
+def held(structure: Structure, v: Array) -> tuple[Array, Array]:
     """Bounds that hold what shapes the last effect, but not its size, where the trial put it.
 
     Until the nominal parameters have settled around it their misfit would move a time across the record.

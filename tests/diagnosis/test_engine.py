@@ -16,8 +16,10 @@ from robthermal.diagnosis._decide import Decision
 from robthermal.diagnosis._descent import descend
 from robthermal.diagnosis._glitches import outliers
 from robthermal.diagnosis._refitting import extended
+from robthermal.diagnosis._scan import scanned
 from robthermal.diagnosis._short_list import Entry, ShortList
-from robthermal.diagnosis._starts import Origin, started
+from robthermal.diagnosis._starts import Origin, held, started
+from robthermal.diagnosis._whitened import Whitened
 from robthermal.diagnosis._whitening import whitener
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
@@ -89,6 +91,42 @@ def test_strong_effect_is_reached_although_the_nominal_fit_is_far_off(plant: rt.
     values = extended(new, new.structure, new.v).structure.quantities(extended(new, new.structure, new.v).v)[0]
     assert values["capacity"] == pytest.approx(C, rel=0.05)
     assert values["time_constant"] == pytest.approx(tau, rel=0.05)
+
+
+def test_time_of_a_step_is_looked_for_beyond_the_nearest_minimum(plant: rt.System, hide: Hide, rate: Callable) -> None:
+    # The link between plate and block doubles at 1230 s, inside a dwell of 100 s: near 1330 s is another minimum.
+    def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        flow = 1.45 * (t > 1230.0) * (T[1] - T[0])
+        return rate(T, u, np.array([flow, -flow]))
+
+    fit = rt.diagnosis.refit(plant, hide(hidden)[0])
+    scores = rt.diagnosis.score(fit, ["conductance_step"])
+    place = [candidate.label for candidate in scores.candidates].index("conductance_step(plate-block)")
+    right = started(Origin(fit), scores.candidates[place], float(scores.size[place]))
+    right = extended(right, right.structure, right.v)
+    at = right.structure.n_parameters + 1
+    assert right.v[at] == pytest.approx(1230.0, abs=5.0)
+    assert scanned(right) is right
+    for shift in (-90.0, -40.0, 40.0, 90.0):
+        v = right.v.copy()
+        v[at] += shift
+        found = scanned(replace(right, v=v, z=Whitened(right.structure, right.whiteners).residual(v)))
+        assert found.v[at] == pytest.approx(right.v[at], abs=1.0)
+        assert found.rss < right.rss * (1 + 1e-3)
+
+
+def test_shape_is_held_while_the_rest_settles_but_the_size_is_not(plant: rt.System, hide: Hide) -> None:
+    structure = rt.diagnosis.refit(plant, hide(n=200)[0]).structure
+    tried = {c.label: c for c in rt.diagnosis.candidates(plant, ["hidden_mass", "conductance_step"])}
+    beside = structure.with_effects(tuple(replace(tried[label], shape=shape) for label, shape in (
+        ("conductance_step(plate-block)", {"time": 300.0}), ("hidden_mass(plate)", {"time_constant": 60.0}))))
+    values = [{"relative": 0.5, "time": 300.0}, {"capacity": 10.0, "time_constant": 60.0}]
+    v = beside.start(beside.ranges.start, values)
+    low, high = held(beside, v)
+    last = beside.n_parameters + 3
+    assert low[last] == high[last] == v[last] == pytest.approx(np.log(60.0))
+    free = np.arange(v.size) != last
+    assert np.array_equal(low[free], beside.bounds[0][free]) and np.array_equal(high[free], beside.bounds[1][free])
 
 
 def test_descent_does_not_polish_what_is_hopeless() -> None:
