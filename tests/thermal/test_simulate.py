@@ -116,6 +116,19 @@ def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
         assert np.abs(difference - exact[..., column]).max() <= 1e-5 * scale + 1e-7, name
 
 
+def test_derivatives_can_be_asked_for_afterwards(full, drive, monkeypatch):
+    record, names = drive(40), ["modules.tem.seebeck.value", "sensors.T_plate.delay", "lumps.plate.capacity"]
+    run = rt.thermal.trajectory(full, record)
+    assert run.sensitivity.shape == (40, 2, 0)
+    known = rt.thermal.trajectory(full, record, sensitivities=names).sensitivity
+    np.testing.assert_array_equal(run.derivative(names), known)
+    with pytest.raises(rt.InputError, match="tempo"):
+        run.derivative(["lumps.plate.tempo"])
+    monkeypatch.setattr("robthermal.thermal._simulate._DENSE_STATES", 1)
+    with pytest.raises(rt.InputError, match="sensitivities of a network"):
+        rt.thermal.trajectory(full, record).derivative(names)
+
+
 @pytest.mark.parametrize("field", ["time_constant", "delay"])
 def test_a_sensor_without_lag_or_delay_still_has_that_derivative(full, drive, field):
     record, name, step = drive(40), f"sensors.T_plate.{field}", 1e-3
