@@ -15,7 +15,7 @@ from blind import plants
 from scipy.integrate import solve_ivp
 
 import robthermal as rt
-from robthermal.thermal import _exponential
+from robthermal.thermal import _fixed_point
 from robthermal.thermal._effect_parts import Step
 
 HOURS, PART, TIGHT = 48, 1500, 400
@@ -97,16 +97,16 @@ def _step_of(name, base, pair, inputs, columns):
     header(f"1 h of the {name} at 3 s, the link {'-'.join(pair)} changes at half time")
     record = rt.Record(sample_time=3.0, inputs=inputs, outputs=np.zeros((len(inputs), 0)), input_names=columns,
                        output_names=[])
-    slow = _exponential._SLOW
+    slow = _fixed_point._SLOW
     for relative in (0.3, -0.9, 3.0, 20.0):
         step = Step(relative=relative, time=1801.0)
         links = [link.model_copy(update={"step": step}) if set(link.between) == set(pair) else link
                  for link in base.links]
         system = base.model_copy(update={"links": links})
         ours, run = best_of(lambda system=system: rt.thermal.trajectory(system, record))
-        _exponential._SLOW = np.inf
+        _fixed_point._SLOW = np.inf
         picard, other = best_of(lambda system=system: rt.thermal.trajectory(system, record))
-        _exponential._SLOW = slow
+        _fixed_point._SLOW = slow
         apart = np.abs(run.lumps - other.lumps).max()
         row(f"robthermal, by {relative:+g} of itself", ours,
             f"Picard alone {picard:.3f} s, {picard / ours:.1f} times; {1e3 * apart:.2g} mK apart")
