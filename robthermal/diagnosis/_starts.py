@@ -101,7 +101,7 @@ def _refitted(fit: Refit, start: _Start) -> Refit | None:
     values = [*start.at.structure.quantities(start.v), {**start.trial.shape, start.trial.effect.size.name: start.size}]
     v = structure.carried(start.at.structure, start.v, values)
     try:
-        if len(start.trial.effect.free) > 1:
+        if any(callable(quantity.grid) for quantity in start.trial.effect.free[1:]):
             v = descend(Whitened(structure, fit.whiteners), v, held(structure, v), _SETTLING, ENOUGH).at.v
         return extended(fit, structure, v, _FEW)
     except (Diverged, InputError):
@@ -109,14 +109,16 @@ def _refitted(fit: Refit, start: _Start) -> Refit | None:
 
 
 def held(structure: Structure, v: Array) -> tuple[Array, Array]:
-    """Bounds that hold what shapes the last effect, but not its size, where the trial put it.
+    """Bounds that hold the times and levels that shape the last effect where the trial put them.
 
-    Until the nominal parameters have settled around it their misfit would move a time across the record.
+    Until the nominal parameters have settled around it their misfit would move a time across the record. A time
+    constant stays free: it and its capacity have to move together.
     """
     low, high = (bound.copy() for bound in structure.bounds)
-    last = structure.n_parameters + structure.n_effects
-    shape = slice(last - len(structure.effects[-1].effect.free) + 1, last)
-    low[shape] = high[shape] = np.clip(v[shape], low[shape], high[shape])
+    quantities = structure.effects[-1].effect.free
+    for at, quantity in enumerate(quantities, start=structure.n_parameters + structure.n_effects - len(quantities)):
+        if quantity is not quantities[0] and callable(quantity.grid):
+            low[at] = high[at] = np.clip(v[at], low[at], high[at])
     return low, high
 
 

@@ -115,18 +115,20 @@ def test_time_of_a_step_is_looked_for_beyond_the_nearest_minimum(plant: rt.Syste
         assert found.rss < right.rss * (1 + 1e-3)
 
 
-def test_shape_is_held_while_the_rest_settles_but_the_size_is_not(plant: rt.System, hide: Hide) -> None:
+def test_times_are_held_while_the_rest_settles_but_no_size_or_time_constant(plant: rt.System, hide: Hide) -> None:
     structure = rt.diagnosis.refit(plant, hide(n=200)[0]).structure
     tried = {c.label: c for c in rt.diagnosis.candidates(plant, ["hidden_mass", "conductance_step"])}
-    beside = structure.with_effects(tuple(replace(tried[label], shape=shape) for label, shape in (
-        ("conductance_step(plate-block)", {"time": 300.0}), ("hidden_mass(plate)", {"time_constant": 60.0}))))
-    values = [{"relative": 0.5, "time": 300.0}, {"capacity": 10.0, "time_constant": 60.0}]
-    v = beside.start(beside.ranges.start, values)
-    low, high = held(beside, v)
-    last = beside.n_parameters + 3
-    assert low[last] == high[last] == v[last] == pytest.approx(np.log(60.0))
-    free = np.arange(v.size) != last
-    assert np.array_equal(low[free], beside.bounds[0][free]) and np.array_equal(high[free], beside.bounds[1][free])
+    step = replace(tried["conductance_step(plate-block)"], shape={"time": 300.0})
+    mass = replace(tried["hidden_mass(plate)"], shape={"time_constant": 60.0})
+    of_step, of_mass = {"relative": 0.5, "time": 300.0}, {"capacity": 10.0, "time_constant": 60.0}
+    for first, last, values, fixed in ((mass, step, [of_mass, of_step], True), (step, mass, [of_step, of_mass], False)):
+        both = structure.with_effects((first, last))
+        v = both.start(both.ranges.start, values)
+        low, high = held(both, v)
+        at = both.n_parameters + 3
+        assert bool(low[at] == high[at] == v[at]) is fixed
+        free = np.arange(v.size) != at
+        assert np.array_equal(low[free], both.bounds[0][free]) and np.array_equal(high[free], both.bounds[1][free])
 
 
 def test_descent_does_not_polish_what_is_hopeless() -> None:
