@@ -70,7 +70,7 @@ class Trajectory:
     @cached_property
     def sensitivity(self) -> Array:
         """Derivative of the readings by `parameters`, (n, n_sensors, n_parameters); computed when first asked for."""
-        return self.derivative(self.parameters)
+        return self.derivative(self.parameters) if self.parameters else np.zeros((*self.readings.shape, 0))
 
     @property
     def energy_residual(self) -> Array:

@@ -125,8 +125,10 @@ def test_derivatives_can_be_asked_for_afterwards(full, drive, monkeypatch):
     with pytest.raises(rt.InputError, match="tempo"):
         run.derivative(["lumps.plate.tempo"])
     monkeypatch.setattr("robthermal.thermal._simulate._DENSE_STATES", 1)
+    large = rt.thermal.trajectory(full, record)
+    assert large.method == "implicit" and large.sensitivity.shape == (40, 2, 0)
     with pytest.raises(rt.InputError, match="sensitivities of a network"):
-        rt.thermal.trajectory(full, record).derivative(names)
+        large.derivative(names)
 
 
 @pytest.mark.parametrize("field", ["time_constant", "delay"])
