@@ -27,7 +27,7 @@ from ._revise import revised
 from ._score import Scores, promising, score
 from ._sessions import SessionGain
 from ._setting import setting_of
-from ._short_list import Entry, quantities_of, refit_short_list
+from ._short_list import flails, quantities_of, refit_short_list
 from ._told_apart import ruled_out, told_apart
 from ._unknown_heat import unknown_heat
 from ._unseen_doubts import supported
@@ -36,7 +36,6 @@ from ._wider_noise import with_wider_noise
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
-_MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -172,21 +171,14 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         decision = decide(refit_short_list(fit, scores))
         if decision.best is None:
             break
-        hopeless = _flails(fit, decision.best)
+        hopeless = flails(fit, decision.best)
         rounds, fit = (*rounds, decision), decision.best.fit
         if hopeless or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
             return rounds, fit, True
     if len(rounds) < 2:
         return rounds, fit, False
     progress(f"choosing each of {len(rounds)} effects again beside the others")
-    return *revised(rounds, nominal, effects), False
-
-
-def _flails(fit: Refit, best: Entry) -> bool:
-    """Whether the best candidate leaves most of a large misfit: more of the same kind would only be curve fitting."""
-    n = fit.n_readings
-    after = fit.rss * np.exp(-best.delta_bic / n)
-    return bool(after > _LARGE * n and after - n > _MOST * (fit.rss - n))
+    return *revised(rounds, nominal, effects, last_is_new=True), False
 
 
 def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None

@@ -16,7 +16,7 @@ _SWEEPS = 2
 _LENGTH = 4
 
 
-def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None
+def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
             ) -> tuple[tuple[Decision, ...], Refit]:
     """Choose each effect again with the others in place, until none changes; drop what is not needed any more.
 
@@ -28,14 +28,16 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
         Without any effect.
     effects : iterable of str, optional
         Catalogue.
+    last_is_new : bool
+        Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
     """
     names = None if effects is None else list(effects)
     chosen = [round_.best for round_ in rounds if round_.best is not None]
     fit = chosen[-1].fit
     decisions = list(rounds)
-    for _ in range(_SWEEPS):
+    for sweep in range(_SWEEPS):
         changed = False
-        for place in range(len(decisions) - 1, -1, -1):
+        for place in range(len(decisions) - 1 - (last_is_new and sweep == 0), -1, -1):
             before = without(fit, place, nominal)
             if before is None:
                 continue

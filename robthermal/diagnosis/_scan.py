@@ -1,28 +1,34 @@
-"""A finer look at what shapes an effect where the sum of squares has several minima: a time, a dew point.
+"""A second look at what shapes an effect where the sum of squares has several minima.
 
-A step of a conductance at the wrong side of a change of the inputs is a minimum of its own. Residuals are cheap, and
-the other unknowns are nearly right there already.
+A step of a conductance at the wrong side of a change of the inputs is a minimum of its own; residuals are cheap, and
+the other unknowns are nearly right there already. A capacity beside the capacity of a measured lump has two, a fast
+and a slow one; there the nominal parameters have to follow.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import Diverged, InputError
+from ._descent import descend
 from ._refit import Refit
-from ._refitting import LIMIT, extended
+from ._refitting import ENOUGH, LIMIT, extended
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 _FINE = 12  # values on either side, as far as the next value tried when candidates were scored
 _LOWER = 1e-3  # of the sum of squares: a minimum of its own
+_FACTORS = (0.1, 0.25, 0.5, 2.0, 4.0, 10.0)  # other time constants than the one found
+_HELD = 4  # evaluations with such a time constant held
+_NEAR = 30.0  # ΔBIC that releasing it may well bring
 
 
 def scanned(fit: Refit) -> Refit:
-    """The fit, or a better one from another value of a quantity that shapes its last effect.
+    """The fit, or a better one from another time or level that shapes its last effect.
 
     Parameters
     ----------
@@ -60,3 +66,38 @@ def _along(fit: Refit, place: int) -> Refit:
         if z @ z < least:
             best, least = v, float(z @ z)
     return fit if best is fit.v else extended(fit, structure, best, LIMIT)
+
+
+def retried(fit: Refit) -> Refit:
+    """The fit, or a better one from another time constant of its last effect.
+
+    Parameters
+    ----------
+    fit : Refit
+        Converged, with one effect or more.
+
+    Returns
+    -------
+    Refit
+    """
+    quantities = fit.structure.effects[-1].effect.free
+    first = fit.structure.n_parameters + fit.structure.n_effects - len(quantities)
+    for at, quantity in enumerate(quantities[1:], start=first + 1):
+        if not callable(quantity.grid) and quantity.lower > 0:
+            fit = min((fit, *_from_other_times(fit, at)), key=lambda new: new.rss)
+    return fit
+
+
+def _from_other_times(fit: Refit, at: int) -> Iterator[Refit]:
+    """Fits from other values of one time constant, of which no smaller sum of squares can be ruled out."""
+    structure = fit.structure
+    for factor in _FACTORS:
+        v, (low, high) = fit.v.copy(), (bound.copy() for bound in structure.bounds)
+        v[at] += math.log(factor)
+        low[at] = high[at] = v[at]
+        try:
+            held = descend(Whitened(structure, fit.whiteners), v, (low, high), _HELD, ENOUGH).at
+            if held.z @ held.z < fit.rss * math.exp(_NEAR / fit.n_readings):
+                yield extended(fit, structure, held.v, LIMIT)
+        except (Diverged, InputError):
+            continue

@@ -14,7 +14,7 @@ from ..errors import Diverged, InputError
 from ._effect import Candidate
 from ._refit import Refit
 from ._refitting import extended
-from ._scan import scanned
+from ._scan import retried, scanned
 from ._score import BIC_GAP, Scores
 from ._starts import Origin, started
 
@@ -24,6 +24,8 @@ LENGTH = 7
 _FIRST = 2  # evaluations before the hopeless ones are dropped
 _LAST = 15  # more evaluations, for the others
 _BEHIND = 60.0  # ΔBIC
+_LARGE = 1.5  # whitened variance
+_MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +145,27 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
                                     aliases))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    best, *others = sorted(map(finished, hopeful(entries)), key=lambda e: -e.delta_bic) or (None,)
-    return ShortList(fit, () if best is None else (replaced(best, scanned(best.fit)), *others), failed)
+    return ShortList(fit, tuple(_looked_at_again(fit, map(finished, hopeful(entries)))), failed)
+
+
+def _looked_at_again(before: Refit, entries: Iterable[Entry]) -> list[Entry]:
+    """By ΔBIC; the best and what is near it from other times, too, unless all of them flail."""
+    ordered = sorted(entries, key=lambda entry: -entry.delta_bic)
+    if not ordered or flails(before, ordered[0]):
+        return ordered
+    ordered[0] = replaced(ordered[0], scanned(ordered[0].fit))
+    if ordered[0].delta_bic < BIC_GAP:
+        return ordered
+    near = ordered[0].delta_bic - _BEHIND
+    again = [replaced(entry, retried(entry.fit)) if entry.delta_bic > near else entry for entry in ordered]
+    return sorted(again, key=lambda entry: -entry.delta_bic)
+
+
+def flails(before: Refit, best: Entry) -> bool:
+    """Whether the best candidate leaves most of a large misfit: more of the same kind would only be curve fitting."""
+    n = before.n_readings
+    after = before.rss * math.exp(-best.delta_bic / n)
+    return bool(after > _LARGE * n and after - n > _MOST * (before.rss - n))
 
 
 def hopeful(entries: Sequence[Entry]) -> list[Entry]:

@@ -14,6 +14,7 @@ from ._along import Along
 
 Array = NDArray[np.float64]
 _IGNORED = 1e6  # K: standard deviation of a missing reading
+_BLOCK = 8  # samples whitened in one product
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,22 +73,37 @@ class Whitener:
 
     def __call__(self, r: Array) -> Array:
         """Whiten along time."""
-        flat = np.ascontiguousarray(r.reshape(*r.shape[:2], -1))
+        flat = r.reshape(*r.shape[:2], -1)
         if not self.gains.any():
             return (self.roots @ flat).reshape(r.shape)
-        n, rest = self.A.shape[1], flat.shape[1:]
-        state, after, out = np.zeros((n + rest[0], rest[1])), np.empty((n + rest[0], rest[1])), np.empty_like(flat)
-        for k in range(len(flat)):  # this loop is the hot one: one product, three copies
-            state[n:] = flat[k]
-            np.matmul(self._joint[k], state, out=after)
-            state[:n], out[k] = after[:n], after[n:]
-        return out.reshape(r.shape)
+        (n, n_sensors, columns), n_z = flat.shape, self.A.shape[1]
+        carry, out = self._blocks
+        readings = np.zeros((len(carry) * _BLOCK, n_sensors, columns))
+        readings[:n] = flat
+        given = np.zeros((len(carry), carry.shape[2], columns))  # state, then readings, of every block
+        given[:, n_z:] = readings.reshape(len(carry), -1, columns)
+        pushed, decay = carry[:, :, n_z:] @ given[:, n_z:], np.ascontiguousarray(carry[:, :, :n_z])
+        for k in range(len(carry) - 1):
+            given[k + 1, :n_z] = decay[k] @ given[k, :n_z] + pushed[k]
+        return (out @ given).reshape(readings.shape)[:n].reshape(r.shape)
 
     @cached_property
-    def _joint(self) -> Array:
-        """One matrix a sample: (δ̂(k), r(k)) to (δ̂(k + 1), z(k))."""
+    def _blocks(self) -> tuple[Array, Array]:
+        """Of `_BLOCK` samples at once: (δ̂, readings) to the δ̂ after them, and to their z; the last is filled up."""
+        (n, n_z), n_sensors = self.A.shape[:2], self.C.shape[0]
         inject, weighed = self.A @ self.gains, self.roots @ self.C
-        return np.block([[self.A - inject @ self.C, inject], [-weighed, self.roots]])
+        sample = np.zeros((-(-n // _BLOCK), _BLOCK, n_z + n_sensors, n_z + n_sensors))
+        sample.reshape(-1, *sample.shape[2:])[:n] = np.block([[self.A - inject @ self.C, inject],
+                                                              [-weighed, self.roots]])
+        carry = np.zeros((len(sample), n_z, n_z + _BLOCK * n_sensors))
+        carry[:, :, :n_z] = np.eye(n_z)
+        out = np.empty((len(sample), _BLOCK, n_sensors, carry.shape[2]))
+        for j in range(_BLOCK):
+            after = sample[:, j, :, :n_z] @ carry
+            own = n_z + j * n_sensors
+            after[:, :, own:own + n_sensors] += sample[:, j, :, n_z:]
+            carry, out[:, j] = after[:, :n_z], after[:, n_z:]
+        return np.ascontiguousarray(carry), out.reshape(len(sample), _BLOCK * n_sensors, -1)
 
 
 def whitener(path: Along, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
