@@ -314,12 +314,12 @@ class Structure:
         for group, slope in zip(self.ranges.members, slopes, strict=True):
             columns.append({name: float(slope) for name in group})
         if self.n_effects:
-            values = _numbers(here)
+            values = here.parameters
             for i in range(p, n):
                 moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-6)
                 step = -step if v[i] + step > self.bounds[1][i] else step
                 moved[i] += step
-                other = _numbers(self.system(moved))
+                other = self.system(moved).parameters
                 columns.append({name: (other[name] - values[name]) / step for name in values
                                 if other[name] != values[name]})
             if _derives(self, v, values, columns[:p]):
@@ -331,28 +331,24 @@ class Structure:
                                      ).reshape(len(names), n)
 
 
-def _numbers(system: System) -> dict[str, float]:
-    return {name: system.parameter(name) for name in system.parameter_names}
-
-
 def _derives(structure: Structure, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
     """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?"""
     p = len(columns)
     steps = _STEP * np.maximum(np.abs(v[:p]), 1e-3)
-    moved = _numbers(structure.system(np.concatenate([v[:p] + steps, v[p:]])))
-    for name, value in values.items():
-        change = moved[name] - value
-        known = sum(float(step) * column.get(name, 0.0) for step, column in zip(steps, columns, strict=True))
-        if abs(change - known) > _UNLIKE * abs(change):
-            return True
-    return False
+    moved = structure.system(np.concatenate([v[:p] + steps, v[p:]])).parameters
+    known = dict.fromkeys(values, 0.0)
+    for step, column in zip(steps, columns, strict=True):
+        for name, slope in column.items():
+            known[name] += float(step) * slope
+    changes = {name: moved[name] - value for name, value in values.items()}
+    return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
 
 
 def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], own: dict[str, float]
               ) -> dict[str, float]:
     moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-3)
     moved[i] += step
-    other = _numbers(structure.system(moved))
+    other = structure.system(moved).parameters
     return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
 
 

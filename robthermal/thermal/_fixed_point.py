@@ -69,7 +69,8 @@ class FixedPoint:
             new = base + self._M @ (self._gather @ flows.T).ravel()
             changes.append(new - points[-1])
             sizes.append(np.abs(changes[-1]).max(initial=0.0))
-            converged = bool(sizes[-1] < self._goal)
+            rate = sizes[-1] / sizes[-2] if 0 < k < slow_since else 1.0  # mixing's says little about what is left
+            converged = bool(sizes[-1] * min(1.0, rate / max(1.0 - rate, 0.5)) < self._goal)
             if converged or not sizes[-1] < (HOTTEST if k > slow_since else 2 * sizes[-2]):  # grows, or is not a number
                 break
             if k > 1 and sizes[-1] > _SLOW * sizes[-2]:

@@ -36,13 +36,13 @@ def parts_of(system: System, table: str) -> Mapping[str, Part]:
     return {part.name: part for part in parts} if table in LISTED else parts
 
 
-def parameter_names(system: System) -> Iterator[str]:
-    """Every named number that is set."""
+def parameters(system: System) -> Iterator[tuple[str, float]]:
+    """Every number that is set, with its name."""
     for table, fields in FIELDS.items():
         for name, part in parts_of(system, table).items():
             for field in fields:
-                if _get(part, field) is not None:
-                    yield f"{table}.{name}.{field}"
+                if (value := _get(part, field)) is not None:
+                    yield f"{table}.{name}.{field}", value
 
 
 EFFECT_SIZES = {  # zero or absent: the effect is not there
@@ -65,7 +65,7 @@ def locate(system: System, name: str) -> tuple[str, str, str]:
         part = rest.removesuffix("." + field)
         if part != rest and part in parts_of(system, table):
             return table, part, field
-    known = list(parameter_names(system))
+    known = list(dict(parameters(system)))
     close = difflib.get_close_matches(name, known, n=1)
     remedy = f"Did you mean {close[0]!r}?" if close else f"For example {known[0]!r}."
     raise InputError(f"there is no parameter {name!r}", where="parameter name",

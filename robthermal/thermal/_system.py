@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from ..errors import InputError
 from ._equations import Equations
 from ._network import check_network
-from ._parameters import parameter_names, present_effects, read_parameter, replace_parameters
+from ._parameters import parameters, present_effects, read_parameter, replace_parameters
 from ._parts import Ambient, FitRange, Input, Lead, Link, Lump, Module, Name, Part, Sensor
 from ._refusals import refusal
 
@@ -122,7 +122,12 @@ class System(Part):
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Every number of the system that has a name, for example ``modules.m1.seebeck.slope``."""
-        return tuple(parameter_names(self))
+        return tuple(self.parameters)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Every number of the system that has a name, with its value, temperatures in kelvin."""
+        return dict(parameters(self))
 
     @property
     def effects(self) -> tuple[str, ...]:
