@@ -40,6 +40,8 @@ class Drive(Part):
 class Hysteresis(Part):
     """Memory of a module's polarity: heat m into the cold face, time_constant dm/dt = sign(I) - m, from m = 0.
 
+    I is the current before an amplifier's lag: behind one it never comes back to zero, and would keep its sign.
+
     Parameters
     ----------
     heat : float
