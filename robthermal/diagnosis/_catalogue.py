@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from ..errors import InputError
 from ..thermal import System
@@ -125,5 +126,16 @@ def candidates(system: System, names: Iterable[str] | None = None) -> list[Candi
     >>> [candidate.label for candidate in found if candidate.effect.name == "seebeck_slope"]
     ['seebeck_slope(m1)', 'seebeck_slope(m2)']
     """
-    return [Candidate(effect, tuple(where)) for effect in chosen_effects(names) for where in effect.places(system)]
+    return [Candidate(_with_units(effect, system, tuple(where)), tuple(where))
+            for effect in chosen_effects(names) for where in effect.places(system)]
+
+
+def _with_units(effect: Effect, system: System, where: tuple[str, ...]) -> Effect:
+    """With the unit of the column it acts on, where that is known: A of a module, W of a heater with gain 1."""
+    heater = system.inputs.get(where[0]) if where else None
+    unit = "A" if where and where[0] in system.modules else "W" if heater is not None and heater.gain == 1.0 else "unit"
+    if unit == "unit" or not any("unit" in quantity.unit for quantity in effect.quantities):
+        return effect
+    return replace(effect, quantities=tuple(replace(quantity, unit=quantity.unit.replace("unit", unit))
+                                            for quantity in effect.quantities))
 

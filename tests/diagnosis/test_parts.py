@@ -49,6 +49,16 @@ def test_catalogue_is_the_contract() -> None:
         assert effect.separated_by and effect.confused_with
 
 
+def test_units_are_those_of_the_column(cooler: rt.System) -> None:
+    percent = cooler.model_copy(update={"inputs": {"heater": cooler.inputs["heater"].model_copy(update={"gain": 0.2})}})
+    for system, heater in ((cooler, "W"), (percent, "unit")):
+        tried = rt.diagnosis.candidates(system, ["input_offset", "input_saturation"])
+        known = {(c.where[0], q.name): q.unit for c in tried for q in c.effect.quantities}
+        assert known["heater", "offset"] == known["heater", "clip"] == heater
+        assert known["heater", "cubic"] == f"1/{heater}²"
+        assert known["m1", "offset"] == known["m1", "clip"] == "A"
+
+
 def test_whitener_inverts_the_dense_covariance(path: Along) -> None:
     noise, disturbance = np.array([0.02, 0.03]), np.array([0.05, 0.02])
     A, C, Q = path.steps[0], path.C, gathered(path, disturbance)
