@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -61,10 +62,15 @@ class PortHeat:
 
     def flows(self, V: Array) -> Array:
         """Heats before they are added up by target (..., n_flows) at V (..., n_ports + n_w)."""
-        flows: list[Array] = [np.zeros((*V.shape[:-1], 0))]
-        for term, (a, b, drive) in zip(self.eq.terms, self.places, strict=True):
+        flows: list[Array] = []
+        for term, (a, b, drive) in zip(self.eq.terms, self._views, strict=True):
             flows.extend(term.heat(V[..., a], V[..., b], V[..., drive]))
-        return np.concatenate(flows, axis=-1)
+        return np.concatenate(flows, axis=-1) if flows else np.zeros((*V.shape[:-1], 0))
+
+    @cached_property
+    def _views(self) -> list[tuple[Indices | slice, ...]]:
+        """`places`, as slices where they are evenly spaced: this is the innermost loop, and a view costs little."""
+        return [tuple(map(_view, place)) for place in self.places]
 
     def slopes(self, V: Array) -> Array:
         """Derivative (..., n_q, n_ports + n_w) of the heats with respect to V."""
@@ -91,6 +97,13 @@ class PortHeat:
                 flows[..., first[number] + side * len(a) + pair] += flow[..., pair]
             found = True
         return flows @ self.scatter if found else None
+
+
+def _view(place: Indices) -> Indices | slice:
+    steps = np.diff(place)
+    if not place.size or np.any(steps != steps[:1]) or np.any(steps <= 0):
+        return place
+    return slice(int(place[0]), int(place[-1]) + 1, int(steps[0]) if steps.size else 1)
 
 
 def _ports(eq: Equations, layout: Layout) -> NDArray[np.intp]:
