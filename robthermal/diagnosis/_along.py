@@ -20,7 +20,6 @@ from ..thermal import Equations, System, Trajectory, trajectory
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-_BLOCK = 64  # responses at once
 _SAME = 1e-4  # change of a rate times the sample time [-]
 
 
@@ -203,21 +202,13 @@ class Along:
         Parameters
         ----------
         responses : list of Response
-            Of m effects.
+            Of m effects; some dozens, so that they stay in the cache.
 
         Returns
         -------
         ndarray, shape (n, n_sensors, m)
             [K].
         """
-        out = np.zeros((len(self.x), len(self.one.sensors), len(responses)))
-        for first in range(0, len(responses), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            out[..., block] = self._readings_of(responses[block])
-        return out
-
-    def _readings_of(self, responses: list[Response]) -> Array:
-        """The same for so few that they stay in the cache."""
         n, nl = self.x.shape
         start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
         for j, response in enumerate(responses):

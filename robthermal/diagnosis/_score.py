@@ -27,6 +27,7 @@ ALPHA = 0.01  # family-wise
 POWER = 0.9
 ALIAS = 1e-3  # sine of the angle below which two signatures are the same, and one is no signature
 BIC_GAP = 10.0
+_BLOCK = 32  # signatures at once: they stay in the cache
 Pair = tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]
 
 
@@ -259,16 +260,19 @@ def columns(path: Along | AlongResponse, trials: Sequence[Candidate]) -> Array:
     if isinstance(path, AlongResponse):
         return path.columns(trials)
     linear = [i for i, trial in enumerate(trials) if trial.effect.signature is not None]
-    responses: list[Response] = []
-    for i in linear:
-        signature = trials[i].effect.signature
-        assert signature is not None
-        responses.append(signature(path, trials[i].where, trials[i].shape))
     out = np.zeros((*path.one.readings.shape, len(trials)))
-    if linear:
-        out[..., linear] = path.readings_of(responses)
+    for first in range(0, len(linear), _BLOCK):
+        some = linear[first:first + _BLOCK]
+        out[..., some] = path.readings_of([_response(path, trials[i]) for i in some])
     for i in set(range(len(trials))) - set(linear):
         step = trials[i].shape.get(trials[i].effect.size.name, trials[i].effect.size.typical)
         run = trajectory(trials[i].add(path.system, step), path.one.record)
         out[..., i] = (run.readings - path.readings)[:, path.one.columns] / step
     return out
+
+
+def _response(path: Along, trial: Candidate) -> Response:
+    """Per unit of the size of a trial with a signature."""
+    signature = trial.effect.signature
+    assert signature is not None
+    return signature(path, trial.where, trial.shape)

@@ -15,6 +15,7 @@ from ._along import Along
 Array = NDArray[np.float64]
 _IGNORED = 1e6  # K: standard deviation of a missing reading
 _BLOCK = 8  # samples whitened in one product
+_COLUMNS = 32  # whitened at once: they stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +77,22 @@ class Whitener:
         flat = r.reshape(*r.shape[:2], -1)
         if not self.gains.any():
             return (self.roots @ flat).reshape(r.shape)
-        (n, n_sensors, columns), n_z = flat.shape, self.A.shape[1]
+        out = np.empty(flat.shape)
+        for first in range(0, flat.shape[2], _COLUMNS):
+            out[..., first:first + _COLUMNS] = self._filtered(flat[..., first:first + _COLUMNS])
+        return out.reshape(r.shape)
+
+    def _filtered(self, r: Array) -> Array:
+        (n, n_sensors, columns), n_z = r.shape, self.A.shape[1]
         carry, out = self._blocks
         readings = np.zeros((len(carry) * _BLOCK, n_sensors, columns))
-        readings[:n] = flat
+        readings[:n] = r
         given = np.zeros((len(carry), carry.shape[2], columns))  # state, then readings, of every block
         given[:, n_z:] = readings.reshape(len(carry), -1, columns)
         pushed, decay = carry[:, :, n_z:] @ given[:, n_z:], np.ascontiguousarray(carry[:, :, :n_z])
         for k in range(len(carry) - 1):
             given[k + 1, :n_z] = decay[k] @ given[k, :n_z] + pushed[k]
-        return (out @ given).reshape(readings.shape)[:n].reshape(r.shape)
+        return (out @ given).reshape(readings.shape)[:n]
 
     @cached_property
     def _blocks(self) -> tuple[Array, Array]:
