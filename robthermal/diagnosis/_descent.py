@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ..errors import Diverged, InputError
 
@@ -95,7 +96,7 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
     while count < limit:
         power = float(now.z @ now.z)
         little = enough * power * (1.0 + 10.0 * np.log(max(power / now.z.size, 1.0)))
-        for step in _trials(now.z, now.J, now.v, bounds):
+        for step in _trials(now.z, now.J, now.v, bounds, little):
             decrease = power - float(np.sum((now.z - now.J @ step) ** 2))
             if decrease <= little:
                 return Descent(now, True, count)
@@ -122,9 +123,15 @@ def _better(new: Point, power: float, goes_on: bool) -> Point | None:
     return new
 
 
-def _trials(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Iterator[Array]:
-    """The full step, shorter ones in its direction, then ones that turn away from what the data hardly determine."""
+def _trials(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], little: float) -> Iterator[Array]:
+    """The full step, shorter ones in its direction, then ones that turn away from what the data hardly determine.
+
+    Where unknowns put on their bounds leave no decrease to speak of, the best step within the bounds says whether there
+    is one.
+    """
     full = _step(z, J, v, bounds, 0.0)
+    if z @ z - np.sum((z - J @ full) ** 2) <= little and np.any((v + full <= bounds[0]) | (v + full >= bounds[1])):
+        full = _best_step(z, J, v, bounds)
     yield from (full, full / 2, full / 4)
     for damping in _DAMPINGS:
         yield _step(z, J, v, bounds, damping)
@@ -142,6 +149,17 @@ def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], damping: fl
             break
         step[out] = np.clip(v + step, *bounds)[out] - v[out]
         free &= ~out
+    return step
+
+
+def _best_step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Array:
+    """Least-squares step within the bounds, exactly (Stark and Parker's active sets)."""
+    step, free = np.zeros(v.size), bounds[1] > bounds[0]
+    scale = np.linalg.norm(J[:, free], axis=0)
+    scale[scale == 0] = 1.0
+    R = np.asarray(np.linalg.qr(np.column_stack([J[:, free] / scale, z]), mode="r"), np.float64)
+    low, high = ((bound - v)[free] * scale for bound in bounds)
+    step[free] = lsq_linear(R[:, :-1], R[:, -1], (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x / scale
     return step
 
 

@@ -23,7 +23,7 @@ from ._next_experiment import NextExperiment, next_experiment, rivals
 from ._noise_floor import noise_floor
 from ._refit import Refit
 from ._refitting import refit
-from ._revise import revised
+from ._revise import needed, revised
 from ._score import Scores, promising, score
 from ._sessions import SessionGain
 from ._setting import setting_of
@@ -117,6 +117,10 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         progress("asking the unseen records whether they speak against an effect")
         data = unseen_data(fit, validation, operating_point)
         rounds, fit = told_apart(*supported(rounds, fit, nominal, data), data)
+        fewer, less = needed(rounds, fit, nominal)
+        if len(fewer) < len(rounds):
+            again = revised(fewer, nominal, effects) if fewer else (fewer, less)
+            rounds, fit = told_apart(*supported(*again, nominal, data), data)
     progress("testing whether anything is left")
     checks = adequacy(fit)
     if validation is not None:
@@ -175,10 +179,11 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         rounds, fit = (*rounds, decision), decision.best.fit
         if hopeless or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
             return rounds, fit, True
-    if len(rounds) < 2:
-        return rounds, fit, False
-    progress(f"choosing each of {len(rounds)} effects again beside the others")
-    return *revised(rounds, nominal, effects, last_is_new=True), False
+    if len(rounds) > 1:
+        progress(f"choosing each of {len(rounds)} effects again beside the others")
+        rounds, fit = revised(rounds, nominal, effects, last_is_new=True)
+    kept, less = needed(rounds, fit, nominal)
+    return *(revised(kept, nominal, effects) if 0 < len(kept) < len(rounds) else (kept, less)), False
 
 
 def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None

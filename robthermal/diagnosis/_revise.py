@@ -61,6 +61,26 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
     return tuple(decisions), fit
 
 
+def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Decision, ...], Refit]:
+    """Without effects that are not worth ΔBIC 10 in the end: beside one chosen later, one may shrink to nothing.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In the order of the effects of the fit.
+    fit, nominal : Refit
+        With them, without any.
+    """
+    for place in range(len(rounds)):
+        less = without(fit, place, nominal)
+        if less is not None and delta_bic(less, fit) < BIC_GAP:
+            kept = [round_ for at, round_ in enumerate(rounds) if at != place]
+            if kept and (last := kept[-1].best) is not None:
+                kept[-1] = replace(kept[-1], best=replace(last, fit=less))
+            return needed(tuple(kept), less, nominal)
+    return rounds, fit
+
+
 def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, before: Refit) -> tuple[Entry, ...]:
     """The list with the accepted effect as it is: far from the truth its score may be too low to be listed."""
     fit = accepted.fit
