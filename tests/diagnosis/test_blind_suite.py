@@ -100,6 +100,16 @@ def test_the_other_minimum_along_a_time_constant_is_found(monkeypatch):
     assert rt.diagnosis.refit_short_list(fit, scores).entries[0].candidate.where == ("cover",)
 
 
+def test_an_effect_that_shrinks_to_nothing_is_no_name():
+    """The neighbour is accepted first; once the right mass is found, nothing is left of it."""
+    given, truth = made(Case("C", "hidden", "hidden_mass", 78))
+    found = rt.diagnose(given.system, given.train, validation=given.unseen,
+                        effects=["hidden_mass", "missing_ambient_link"])
+    assert [(effect.effect, effect.where) for effect in found.effects] == [("hidden_mass", ("left",))]
+    value, std, _ = found.effects[0].values["capacity"]
+    assert abs(value - truth.effects[0][2]["capacity"]) < 3.0 * std
+
+
 def test_the_workflow_gets_no_answer():
     given, truth = made(Case("C", "hidden", "sensor_lag", 3))
     assert not any(sensor.time_constant for sensor in given.system.sensors.values())

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
 import robthermal as rt
 from robthermal._fitting._data import as_data
@@ -118,6 +118,18 @@ def test_descent_with_bounds_is_non_negative_least_squares() -> None:
     _, least = nnls(J, z)
     assert np.linalg.norm(found.z) == pytest.approx(least, rel=1e-6)
     assert np.any(found.v == 0.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_descent_does_not_claim_convergence_at_wrong_bounds(seed: int) -> None:
+    # Correlated unknowns: those that a free step would carry out of the box are not those on its walls at the optimum.
+    rng = np.random.default_rng(seed)
+    J = rng.standard_normal((30, 6)) @ (np.eye(6) + 3.0 * rng.standard_normal((6, 6)))
+    y, box = 5.0 * rng.standard_normal(30), (np.full(6, -0.3), np.full(6, 0.3))
+    problem = SimpleNamespace(residual=lambda v: y - J @ v, slopes=lambda v: J)
+    found = descend(problem, np.zeros(6), box, 50, 1e-9)
+    assert found.converged
+    assert found.at.z @ found.at.z == pytest.approx(2.0 * lsq_linear(J, y, box, "bvls").cost, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(12))
