@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from ..errors import InputError
+from ..errors import Diverged, InputError
 from ._decide import Decision, settled
 from ._refit import Refit
 from ._refitting import extended, relinearised
@@ -97,11 +97,11 @@ def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, 
 
 
 def without(fit: Refit, place: int, nominal: Refit) -> Refit | None:
-    """The fit without one of its effects; None where another effect acts on a part that this one adds."""
+    """The fit without one of its effects; None where another acts on a part that this one adds, or nothing survives."""
     effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
     try:
         structure = nominal.structure.with_effects(effects[:place] + effects[place + 1:])
-    except InputError:
+        v = structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])
+        return relinearised(extended(fit, structure, v))
+    except (Diverged, InputError):
         return None
-    v = structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])
-    return relinearised(extended(fit, structure, v))

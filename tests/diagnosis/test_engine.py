@@ -362,3 +362,28 @@ def test_choosing_again_does_not_lose_what_was_accepted(
         (kept,), fit = _revise.revised((decision,), nominal, names)
         assert kept.best is not None and kept.best.candidate.label == "sensor_lag(Tp)" and fit is kept.best.fit
         assert kept.best.values["time_constant"][0] == pytest.approx(15.0, rel=0.1)
+
+
+# Effects that are not needed in the end
+
+
+def test_only_what_explains_something_is_kept(plant: rt.System, hide: Hide, rate: Callable, monkeypatch) -> None:
+    fit = rt.diagnosis.refit(plant, hide(convection(0.3, rate))[0])
+    decision = rt.diagnosis.decide(rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit)))
+    idle = next(c for c in rt.diagnosis.candidates(plant, ["sensor_lag"]))
+    beside = decision.best.fit.structure.with_effect(idle)
+    v = beside.carried(decision.best.fit.structure, decision.best.fit.v,
+                       [*decision.best.fit.structure.quantities(decision.best.fit.v), {"time_constant": 1e-3}])
+    both = extended(decision.best.fit, beside, v)
+    rounds = (decision, replace(decision, best=Entry(idle, both, 50.0, 1e-9)))
+    kept, less = _revise.needed(rounds, both, fit)
+    assert [one.best.candidate.key for one in kept] == [decision.best.candidate.key]
+    assert [one.key for one in less.structure.effects] == [decision.best.candidate.key]
+    assert kept[-1].best.fit is less
+
+    def lost(*_: object) -> None:
+        raise rt.Diverged("runs away", time=1.0)
+
+    monkeypatch.setattr(_revise, "extended", lost)
+    kept, same = _revise.needed(rounds, both, fit)  # what does not survive without an effect needs it
+    assert kept == rounds and same is both
