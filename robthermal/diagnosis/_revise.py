@@ -10,10 +10,11 @@ from ._decide import Decision, settled
 from ._refit import Refit
 from ._refitting import extended, relinearised
 from ._score import BIC_GAP, score
-from ._short_list import Entry, delta_bic, refit_short_list
+from ._short_list import Entry, delta_bic, quantities_of, refit_short_list
 
 _SWEEPS = 2
 _LENGTH = 4
+_SURE = 8.0  # standard deviations of a size that is certainly worth a ΔBIC of 10
 
 
 def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
@@ -72,6 +73,9 @@ def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tu
         With them, without any.
     """
     for place in range(len(rounds)):
+        value, std = quantities_of(fit, place)[fit.structure.effects[place].effect.size.name]
+        if abs(value) > _SURE * std:
+            continue
         less = without(fit, place, nominal)
         if less is not None and delta_bic(less, fit) < BIC_GAP:
             kept = [round_ for at, round_ in enumerate(rounds) if at != place]
