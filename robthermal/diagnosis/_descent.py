@@ -124,23 +124,20 @@ def _better(new: Point, power: float, goes_on: bool) -> Point | None:
 
 
 def _trials(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], little: float) -> Iterator[Array]:
-    """The full step, shorter ones in its direction, then ones that turn away from what the data hardly determine.
-
-    Where unknowns put on their bounds leave no decrease to speak of, the best step within the bounds says whether there
-    is one.
-    """
-    full = _step(z, J, v, bounds, 0.0)
-    if z @ z - np.sum((z - J @ full) ** 2) <= little and np.any((v + full <= bounds[0]) | (v + full >= bounds[1])):
-        full = _best_step(z, J, v, bounds)
+    """The full step, shorter ones in its direction, then ones that turn away from what the data hardly determine."""
+    full = _step(z, J, v, bounds, little)
     yield from (full, full / 2, full / 4)
+    norms = np.linalg.norm(J, axis=0)
     for damping in _DAMPINGS:
-        yield _step(z, J, v, bounds, damping)
+        rows = np.diag(np.sqrt(damping) * norms)
+        yield _step(np.append(z, np.zeros(v.size)), np.concatenate([J, rows]), v, bounds, little)
 
 
-def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], damping: float) -> Array:
-    """Least-squares step within the bounds; unknowns that would leave are put on their bound, the rest solved again."""
-    rows = np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))
-    J, z = (np.concatenate([J, rows]), np.append(z, np.zeros(v.size))) if damping else (J, z)
+def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], little: float) -> Array:
+    """Least-squares step within the bounds; unknowns that would leave are put on their bound, the rest solved again.
+
+    Where that leaves no decrease to speak of, the best step within the bounds says whether there is one.
+    """
     step, free = np.zeros(v.size), np.ones(v.size, bool)
     for _ in range(v.size + 1):
         step[free] = _solve(J[:, free], z - J[:, ~free] @ step[~free])
@@ -149,6 +146,8 @@ def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], damping: fl
             break
         step[out] = np.clip(v + step, *bounds)[out] - v[out]
         free &= ~out
+    if not free.all() and z @ z - np.sum((z - J @ step) ** 2) <= little:
+        return _best_step(z, J, v, bounds)
     return step
 
 

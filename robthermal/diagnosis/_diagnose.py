@@ -116,11 +116,12 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if rounds and validation is not None and not hopeless:
         progress("asking the unseen records whether they speak against an effect")
         data = unseen_data(fit, validation, operating_point)
-        rounds, fit = told_apart(*supported(rounds, fit, nominal, data), data)
-        fewer, less = needed(rounds, fit, nominal)
-        if len(fewer) < len(rounds):
-            again = revised(fewer, nominal, effects) if fewer else (fewer, less)
-            rounds, fit = told_apart(*supported(*again, nominal, data), data)
+        for _ in rounds:  # a name that takes another's place may leave nothing of a third
+            rounds, fit = told_apart(*supported(rounds, fit, nominal, data), data)
+            fewer, less = needed(rounds, fit, nominal)
+            if len(fewer) == len(rounds):
+                break
+            rounds, fit = revised(fewer, nominal, effects) if fewer else (fewer, less)
     progress("testing whether anything is left")
     checks = adequacy(fit)
     if validation is not None:
@@ -179,11 +180,10 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         rounds, fit = (*rounds, decision), decision.best.fit
         if hopeless or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE):
             return rounds, fit, True
-    if len(rounds) > 1:
-        progress(f"choosing each of {len(rounds)} effects again beside the others")
-        rounds, fit = revised(rounds, nominal, effects, last_is_new=True)
-    kept, less = needed(rounds, fit, nominal)
-    return *(revised(kept, nominal, effects) if 0 < len(kept) < len(rounds) else (kept, less)), False
+    if len(rounds) < 2:
+        return *needed(rounds, fit, nominal), False
+    progress(f"choosing each of {len(rounds)} effects again beside the others")
+    return *revised(rounds, nominal, effects, last_is_new=True), False
 
 
 def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None

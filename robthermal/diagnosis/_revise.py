@@ -59,7 +59,8 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
             changed = changed or decision.best.candidate.key != old.candidate.key
         if not changed:
             break
-    return tuple(decisions), fit
+    kept, less = needed(tuple(decisions), fit, nominal)
+    return revised(kept, nominal, names) if 0 < len(kept) < len(decisions) else (kept, less)
 
 
 def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Decision, ...], Refit]:
