@@ -24,7 +24,7 @@ from ._noise_floor import noise_floor
 from ._refit import Refit
 from ._refitting import refit
 from ._revise import needed, revised
-from ._score import Scores, promising, score
+from ._score import Scores, explains, promising, score
 from ._sessions import SessionGain
 from ._setting import setting_of
 from ._short_list import flails, quantities_of, refit_short_list
@@ -36,6 +36,7 @@ from ._wider_noise import with_wider_noise
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
+_LEAST = 0.3  # share of a large misfit that the last effect allowed must promise: it has to explain all of it
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -172,6 +173,8 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
             scores = score(fit, effects)
         if not promising(fit, scores):
             break
+        if len(rounds) == MOST_EFFECTS - 1 and _too_much_left(fit, scores):
+            return rounds, fit, True
         progress("refitting the best candidates")
         decision = decide(refit_short_list(fit, scores))
         if decision.best is None:
@@ -184,6 +187,14 @@ def _accepted(nominal: Refit, scores: Scores, effects: list[str] | None, progres
         return *needed(rounds, fit, nominal), False
     progress(f"choosing each of {len(rounds)} effects again beside the others")
     return *revised(rounds, nominal, effects, last_is_new=True), False
+
+
+def _too_much_left(fit: Refit, scores: Scores) -> bool:
+    """Whether the last effect allowed cannot be what is missing: a large misfit would be left, most of this one."""
+    if fit.variance <= _LARGE:
+        return False
+    share = explains(fit, scores)
+    return share < _LEAST and 1.0 + (1.0 - share) * (fit.variance - 1.0) > _LARGE
 
 
 def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None

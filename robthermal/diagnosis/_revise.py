@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import Diverged, InputError
 from ._decide import Decision, settled
 from ._refit import Refit
 from ._refitting import extended, relinearised
 from ._score import BIC_GAP, score
 from ._short_list import Entry, delta_bic, quantities_of, refit_short_list
+from ._whitened import Whitened
 
 _SWEEPS = 2
 _LENGTH = 4
+_EVALUATIONS = 20  # without an effect: where it is strong the misfit is large, and need not be polished
 _SURE = 8.0  # standard deviations of a size that is certainly worth a ΔBIC of 10
 
 
@@ -39,7 +43,7 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
     for sweep in range(_SWEEPS):
         changed = False
         for place in range(len(decisions) - 1 - (last_is_new and sweep == 0), -1, -1):
-            before = without(fit, place, nominal)
+            before = without(fit, place, nominal, decisions[place].before)
             if before is None:
                 continue
             old = decisions[place].best
@@ -77,7 +81,7 @@ def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tu
         value, std = quantities_of(fit, place)[fit.structure.effects[place].effect.size.name]
         if abs(value) > _SURE * std:
             continue
-        less = without(fit, place, nominal)
+        less = without(fit, place, nominal, rounds[place].before)
         if less is not None and delta_bic(less, fit) < BIC_GAP:
             kept = [round_ for at, round_ in enumerate(rounds) if at != place]
             if kept and (last := kept[-1].best) is not None:
@@ -101,12 +105,29 @@ def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, 
     return tuple(sorted([own, *others], key=lambda entry: -entry.delta_bic))
 
 
-def without(fit: Refit, place: int, nominal: Refit) -> Refit | None:
-    """The fit without one of its effects; None where another acts on a part that this one adds, or nothing survives."""
+def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None) -> Refit | None:
+    """The fit without one of its effects; None where another acts on a part that this one adds, or nothing survives.
+
+    Parameters
+    ----------
+    fit : Refit
+        With all effects.
+    place : int
+        Of the effect to leave out.
+    nominal : Refit
+        Without any.
+    before : Refit, optional
+        From which the effect was chosen; if it had the other effects, its unknowns are a start, too.
+    """
     effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
+    others = effects[:place] + effects[place + 1:]
     try:
-        structure = nominal.structure.with_effects(effects[:place] + effects[place + 1:])
-        v = structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])
-        return relinearised(extended(fit, structure, v))
+        structure = nominal.structure.with_effects(others)
+        starts = [structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])]
+        if before is not None and [c.key for c in before.structure.effects] == [c.key for c in others]:
+            starts.append(structure.carried(before.structure, before.v, before.structure.quantities(before.v)))
+        problem = Whitened(structure, fit.whiteners)
+        v = starts[0] if len(starts) == 1 else min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))
+        return relinearised(extended(fit, structure, v, _EVALUATIONS))
     except (Diverged, InputError):
         return None

@@ -212,6 +212,20 @@ def promising(fit: Refit, scores: Scores) -> bool:
     return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
 
 
+def explains(fit: Refit, scores: Scores) -> float:
+    """Largest share of the misfit, as far as it is more than noise, that one candidate promises to explain.
+
+    Parameters
+    ----------
+    fit : Refit
+        That leaves more than noise.
+    scores : Scores
+        On it.
+    """
+    best = max((float(scores.signatures[:, i] @ fit.rest) ** 2 for i in scores.order), default=0.0)
+    return (fit.rss - float(fit.rest @ fit.rest) + best) / (fit.rss - fit.n_readings)
+
+
 def turned(fit: Refit, trials: list[tuple[int, Candidate]], J: Array
            ) -> tuple[list[tuple[int, Candidate]], Array, NDArray[np.intp]]:
     """Join the two columns of every paired trial to the one at the best angle; also the columns each one had."""

@@ -16,7 +16,7 @@ from ._refit import Refit
 from ._refitting import extended
 from ._scan import retried, scanned
 from ._score import BIC_GAP, Scores
-from ._starts import Origin, started
+from ._starts import Origin, in_reach, started
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
@@ -141,8 +141,9 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
     for i in picked:
         aliases = tuple(scores.candidates[j] for j in scores.aliases(i))
         try:
+            best = max((entry.delta_bic for entry in entries), default=0.0)
             entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
-                                    aliases))
+                                    aliases, best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
     return ShortList(fit, tuple(_looked_at_again(fit, map(finished, hopeful(entries)))), failed)
@@ -171,7 +172,7 @@ def flails(before: Refit, best: Entry) -> bool:
 def hopeful(entries: Sequence[Entry]) -> list[Entry]:
     """Entries that further iterations could bring to the top: not those far behind already."""
     best = max((entry.delta_bic for entry in entries), default=0.0)
-    return [entry for entry in entries if entry.delta_bic > 0.3 * best - _BEHIND]
+    return [entry for entry in entries if in_reach(entry.delta_bic, best)]
 
 
 def finished(entry: Entry) -> Entry:
@@ -188,10 +189,11 @@ def replaced(entry: Entry, fit: Refit) -> Entry:
 
 
 def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,
-             aliases: tuple[Candidate, ...] = ()) -> Entry:
-    """Refit one candidate from the better of its starts; not to the end yet."""
-    new = started(origin, candidate, size)
-    new = extended(new, new.structure, new.v, _FIRST)
+             aliases: tuple[Candidate, ...] = (), best: float = 0.0) -> Entry:
+    """Refit one candidate from the better of its starts; not to the end yet. Another has reached the `best` ΔBIC."""
+    new = started(origin, candidate, size, best)
+    if in_reach(delta_bic(origin.fit, new), best):
+        new = extended(new, new.structure, new.v, _FIRST)
     return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, aliases)
 
 

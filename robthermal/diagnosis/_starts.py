@@ -28,6 +28,7 @@ _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
 _MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
 _MANY = 12  # evaluations along a bent valley
+_SHARE, _BEHIND = 0.3, 60.0  # of the best ΔBIC; below it by so much
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +52,30 @@ class Origin:
         return replace(self.fit, v=v, z=z, paths=paths_of(structure, v))
 
 
-def started(origin: Origin, candidate: Candidate, size: float) -> Refit:
-    """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best."""
+def in_reach(delta_bic: float, best: float) -> bool:
+    """Whether more evaluations could bring a candidate to the top: not if it is far behind the best already."""
+    return delta_bic > _SHARE * best - _BEHIND
+
+
+def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0) -> Refit:
+    """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best.
+
+    Other starts than the first are for candidates that promise enough beside the best ΔBIC that another has reached.
+    """
     fit = origin.fit
     tried: list[Refit] = []
     least = fit.rss
     for start in _starts(origin, candidate, size):
+        if tried and not in_reach(fit.n_readings * np.log(fit.rss / start.promise), best):
+            continue
         new = _refitted(fit, start)
         if new is not None:
             if start.promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - start.promise):
                 return new
             tried.append(new)
             least = min(least, start.promise)
-    if not any(new.rss < fit.rss for new in tried):
+    worth = not tried or in_reach(fit.n_readings * np.log(fit.rss / least), best)
+    if worth and not any(new.rss < fit.rss for new in tried):
         nothing = float(np.sign(size)) * candidate.effect.size.typical
         new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
         if new is None and not tried:

@@ -28,7 +28,8 @@ def supported(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, data: Se
         Unseen. They only take names back: no parameter and no name comes from them.
     """
     while rounds:
-        lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal) for place in range(len(rounds))]
+        lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal, round_.before)
+                  for place, round_ in enumerate(rounds)]
         with_all, *others = surprises([fit, *(fit if less is None else less for less in lesser)], fit, data)
         gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
         worst = max(range(len(gains)), key=gains.__getitem__)
