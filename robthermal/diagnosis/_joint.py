@@ -113,7 +113,7 @@ class JointSelection:
         return ax
 
 
-def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2) -> JointSelection:
+def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit | None = None) -> JointSelection:
     """Select effects together instead of one after the other.
 
     minimise ½‖z' - J'β‖² + λ Σ_g w_g ‖β_g‖ within the physical bounds, for λ from the smallest that selects nothing
@@ -129,6 +129,8 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2) -> JointSelect
         Of all candidates on it.
     tries : int
         Sets refitted.
+    known : Refit, optional
+        With some set of effects that has been refitted: where it is among those to refit it is warm.
 
     Returns
     -------
@@ -165,7 +167,7 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2) -> JointSelect
     pairs = program.best_pairs(_PAIRS)
     pool = _pool_of(program, [i for support in supports for i in support], [i for pair in pairs for i in pair])
     sets = best_sets(fit, *_started(program, pool, solved[-1][0]), tries, [_started(program, *pair)
-                     for pair in _solved_pairs(program, pairs[:1])])
+                     for pair in _solved_pairs(program, pairs[:1])], known)
     condition, likeness = _condition(program, sets)
     exact = bool(np.all(kkt < _SMALL))
     outcome = (Outcome(True, "selected", f"Solved: largest KKT residual {kkt.max():.1g}.") if exact else

@@ -63,7 +63,7 @@ def checked_jointly(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, sc
         Catalogue.
     """
     stepwise = fit.structure.effects
-    selection = select_jointly(nominal, scores)
+    selection = select_jointly(nominal, scores, known=fit)
     known = {_representative(key, scores) for key in (candidate.key for candidate in stepwise)}
     others = []
     for found in selection.sets:

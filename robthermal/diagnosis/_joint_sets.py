@@ -70,9 +70,21 @@ def refit_set(fit: Refit, candidates: tuple[Candidate, ...], sizes: Sequence[flo
     return EffectSet(candidates, new, bic(fit) - bic(new))
 
 
+def _again(fit: Refit, known: Refit) -> EffectSet:
+    """A set that has been refitted, with the filters of `fit`."""
+    new = extended(fit, known.structure, known.v)
+    return EffectSet(known.structure.effects, new, bic(fit) - bic(new))
+
+
+def _forms(candidates: Sequence[Candidate]) -> set[tuple[Key, str]]:
+    """Names, and the size of each: an effect may have two forms, such as a cubic and a clip."""
+    return {(candidate.key, candidate.effect.size.name) for candidate in candidates}
+
+
 def best_sets(fit: Refit, pool: tuple[Candidate, ...], sizes: Sequence[float], tries: int,
-              more: Sequence[tuple[tuple[Candidate, ...], list[float]]]) -> tuple[EffectSet, ...]:
-    """The best sets of up to three candidates of a pool, and some more sets, refitted.
+              more: Sequence[tuple[tuple[Candidate, ...], list[float]]], known: Refit | None = None
+              ) -> tuple[EffectSet, ...]:
+    """The best sets of up to three candidates of a pool, and some more sets, refitted; one that is known from there.
 
     The whole pool is refitted first: there the nominal parameters and the shapes are near the truth, and the sums of
     squares of its subsets follow from one linearisation.
@@ -85,8 +97,11 @@ def best_sets(fit: Refit, pool: tuple[Candidate, ...], sizes: Sequence[float], t
     except (Diverged, InputError):  # too many at once
         pass
     for chosen, own, near in starts:
+        warm = known if known is not None and _forms(known.structure.effects) == _forms(chosen) else None
+        if warm is not None and frozenset(candidate.key for candidate in chosen) in found:
+            continue
         try:
-            new = refit_set(fit, chosen, own, near)
+            new = refit_set(fit, chosen, own, near) if warm is None else _again(fit, warm)
         except (Diverged, InputError):  # a set that no simulation follows is no explanation
             continue
         if new.keys not in found or new.delta_bic > found[new.keys].delta_bic:

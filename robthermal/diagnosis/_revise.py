@@ -48,7 +48,7 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
                 continue
             old = decisions[place].best
             assert old is not None
-            short = refit_short_list(before, score(before, names), length=_LENGTH)
+            short = refit_short_list(before, score(before, names), length=_LENGTH, tried=old.candidate.key)
             entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
             if entries[0].delta_bic < BIC_GAP:
                 decisions.pop(place)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -180,10 +180,12 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     trials = [(number, trial) for number, candidate in enumerate(tested) for trial in candidate.trials(fit.paths[0])]
     J = (fit.whiten([columns(path, [trial for _, trial in trials]) for path in fit.paths]) if trials else
          np.zeros((fit.z.size, 0)))
-    trials, J, n_columns = turned(fit, trials, J)
-    length = np.linalg.norm(J, axis=0)
-    rest = fit.project(fit.project(J))
+    explained = fit.basis.T @ J
+    J = fit.project(J - fit.basis @ explained)
+    trials, turn, n_columns = turned(fit, trials, J)
+    rest = turn(J)
     own = np.linalg.norm(rest, axis=0)
+    length = np.hypot(own, np.linalg.norm(turn(explained), axis=0))
     visible = (length > 0) & (own > 1e-9 * length)
     own_safe = np.where(visible, own, 1.0)
     unit = np.where(visible, rest / own_safe, 0.0)
@@ -226,27 +228,51 @@ def explains(fit: Refit, scores: Scores) -> float:
     return (fit.rss - float(fit.rest @ fit.rest) + best) / (fit.rss - fit.n_readings)
 
 
-def turned(fit: Refit, trials: list[tuple[int, Candidate]], J: Array
-           ) -> tuple[list[tuple[int, Candidate]], Array, NDArray[np.intp]]:
-    """Join the two columns of every paired trial to the one at the best angle; also the columns each one had."""
-    kept, merged, count = [], [], []
-    i = 0
-    while i < len(trials):
-        number, trial = trials[i]
-        if not trial.effect.paired:
-            kept.append((number, trial))
-            merged.append(J[:, i])
-            count.append(1)
-            i += 1
-            continue
-        both = J[:, i:i + 2]
-        sine, cosine = np.linalg.lstsq(fit.project(both), fit.rest, rcond=None)[0]
-        angle = float(np.arctan2(cosine, sine))
-        kept.append((number, replace(trial, shape={**trial.shape, trial.effect.paired: angle})))
-        merged.append(np.cos(angle) * both[:, 0] + np.sin(angle) * both[:, 1])
-        count.append(2)
-        i += 2
-    return kept, np.column_stack(merged) if merged else J, np.array(count, np.intp)
+def turned(fit: Refit, trials: list[tuple[int, Candidate]], rest: Array
+           ) -> tuple[list[tuple[int, Candidate]], Callable[[Array], Array], NDArray[np.intp]]:
+    """Join the two columns of every paired trial to the one at the best angle.
+
+    Parameters
+    ----------
+    fit : Refit
+        What is to be explained.
+    trials : list of tuple
+        One per column; pairs follow each other.
+    rest : ndarray, shape (m, k)
+        Columns without what the unknowns can explain.
+
+    Returns
+    -------
+    list of tuple
+        Trials that are left, at their angles.
+    callable
+        Makes their columns of the (m, k) of all.
+    ndarray of int
+        Columns that each one had.
+    """
+    first, at = [], 0
+    while at < len(trials):
+        first.append(at)
+        at += 2 if trials[at][1].effect.paired else 1
+    paired = np.array([bool(trials[i][1].effect.paired) for i in first], bool)
+    one = np.array(first, np.intp)
+    a, b = rest[:, one[paired]], rest[:, one[paired] + 1]
+    aa, ab, bb = (np.einsum("mk,mk->k", x, y) for x, y in ((a, a), (a, b), (b, b)))
+    gram = np.stack([aa, ab, ab, bb], axis=-1).reshape(-1, 2, 2)
+    along = np.stack([fit.rest @ a, fit.rest @ b], axis=-1)[..., None]
+    weights = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ along
+    angles = np.zeros(len(one))
+    angles[paired] = np.arctan2(weights[:, 1, 0], weights[:, 0, 0])
+
+    def turn(columns: Array) -> Array:
+        out = columns[:, one]
+        out[:, paired] *= np.cos(angles[paired])
+        out[:, paired] += np.sin(angles[paired]) * columns[:, one[paired] + 1]
+        return out
+
+    kept = [(number, replace(trial, shape={**trial.shape, trial.effect.paired: float(angle)}) if is_pair else trial)
+            for (number, trial), is_pair, angle in zip([trials[i] for i in first], paired, angles, strict=True)]
+    return kept, turn, np.where(paired, 2, 1)
 
 
 def _best_of(trials: Sequence[tuple[int, Candidate]], statistic: Array, size: Array, possible: NDArray[np.bool_]

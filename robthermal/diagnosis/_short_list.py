@@ -16,14 +16,14 @@ from ._refit import Refit
 from ._refitting import extended
 from ._scan import retried, scanned
 from ._score import BIC_GAP, Scores
-from ._starts import Origin, in_reach, started
+from ._starts import BEHIND, Origin, in_reach, started
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 LENGTH = 7
 _FIRST = 2  # evaluations before the hopeless ones are dropped
 _LAST = 15  # more evaluations, for the others
-_BEHIND = 60.0  # ΔBIC
+_PROMISED = 0.1  # of the best ΔBIC reached: below it, a candidate's linearisation would have to be very wrong
 _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
@@ -101,7 +101,7 @@ class ShortList:
         return ax
 
 
-def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> ShortList:
+def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried: Key | None = None) -> ShortList:
     """Refit the candidates with the best scores.
 
     Parameters
@@ -112,6 +112,8 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
         Of all candidates on it.
     length : int
         How many to refit.
+    tried : tuple, optional
+        Key of a candidate that has been tried with other time constants before.
 
     Returns
     -------
@@ -137,19 +139,23 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH) -> Sho
     for i in scores.order:
         if len(picked) < length and not set(scores.aliases(i)) & set(picked):
             picked.append(i)
-    origin, entries, failed = Origin(fit), [], {}
+    origin, failed = Origin(fit), {}
+    entries: list[Entry] = []
     for i in picked:
+        best = max((entry.delta_bic for entry in entries), default=0.0)
+        promised = fit.n_readings * math.log1p(float(scores.statistic[i]) / max(fit.degrees_of_freedom - 1, 1))
+        if promised < _PROMISED * best - BEHIND:
+            continue
         aliases = tuple(scores.candidates[j] for j in scores.aliases(i))
         try:
-            best = max((entry.delta_bic for entry in entries), default=0.0)
             entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
                                     aliases, best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    return ShortList(fit, tuple(_looked_at_again(fit, map(finished, hopeful(entries)))), failed)
+    return ShortList(fit, tuple(_looked_at_again(fit, map(finished, hopeful(entries)), tried)), failed)
 
 
-def _looked_at_again(before: Refit, entries: Iterable[Entry]) -> list[Entry]:
+def _looked_at_again(before: Refit, entries: Iterable[Entry], tried: Key | None) -> list[Entry]:
     """By ΔBIC; the best and what is near it from other times, too, unless all of them flail."""
     ordered = sorted(entries, key=lambda entry: -entry.delta_bic)
     if not ordered or flails(before, ordered[0]):
@@ -157,8 +163,9 @@ def _looked_at_again(before: Refit, entries: Iterable[Entry]) -> list[Entry]:
     ordered[0] = replaced(ordered[0], scanned(ordered[0].fit))
     if ordered[0].delta_bic < BIC_GAP:
         return ordered
-    near = ordered[0].delta_bic - _BEHIND
-    again = [replaced(entry, retried(entry.fit)) if entry.delta_bic > near else entry for entry in ordered]
+    near = ordered[0].delta_bic - BEHIND
+    again = [replaced(entry, retried(entry.fit)) if entry.delta_bic > near and entry.candidate.key != tried else entry
+             for entry in ordered]
     return sorted(again, key=lambda entry: -entry.delta_bic)
 
 

@@ -28,7 +28,8 @@ _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
 _MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
 _MANY = 12  # evaluations along a bent valley
-_SHARE, _BEHIND = 0.3, 60.0  # of the best ΔBIC; below it by so much
+BEHIND = 60.0  # ΔBIC by which a candidate may lie below the best, and still get there
+_SHARE = 0.3  # of the best ΔBIC, less that much
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Origin:
 
 def in_reach(delta_bic: float, best: float) -> bool:
     """Whether more evaluations could bring a candidate to the top: not if it is far behind the best already."""
-    return delta_bic > _SHARE * best - _BEHIND
+    return delta_bic > _SHARE * best - BEHIND
 
 
 def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0) -> Refit:
