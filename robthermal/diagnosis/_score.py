@@ -27,6 +27,7 @@ ALPHA = 0.01  # family-wise
 POWER = 0.9
 ALIAS = 1e-3  # sine of the angle below which two signatures are the same, and one is no signature
 BIC_GAP = 10.0
+_DIGITS = 6  # of the logarithm of a statistic
 _BLOCK = 32  # signatures at once: they stay in the cache
 Pair = tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]
 
@@ -77,8 +78,10 @@ class Scores:
 
     @property
     def order(self) -> list[int]:
-        """Possible candidates, the best first."""
-        return [int(i) for i in np.argsort(-self.statistic) if self.possible[i] and self.statistic[i] > 0]
+        """Possible candidates, the best first; exact aliases as in the catalogue, whatever their rounding."""
+        height = np.round(np.log(np.maximum(self.statistic, 1e-300)), _DIGITS)
+        best_first = np.argsort(-height, kind="stable")
+        return [int(i) for i in best_first if self.possible[i] and self.statistic[i] > 0]
 
     def aliases(self, i: int) -> list[int]:
         """Candidates whose signature is that of candidate i, whatever the readings may be.
