@@ -1,0 +1,160 @@
+"""What the search spends its evaluations on: damping remembered, phases solved at once, what cannot catch up left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis import _diagnose, _revise, _short_list
+from robthermal.diagnosis._descent import Point, descend
+from robthermal.diagnosis._effect import Candidate
+from robthermal.diagnosis._refit import Refit
+from robthermal.diagnosis._refitting import extended
+from robthermal.diagnosis._score import Scores, columns, explains
+
+Hide = Callable[..., tuple[rt.Record, rt.Record]]
+
+
+class Winding:
+    """A steep valley along y = sin(p x) / p that falls gently to x = 3."""
+
+    def __init__(self, steep: float, p: float):
+        self.steep, self.p = steep, p
+
+    def residual(self, v: np.ndarray) -> np.ndarray:
+        return np.array([self.steep * (v[1] - np.sin(self.p * v[0]) / self.p), 3.0 - v[0]])
+
+    def slopes(self, v: np.ndarray) -> np.ndarray:
+        return np.array([[self.steep * np.cos(self.p * v[0]), -self.steep], [1.0, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def convected(plant: rt.System, hide: Hide, rate: Callable) -> rt.Record:
+    """Strong natural convection from the plate."""
+    def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        dT = u[1] - T[0]
+        return rate(T, u, np.array([0.3 * abs(dT) ** 0.25 * dT, 0.0]))
+
+    return hide(hidden)[0]
+
+
+def labels(scores: Scores) -> list[str]:
+    return [candidate.label for candidate in scores.candidates]
+
+
+# Steps
+
+
+@pytest.mark.parametrize(("steep", "p", "most"), [(30.0, 4.0, 130), (100.0, 2.0, 120)])
+def test_a_winding_valley_is_followed_with_the_damping_of_the_step_before(steep: float, p: float, most: int) -> None:
+    # Looking for the damping from the beginning at every step takes 194 and 184 evaluations.
+    wide = np.full(2, 50.0)
+    found = descend(Winding(steep, p), np.zeros(2), (-wide, wide), 200, 1e-8)
+    assert found.converged and found.iterations < most
+    assert np.allclose(found.at.v, [3.0, np.sin(3.0 * p) / p], atol=1e-3)
+
+
+@pytest.mark.parametrize("rows", [1, 4, 5, 60])
+def test_the_triangle_stands_for_all_rows(rows: int) -> None:
+    rng = np.random.default_rng(rows)
+    J, z = rng.standard_normal((rows, 4)), rng.standard_normal(rows)
+    problem = SimpleNamespace(residual=lambda v: z, slopes=lambda v: J)
+    small, rest = Point(problem, np.zeros(4)).small
+    for step in rng.standard_normal((5, 4)):
+        assert np.sum((rest - small @ step) ** 2) == pytest.approx(np.sum((z - J @ step) ** 2), rel=1e-10)
+
+
+# Scores
+
+
+def test_the_phase_of_a_load_is_that_of_least_squares(plant: rt.System, convected: rt.Record) -> None:
+    fit = rt.diagnosis.refit(plant, convected)
+    scores = rt.diagnosis.score(fit, ["periodic_load"])
+    assert len(scores.candidates) == 2
+    for i, found in enumerate(scores.candidates):
+        pair = [replace(found, shape={**found.shape, "phase": phase}) for phase in (0.0, np.pi / 2)]
+        both = fit.whiten([columns(path, pair) for path in fit.paths])
+        sine, cosine = np.linalg.lstsq(np.column_stack([both, fit.J]), fit.z, rcond=None)[0][:2]
+        assert np.angle(np.exp(1j * (found.shape["phase"] - np.arctan2(cosine, sine)))) == pytest.approx(0.0, abs=1e-6)
+        assert scores.size[i] == pytest.approx(np.hypot(sine, cosine), rel=1e-6)
+        whole = np.linalg.norm(both @ np.array([sine, cosine]) / np.hypot(sine, cosine))
+        own = abs(scores.size[i]) / scores.std[i] / np.sqrt(scores.statistic[i])  # 1: the same deviation in both
+        assert own == pytest.approx(1.0, rel=1e-6)
+        left = fit.project(both) @ np.array([sine, cosine]) / np.hypot(sine, cosine)
+        assert scores.identifiability[i] == pytest.approx(np.linalg.norm(left) / whole, rel=1e-6)
+
+
+def test_exact_aliases_stand_in_the_order_of_the_catalogue(plant: rt.System, convected: rt.Record) -> None:
+    scores = rt.diagnosis.score(rt.diagnosis.refit(plant, convected),
+                                ["heat_source", "ambient_gradient", "sensor_self_heating"])
+    first = labels(scores).index("heat_source(plate)")
+    alike = sorted([first, *scores.aliases(first)])
+    assert len(alike) == 3
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        rounded = replace(scores, statistic=scores.statistic * (1 + 1e-9 * rng.uniform(-1, 1, len(scores.statistic))))
+        assert [i for i in rounded.order if i in alike] == alike
+
+
+def test_the_share_promised_is_the_share_explained_where_all_is_linear(plant: rt.System, hide: Hide) -> None:
+    train, _ = hide(read=lambda T: T + [0.5, 0.0])
+    fit = rt.diagnosis.refit(plant, train)
+    scores = rt.diagnosis.score(fit, ["sensor_offset"])
+    after = rt.diagnosis.refit_short_list(fit, scores).entries[0].fit
+    got = (fit.rss - after.rss) / (fit.rss - fit.n_readings)
+    assert got > 0.9  # otherwise nothing was tested
+    assert explains(fit, scores) == pytest.approx(got, abs=0.01)
+
+
+# What is not tried further
+
+
+def test_a_misfit_that_no_single_effect_could_remove_is_left_to_the_verdict(
+        plant: rt.System, convected: rt.Record, hide: Hide) -> None:
+    fit = rt.diagnosis.refit(plant, convected)
+    assert fit.variance > 3.0
+    helpless, helpful = (rt.diagnosis.score(fit, [name]) for name in ("sensor_offset", "natural_convection"))
+    assert explains(fit, helpless) < 0.3 < 0.8 < explains(fit, helpful)
+    assert _diagnose._too_much_left(fit, helpless) and not _diagnose._too_much_left(fit, helpful)
+    good = rt.diagnosis.refit(plant, hide()[0])
+    assert good.variance < 1.5 and not _diagnose._too_much_left(good, rt.diagnosis.score(good, ["sensor_offset"]))
+
+
+def test_candidates_that_promise_next_to_nothing_beside_the_best_are_not_refitted(
+        plant: rt.System, convected: rt.Record, monkeypatch: pytest.MonkeyPatch) -> None:
+    fit = rt.diagnosis.refit(plant, convected)
+    scores = rt.diagnosis.score(fit)
+    tried: list[str] = []
+    whole = _short_list.entry_of
+
+    def noted(origin: object, candidate: Candidate, *args: object) -> object:
+        tried.append(candidate.label)
+        return whole(origin, candidate, *args)
+
+    monkeypatch.setattr(_short_list, "entry_of", noted)
+    short = rt.diagnosis.refit_short_list(fit, scores)
+    assert short.entries[0].candidate.label == tried[0] == "natural_convection(plate, room)"
+    first = np.arange(len(scores.statistic)) == scores.order[0]
+    far = replace(scores, statistic=np.where(first, scores.statistic, 1.0))
+    tried.clear()
+    rt.diagnosis.refit_short_list(fit, far)
+    assert tried == ["natural_convection(plate, room)"]
+
+
+def test_leaving_an_effect_out_starts_from_what_is_known(plant: rt.System, convected: rt.Record) -> None:
+    nominal = rt.diagnosis.refit(plant, convected)
+    best = rt.diagnosis.decide(rt.diagnosis.refit_short_list(nominal, rt.diagnosis.score(nominal))).best
+    assert best is not None
+    far = replace(best.fit, v=best.fit.v + 0.0)
+    cold, warm = (_revise.without(far, 0, nominal, before) for before in (None, nominal))
+    assert cold is not None and warm is not None
+    assert warm.structure.effects == () and warm.rss <= cold.rss * (1 + 1e-4)
+    assert int(warm.outcome.text.split()[2]) <= int(cold.outcome.text.split()[2])
+    wrong = extended(best.fit, best.fit.structure, best.fit.v)  # has the effect that is to be left out
+    other = _revise.without(far, 0, nominal, wrong)
+    assert isinstance(other, Refit) and other.rss == pytest.approx(cold.rss, rel=1e-9)
