@@ -217,6 +217,22 @@ def promising(fit: Refit, scores: Scores) -> bool:
     return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
 
 
+def promised(fit: Refit, scores: Scores, i: int) -> float:
+    """Sum of squares that the linearisation about the fit leaves with candidate i.
+
+    Parameters
+    ----------
+    fit : Refit
+        That was scored.
+    scores : Scores
+        On it.
+    i : int
+        Place in `candidates`.
+    """
+    power = float(fit.rest @ fit.rest)
+    return max(power - float(scores.signatures[:, i] @ fit.rest) ** 2, 1e-12 * power)
+
+
 def explains(fit: Refit, scores: Scores) -> float:
     """Largest share of the misfit, as far as it is more than noise, that one candidate promises to explain.
 
@@ -227,8 +243,8 @@ def explains(fit: Refit, scores: Scores) -> float:
     scores : Scores
         On it.
     """
-    best = max((float(scores.signatures[:, i] @ fit.rest) ** 2 for i in scores.order), default=0.0)
-    return (fit.rss - float(fit.rest @ fit.rest) + best) / (fit.rss - fit.n_readings)
+    least = min((promised(fit, scores, i) for i in scores.order), default=fit.rss)
+    return (fit.rss - least) / (fit.rss - fit.n_readings)
 
 
 def turned(fit: Refit, trials: list[tuple[int, Candidate]], rest: Array

@@ -15,7 +15,7 @@ from ._effect import Candidate
 from ._refit import Refit
 from ._refitting import extended
 from ._scan import retried, scanned
-from ._score import BIC_GAP, Scores
+from ._score import BIC_GAP, Scores, promised
 from ._starts import BEHIND, Origin, in_reach, started
 
 Array = NDArray[np.float64]
@@ -143,8 +143,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
     entries: list[Entry] = []
     for i in picked:
         best = max((entry.delta_bic for entry in entries), default=0.0)
-        promised = fit.n_readings * math.log1p(float(scores.statistic[i]) / max(fit.degrees_of_freedom - 1, 1))
-        if promised < _PROMISED * best - BEHIND:
+        if fit.n_readings * math.log(fit.rss / promised(fit, scores, i)) < _PROMISED * best - BEHIND:
             continue
         aliases = tuple(scores.candidates[j] for j in scores.aliases(i))
         try:

@@ -140,7 +140,7 @@ def test_candidates_that_promise_next_to_nothing_beside_the_best_are_not_refitte
     short = rt.diagnosis.refit_short_list(fit, scores)
     assert short.entries[0].candidate.label == tried[0] == "natural_convection(plate, room)"
     first = np.arange(len(scores.statistic)) == scores.order[0]
-    far = replace(scores, statistic=np.where(first, scores.statistic, 1.0))
+    far = replace(scores, signatures=np.where(first, scores.signatures, 0.0))
     tried.clear()
     rt.diagnosis.refit_short_list(fit, far)
     assert tried == ["natural_convection(plate, room)"]
