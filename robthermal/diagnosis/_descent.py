@@ -118,7 +118,7 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
             if count >= limit:
                 return Descent(now, False, count)
             count += 1
-            new = Point(problem, now.v + step)
+            new = Point(problem, np.clip(now.v + step, *bounds))  # a rounding may lie beyond
             if _better(new, power - 1e-4 * decrease, count < limit):
                 break
             shortest = _lowest(now, new, step)

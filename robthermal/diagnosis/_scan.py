@@ -68,13 +68,15 @@ def _along(fit: Refit, place: int) -> Refit:
     return fit if best is fit.v else extended(fit, structure, best, LIMIT)
 
 
-def retried(fit: Refit) -> Refit:
+def retried(fit: Refit, before: Refit) -> Refit:
     """The fit, or a better one from another time constant of its last effect.
 
     Parameters
     ----------
     fit : Refit
         Converged, with one effect or more.
+    before : Refit
+        Without the last one: its parameters are another start.
 
     Returns
     -------
@@ -84,20 +86,26 @@ def retried(fit: Refit) -> Refit:
     first = fit.structure.n_parameters + fit.structure.n_effects - len(quantities)
     for at, quantity in enumerate(quantities[1:], start=first + 1):
         if not callable(quantity.grid) and quantity.lower > 0:
-            fit = min((fit, *_from_other_times(fit, at)), key=lambda new: new.rss)
+            fit = min((fit, *_from_other_times(fit, before, at)), key=lambda new: new.rss)
     return fit
 
 
-def _from_other_times(fit: Refit, at: int) -> Iterator[Refit]:
-    """Fits from other values of one time constant, of which no smaller sum of squares can be ruled out."""
+def _from_other_times(fit: Refit, before: Refit, at: int) -> Iterator[Refit]:
+    """Fits from other values of one time constant, of which no smaller sum of squares can be ruled out.
+
+    The parameters begin as they are in the fit, and where that leads nowhere as they were before the effect: at a wrong
+    time constant they have gone far away.
+    """
     structure = fit.structure
+    as_before = structure.carried(before.structure, before.v, structure.quantities(fit.v))
     for factor in _FACTORS:
-        v, (low, high) = fit.v.copy(), (bound.copy() for bound in structure.bounds)
-        v[at] += math.log(factor)
-        low[at] = high[at] = v[at]
-        try:
-            held = descend(Whitened(structure, fit.whiteners), v, (low, high), _HELD, ENOUGH).at
-            if held.z @ held.z < fit.rss * math.exp(_NEAR / fit.n_readings):
-                yield extended(fit, structure, held.v, LIMIT)
-        except (Diverged, InputError):
-            continue
+        for start in (fit.v, as_before):
+            v, (low, high) = start.copy(), (bound.copy() for bound in structure.bounds)
+            v[at] = low[at] = high[at] = fit.v[at] + math.log(factor)
+            try:
+                held = descend(Whitened(structure, fit.whiteners), v, (low, high), _HELD, ENOUGH).at
+                if held.z @ held.z < fit.rss * math.exp(_NEAR / fit.n_readings):
+                    yield extended(fit, structure, held.v, LIMIT)
+                    break
+            except (Diverged, InputError):
+                continue

@@ -24,6 +24,7 @@ LENGTH = 7
 _FIRST = 2  # evaluations before the hopeless ones are dropped
 _LAST = 15  # more evaluations, for the others
 _PROMISED = 0.1  # of the best ΔBIC reached: below it, a candidate's linearisation would have to be very wrong
+_NEAR = 0.7  # of the best ΔBIC: from another time constant it may be the best
 _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
 
@@ -155,16 +156,16 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
 
 
 def _looked_at_again(before: Refit, entries: Iterable[Entry], tried: Key | None) -> list[Entry]:
-    """By ΔBIC; the best and what is near it from other times, too, unless all of them flail."""
+    """By ΔBIC; the best and what comes near it from other times, too, unless all of them flail."""
     ordered = sorted(entries, key=lambda entry: -entry.delta_bic)
     if not ordered or flails(before, ordered[0]):
         return ordered
     ordered[0] = replaced(ordered[0], scanned(ordered[0].fit))
     if ordered[0].delta_bic < BIC_GAP:
         return ordered
-    near = ordered[0].delta_bic - BEHIND
-    again = [replaced(entry, retried(entry.fit)) if entry.delta_bic > near and entry.candidate.key != tried else entry
-             for entry in ordered]
+    near = min(ordered[0].delta_bic - BEHIND, _NEAR * ordered[0].delta_bic)
+    again = [entry if entry.delta_bic <= near or entry.candidate.key == tried else
+             replaced(entry, retried(entry.fit, before)) for entry in ordered]
     return sorted(again, key=lambda entry: -entry.delta_bic)
 
 

@@ -59,6 +59,19 @@ def test_a_winding_valley_is_followed_with_the_damping_of_the_step_before(steep:
     assert np.allclose(found.at.v, [3.0, np.sin(3.0 * p) / p], atol=1e-3)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_nothing_is_evaluated_outside_the_bounds(seed: int) -> None:
+    # Not by a rounding either: a conductance of -3e-23 is no conductance, and the system refuses it.
+    rng = np.random.default_rng(seed)
+    J, y = rng.standard_normal((30, 6)) @ (np.eye(6) + 3.0 * rng.standard_normal((6, 6))), rng.standard_normal(30)
+    low, high = -rng.uniform(0.0, 0.3, 6), rng.uniform(0.0, 0.3, 6)
+    asked: list[np.ndarray] = []
+    problem = SimpleNamespace(residual=lambda v: asked.append(v) or y - J @ v - (J @ v) ** 2, slopes=lambda v: (
+        J + 2.0 * (J @ v)[:, None] * J))
+    descend(problem, np.zeros(6), (low, high), 60, 1e-9)
+    assert all(np.all((v >= low) & (v <= high)) for v in asked)
+
+
 @pytest.mark.parametrize("rows", [1, 4, 5, 60])
 def test_the_triangle_stands_for_all_rows(rows: int) -> None:
     rng = np.random.default_rng(rows)
