@@ -106,9 +106,9 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
     while count < limit:
         power = float(now.z @ now.z)
         little = enough * power * (1.0 + 10.0 * np.log(max(power / now.z.size, 1.0)))
-        shortest = 0.0
+        lowest = 0.0
         for share, damping in _lengths(damped):
-            if share < 1.0 and shortest < share * _TOO_LONG:
+            if share < 1.0 and lowest < share * _TOO_LONG:
                 continue
             step = share * _damped_step(now, damping, bounds, little)
             J, z = now.small
@@ -121,7 +121,7 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
             new = Point(problem, np.clip(now.v + step, *bounds))  # a rounding may lie beyond
             if _better(new, power - 1e-4 * decrease, count < limit):
                 break
-            shortest = _lowest(now, new, step)
+            lowest = _lowest(now, new, step)
         else:
             return Descent(now, False, count)
         now, damped = new, damping

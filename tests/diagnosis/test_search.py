@@ -163,11 +163,10 @@ def test_leaving_an_effect_out_starts_from_what_is_known(plant: rt.System, conve
     nominal = rt.diagnosis.refit(plant, convected)
     best = rt.diagnosis.decide(rt.diagnosis.refit_short_list(nominal, rt.diagnosis.score(nominal))).best
     assert best is not None
-    far = replace(best.fit, v=best.fit.v + 0.0)
-    cold, warm = (_revise.without(far, 0, nominal, before) for before in (None, nominal))
+    cold, warm = (_revise.without(best.fit, 0, nominal, before) for before in (None, nominal))
     assert cold is not None and warm is not None
     assert warm.structure.effects == () and warm.rss <= cold.rss * (1 + 1e-4)
     assert int(warm.outcome.text.split()[2]) <= int(cold.outcome.text.split()[2])
     wrong = extended(best.fit, best.fit.structure, best.fit.v)  # has the effect that is to be left out
-    other = _revise.without(far, 0, nominal, wrong)
+    other = _revise.without(best.fit, 0, nominal, wrong)
     assert isinstance(other, Refit) and other.rss == pytest.approx(cold.rss, rel=1e-9)
