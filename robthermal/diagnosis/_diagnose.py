@@ -129,7 +129,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         progress("predicting the unseen records")
     unseen = None if validation is None else hold_out(nominal, fit, validation, operating_point=operating_point)
     progress("locating the misfit and planning the next experiment")
-    verdict, outcome = _verdict(rounds, fit, checks, unseen)
+    verdict, outcome = _verdict(rounds, fit, checks, unseen, hopeless)
     doubtful = verdict == "unexplained" or (rounds and fit.levels.exhausted)  # a name that asks for more noise besides
     if doubtful and (wider := with_wider_noise(nominal, effects, verdict == "unexplained")) is not None:
         predicts = None if validation is None else hold_out(wider[0], wider[0], validation,
@@ -197,9 +197,11 @@ def _too_much_left(fit: Refit, scores: Scores) -> bool:
     return share < _LEAST and 1.0 + (1.0 - share) * (fit.variance - 1.0) > _LARGE
 
 
-def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None
+def _verdict(rounds: tuple[Decision, ...], fit: Refit, checks: Adequacy, unseen: HoldOut | None, hopeless: bool
              ) -> tuple[Verdict, Outcome]:
     faults = [] if checks.outcome.ok else [checks.outcome.text]
+    if hopeless:
+        faults.append(f"A large misfit stays (whitened variance {fit.variance:.3g}).")
     if unseen is not None and not unseen.outcome.ok:
         faults.append(unseen.outcome.text)
     if rounds and not _still(fit):

@@ -138,6 +138,20 @@ def test_a_misfit_that_no_single_effect_could_remove_is_left_to_the_verdict(
     assert good.variance < 1.5 and not _diagnose._too_much_left(good, rt.diagnosis.score(good, ["sensor_offset"]))
 
 
+def test_where_the_search_gave_up_there_is_no_name(
+        plant: rt.System, hide: Hide, rate: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return rate(T, u, np.array([0.3 * abs(u[1] - T[0]) ** 0.25 * (u[1] - T[0]), 0.0]))
+
+    train, unseen = hide(hidden)
+    names = ["natural_convection"]
+    assert rt.diagnose(plant, train, validation=unseen, effects=names).verdict == "named"
+    monkeypatch.setattr(_diagnose, "flails", lambda *_: True)  # whatever the other gates say
+    found = rt.diagnose(plant, train, validation=unseen, effects=names)
+    assert found.verdict == "unexplained" and not found.effects and "A large misfit stays" in found.outcome.text
+    assert [effect.label for effect in found.provisional] == ["natural_convection(plate, room)"]
+
+
 def test_candidates_that_promise_next_to_nothing_beside_the_best_are_not_refitted(
         plant: rt.System, convected: rt.Record, monkeypatch: pytest.MonkeyPatch) -> None:
     fit = rt.diagnosis.refit(plant, convected)
