@@ -1,4 +1,37 @@
-"""What fits of a system to data share: checked data, ranges and priors, starts, noise, and the model beside the data.
+"""What fits of a system to data share: checked data, ranges and priors, starts, noise, residuals and free runs.
 
-Shared by the rooms calibration and diagnosis; nothing of it is public.
+Shared by the packages calibration, diagnosis and project; nothing of it is public.
 """
+
+from ._data import Data as Data
+from ._data import as_data as as_data
+from ._data import refuse_same as refuse_same
+from ._data import refuse_short as refuse_short
+from ._free_run import FreeRun as FreeRun
+from ._free_run import free_run as free_run
+from ._noise import LOSSES as LOSSES
+from ._noise import SMALLEST as SMALLEST
+from ._noise import Loss as Loss
+from ._noise import declared_noise as declared_noise
+from ._noise import estimated_noise as estimated_noise
+from ._noise import quantum as quantum
+from ._noise import scipy_loss as scipy_loss
+from ._noise import score as score
+from ._noise import score_slope as score_slope
+from ._operating_point import OperatingPoint as OperatingPoint
+from ._problem import Problem as Problem
+from ._problem import Weigh as Weigh
+from ._problem import scaled as scaled
+from ._ranges import NONE as NONE
+from ._ranges import Choice as Choice
+from ._ranges import Ranges as Ranges
+from ._ranges import chosen_ranges as chosen_ranges
+from ._residual import residual as residual
+from ._residual import rmse as rmse
+from ._residual import rmse_by_sensor as rmse_by_sensor
+from ._sampled_response import sampled_response as sampled_response
+from ._start import STARTS as STARTS
+from ._start import Initial as Initial
+from ._start import Start as Start
+from ._start import initial_of as initial_of
+from ._start import start_values as start_values

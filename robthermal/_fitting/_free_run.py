@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -16,18 +19,58 @@ Array = NDArray[np.float64]
 _HEAD = 0.1  # part of a validation record that may be used for its initial temperatures
 
 
-def validate(system: System, one: Data, start: Start, noise: dict[str, float]) -> tuple[Array, Array]:
-    """Free run on a record the fit has not seen: initial temperatures (n_lumps,) and residuals (n, n_sensors) [K].
+@dataclass(frozen=True, eq=False)
+class FreeRun:
+    """A model beside a record, driven by the recorded inputs alone.
+
+    Parameters
+    ----------
+    one : Data
+        Record with its readings.
+    initial_temperatures : ndarray, shape (n_lumps,)
+        Where the model started [K].
+    residual : ndarray, shape (n, n_sensors)
+        Measured − modelled [K].
+    """
+
+    one: Data
+    initial_temperatures: Array
+    residual: Array
+
+    @property
+    def modelled(self) -> Array:
+        """What the model reads, (n, n_sensors) [K]."""
+        return self.one.readings - self.residual
+
+    @property
+    def by_sensor(self) -> dict[str, Array]:
+        """Residual (n,) of every sensor [K]."""
+        return {name: self.residual[:, i] for i, name in enumerate(self.one.sensors)}
+
+
+def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]) -> FreeRun:
+    """Run a model freely on a record that its fit has not seen.
 
     A free start is estimated on the first tenth of the record (with its prior), never on the rest.
+
+    Parameters
+    ----------
+    system : System
+        Model with its parameters.
+    one : Data
+        Record to run on.
+    start : {"free", "measured", "system"}
+        Initial lump temperatures, as in `calibrate`.
+    noise : mapping
+        Standard deviation of the sensors [K], weights of the first tenth; 1 K where it is unknown or 0.
     """
     initial = initial_of(system, one, start)
     whole = Problem(system, [one], NONE, [initial])
-    if not initial.n_free:
-        return whole.temperatures(whole.v0)[0], whole.residuals(whole.v0)[0]
-    n_head = max(2, round(_HEAD * len(one.readings)))
-    head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head])
-    weights = scaled(np.array([noise.get(name, 1.0) for name in one.sensors]))
-    problem = Problem(system, [head], NONE, [initial], [weights])
-    v = least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds, x_scale="jac").x
-    return whole.temperatures(v)[0], whole.residuals(v)[0]
+    v = whole.v0
+    if initial.n_free:
+        n_head = max(2, round(_HEAD * len(one.readings)))
+        head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head])
+        weights = scaled(np.array([noise.get(name) or 1.0 for name in one.sensors]))
+        problem = Problem(system, [head], NONE, [initial], [weights])
+        v = least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds, x_scale="jac").x
+    return FreeRun(one, whole.temperatures(v)[0], whole.residuals(v)[0])

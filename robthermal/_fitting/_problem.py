@@ -12,6 +12,7 @@ from ..errors import Diverged
 from ..thermal import System, trajectory
 from ._data import Data
 from ._ranges import Ranges
+from ._residual import residual
 from ._start import REACH, Initial, start_values
 
 Array = NDArray[np.float64]
@@ -20,7 +21,10 @@ Weigh = Callable[[Array], Array]  # (n, n_sensors, ...) in kelvin to weighted, l
 
 @dataclass(frozen=True)
 class Run:
-    """One record at one point: residual (n, n_sensors) and its derivatives (n, n_sensors, p) and (…, n_free)."""
+    """One record at one point: residual, measured − modelled (n, n_sensors), and the residual's derivatives.
+
+    By the parameters (n, n_sensors, p), by the initial temperatures (n, n_sensors, n_free).
+    """
 
     residual: Array
     by_parameter: Array
@@ -87,8 +91,8 @@ class Problem:
         return [self.system.with_parameters({**start_values(self.system, T), **values}) for T in self.temperatures(v)]
 
     def residuals(self, v: Array) -> list[Array]:
-        """Model minus measurement of every record, (n, n_sensors) [K]."""
-        return [trajectory(system, one.record).readings[:, one.columns] - one.readings
+        """Measured − modelled of every record, (n, n_sensors) [K]."""
+        return [residual(one.readings, trajectory(system, one.record).readings[:, one.columns])
                 for system, one in zip(self.systems(v), self.data, strict=True)]
 
     def runs(self, v: Array) -> list[Run]:
@@ -100,9 +104,9 @@ class Problem:
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
             J: Array = np.asarray(run.sensitivity[:, one.columns], np.float64)
-            by_start: Array = np.multiply(J[..., len(flat):], start.sigma)
-            by_parameter: Array = np.multiply(self.ranges.joined(J[..., :len(flat)]), slopes)
-            out.append(Run(run.readings[:, one.columns] - one.readings, by_parameter, by_start))
+            by_start: Array = np.multiply(J[..., len(flat):], -start.sigma)
+            by_parameter: Array = np.multiply(self.ranges.joined(J[..., :len(flat)]), -slopes)
+            out.append(Run(residual(one.readings, run.readings[:, one.columns]), by_parameter, by_start))
         return out
 
     def vector(self, v: Array) -> Array:

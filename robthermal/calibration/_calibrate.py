@@ -11,12 +11,27 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
-from .._fitting._data import Data, as_data, refuse_same, refuse_short
-from .._fitting._free_run import validate
-from .._fitting._noise import LOSSES, Loss, declared_noise, estimated_noise, scipy_loss
-from .._fitting._problem import Problem, Weigh, scaled
-from .._fitting._ranges import Choice, Ranges, chosen_ranges
-from .._fitting._start import STARTS, Start, initial_of
+from .._fitting import (
+    LOSSES,
+    STARTS,
+    Choice,
+    Data,
+    Loss,
+    Problem,
+    Ranges,
+    Start,
+    Weigh,
+    as_data,
+    chosen_ranges,
+    declared_noise,
+    estimated_noise,
+    free_run,
+    initial_of,
+    refuse_same,
+    refuse_short,
+    scaled,
+    scipy_loss,
+)
 from ..errors import Diverged, InputError, Outcome
 from ..identify import FrequencyResponse
 from ..signals import Record
@@ -195,7 +210,7 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
     slopes = ranges.slopes(values)
     residuals = problem.residuals(v)
     system = problem.system.with_parameters(ranges.assigned(values))
-    checks = [validate(system, one, initial, solution.noise) for one in unseen]
+    checks = [free_run(system, one, initial, solution.noise) for one in unseen]
     fit = Fit(
         system=system,
         parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
@@ -207,11 +222,11 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
         data=tuple(one.record for one in problem.data),
         validation_data=tuple(one.record for one in unseen),
         residuals=tuple(_by_sensor(one, r) for one, r in zip(problem.data, residuals, strict=True)),
-        validation_residuals=tuple(_by_sensor(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
+        validation_residuals=tuple(run.by_sensor for run in checks),
         initial_temperatures=tuple(_by_lump(system, T) for T in problem.temperatures(v)),
-        validation_temperatures=tuple(_by_lump(system, T) for T, _ in checks),
+        validation_temperatures=tuple(_by_lump(system, run.initial_temperatures) for run in checks),
         train=tuple(score_of(one, r) for one, r in zip(problem.data, residuals, strict=True)),
-        validation=tuple(score_of(one, r) for one, (_, r) in zip(unseen, checks, strict=True)),
+        validation=tuple(score_of(run.one, run.residual) for run in checks),
         whiteness={name: whiteness_of([weigh(r)[:, one.sensors.index(name)] for one, r, weigh
                                        in zip(problem.data, residuals, problem.weigh, strict=True)
                                        if name in one.sensors])

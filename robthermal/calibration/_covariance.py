@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from .._fitting._noise import Loss, score, score_slope
-from .._fitting._problem import Problem
-from .._fitting._ranges import Ranges
+from .._fitting import Loss, Problem, Ranges, score, score_slope
 from ._autoregression import correlation_of
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._ranges import Ranges
+from .._fitting import Ranges
 
 Array = NDArray[np.float64]
 _VISIBLE = 0.1  # components below this part of the largest are not mentioned

@@ -26,11 +26,11 @@ def draw(columns: list[Column], n_fitted: int) -> NDArray[Any]:
         for i, (name, residual) in enumerate(residuals.items()):
             above.plot(record.time, record[name] - 273.15, ".", color=f"C{i}", markersize=2, alpha=0.4)
             label = f"{name}, {score.rmse[name]:.3g} K"
-            above.plot(record.time, record[name] + residual - 273.15, color=f"C{i}", label=label)
+            above.plot(record.time, record[name] - residual - 273.15, color=f"C{i}", label=label)
             below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
         above.set(title=f"{'fitted' if place < n_fitted else 'validation'}: {score.record}", ylabel="temperature [°C]")
         above.legend(fontsize="small", title="model, RMSE")
-        below.set(xlabel="time [s]", ylabel="model − measured [K]")
+        below.set(xlabel="time [s]", ylabel="measured − model [K]")
         below.axhline(0.0, color="black", linewidth=0.5)
     grid: NDArray[Any] = axes
     return grid

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._fitting import rmse_by_sensor
 from ..signals import Record
 from ._estimates import Estimates, plain
 from ._figure import draw
@@ -46,7 +46,7 @@ class Fit(Estimates):
     data, validation_data : tuple of Record
         What was fitted, and what was only compared.
     residuals, validation_residuals : tuple of dict
-        Model minus measurement, per record and sensor, (n,) [K], free run.
+        Measured − modelled, per record and sensor, (n,) [K], free run.
     initial_temperatures, validation_temperatures : tuple of dict
         Per record and lump [K].
     train, validation : tuple of Score
@@ -69,12 +69,12 @@ class Fit(Estimates):
     @property
     def rmse(self) -> dict[str, float]:
         """Free-run root mean square residual by sensor over all training records [K]."""
-        return _pooled(self.residuals)
+        return rmse_by_sensor(self.residuals)
 
     @property
     def validation_rmse(self) -> dict[str, float]:
         """Free-run root mean square residual by sensor over all validation records [K]; empty without any."""
-        return _pooled(self.validation_residuals)
+        return rmse_by_sensor(self.validation_residuals)
 
     def plot(self) -> NDArray[Any]:
         """Measured and modelled readings [°C] with the residuals [K] below, one column per record.
@@ -109,12 +109,6 @@ class Fit(Estimates):
             for one in scores:
                 lines.append(f"{kind} {one.record}: " + ", ".join(f"{name} {e:.3g} K" for name, e in one.rmse.items()))
         return "\n".join([*lines, str(self.outcome)])
-
-
-def _pooled(residuals: tuple[dict[str, Array], ...]) -> dict[str, float]:
-    names = dict.fromkeys(name for record in residuals for name in record)
-    joined = {name: np.concatenate([record[name] for record in residuals if name in record]) for name in names}
-    return {name: math.sqrt(float(np.mean(e**2))) for name, e in joined.items()}
 
 
 def _score(score: Score) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from .._fitting._data import Data
+from .._fitting import Data
 from ..thermal import System, linearize, trajectory
 
 Array = NDArray[np.float64]
@@ -20,7 +20,8 @@ _STEADY = 1e-12  # relative change of the state covariance at which the gain cou
 class Whitener:
     """Maps free-run residuals to innovations of unit covariance: z = L⁻¹ r, linear in r.
 
-    With the model's deviation δx(k+1) = A δx(k) + w, cov w = `Q`, and residual r = C δx + v, cov v = diag(noise²), the
+    With the machine's deviation from the model δx(k+1) = A δx(k) + w, cov w = `Q`, and residual (measured − modelled)
+    r = C δx + v, cov v = diag(noise²), the
     innovations e = r - C δx̂ of the filter started at δx̂ = 0, P = 0 (the start is a parameter of the fit) are white; z
     divides them by the root of their covariance. The gain varies until P has settled, then stays.
 

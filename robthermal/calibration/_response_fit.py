@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from .._fitting._operating_point import OperatingPoint
-from .._fitting._ranges import Choice, chosen_ranges
+from .._fitting import Choice, OperatingPoint, chosen_ranges
 from ..errors import InputError, Outcome
 from ..identify import FrequencyResponse
 from ..thermal import System

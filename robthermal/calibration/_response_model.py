@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._operating_point import OperatingPoint
-from .._fitting._ranges import Ranges
-from .._fitting._sampled_response import sampled_response
+from .._fitting import OperatingPoint, Ranges, residual, sampled_response
 from ..errors import Diverged
 from ..identify import FrequencyResponse
 from ..thermal import System
@@ -81,8 +79,8 @@ class ResponseProblem:
         return G.transpose(0, 2, 1).reshape(len(frequencies), -1)  # columns of G stacked
 
     def whitened(self, q: Array) -> Complex:
-        """L⁻¹ (model - measured), (n_b, m)."""
-        white: Complex = np.einsum("kab,kb->ka", self.bins.root, self.model(q) - self.bins.measured)
+        """L⁻¹ (measured − modelled), (n_b, m)."""
+        white: Complex = np.einsum("kab,kb->ka", self.bins.root, residual(self.bins.measured, self.model(q)))
         return white
 
     def slopes(self, q: Array) -> Complex:
@@ -92,7 +90,7 @@ class ResponseProblem:
         for i, h in enumerate(_DIFFERENCE * self.ranges.spread):
             after, before = q.copy(), q.copy()
             after[i], before[i] = min(q[i] + h, high[i]), max(q[i] - h, low[i])
-            change = self.model(after) - self.model(before)
+            change = self.model(before) - self.model(after)  # of minus the model
             out[..., i] = np.einsum("kab,kb->ka", self.bins.root, change) / (after[i] - before[i])
         return out
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._data import Data
+from .._fitting import Data, rmse_by_sensor
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,7 @@ class Score:
     record : str
         Its name.
     rmse : dict
-        Root mean square of model minus measurement, by sensor [K].
+        Root mean square residual (measured − modelled) by sensor [K].
     fit_percent : dict
         100 (1 - ‖y - ŷ‖ / ‖y - mean y‖), by sensor [%], as in Matlab's `compare`; nan for a constant signal.
     """
@@ -33,9 +33,9 @@ class Score:
 
 def score_of(one: Data, residual: Array) -> Score:
     """Score of residuals (n, n_sensors) [K]."""
-    rmse = dict(zip(one.sensors, np.sqrt(np.mean(residual**2, axis=0)).tolist(), strict=True))
+    by_sensor = {name: residual[:, i] for i, name in enumerate(one.sensors)}
     percent = {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)}
-    return Score(one.label, rmse, percent)
+    return Score(one.label, rmse_by_sensor([by_sensor]), percent)
 
 
 def _percent(y: Array, residual: Array) -> float:

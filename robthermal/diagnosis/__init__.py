@@ -18,6 +18,7 @@ from ._effect import Effect as Effect
 from ._effect import Quantity as Quantity
 from ._hold_out import Gap as Gap
 from ._hold_out import HoldOut as HoldOut
+from ._hold_out import ValidationResiduals as ValidationResiduals
 from ._hold_out import hold_out as hold_out
 from ._joint import JointSelection as JointSelection
 from ._joint import select_jointly as select_jointly
@@ -43,6 +44,7 @@ from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found",
            "Gap", "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "Measurement", "NextExperiment",
-           "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "adequacy",
-           "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate", "next_experiment",
-           "noise_floor", "refit", "refit_short_list", "register_effect", "score", "select_jointly", "unknown_heat"]
+           "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "ValidationResiduals",
+           "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
+           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score", "select_jointly",
+           "unknown_heat"]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._data import Data
+from .._fitting import Data, rmse
 from ._frequency_data import ResponseData
 from ._frequency_model import AlongResponse
 from ._refit import Refit
@@ -56,4 +56,4 @@ def response_rms(fit: Refit, data: Sequence[Data | ResponseData]) -> float:
     structure = replace(fit.structure, data=own, starts=tuple(start_of(fit.system, one) for one in own))
     known = fit.structure.n_parameters + fit.structure.n_effects
     z = Whitened(structure, [one.white for one in own]).residual(fit.v[:known])
-    return float(np.sqrt(np.mean(z[:structure.n_readings] ** 2)))
+    return rmse([z[:structure.n_readings]])

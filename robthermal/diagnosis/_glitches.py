@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from .._fitting._data import Data
+from .._fitting import Data, residual
 from ..errors import Diverged, InputError
 from ..thermal import System, trajectory
 from ._frequency_data import ResponseData
@@ -68,7 +68,7 @@ def _cleaned(system: System, one: Data, noise: Array) -> Data:
         model = np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
     except Diverged:  # the refit will say so
         return one
-    r, missing = one.readings - model, np.zeros(one.readings.shape, bool)
+    r, missing = residual(one.readings, model), np.zeros(one.readings.shape, bool)
     allowed: Array = _FAR * noise + _BENT * _bends(model)
     time = np.arange(len(r))
     for _ in range(_PASSES):

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from .._fitting._data import Data, refuse_same
-from .._fitting._free_run import validate
-from .._fitting._start import Start
+from .._fitting import Data, Start, free_run, refuse_same, rmse
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import System
 from ._along import Along
@@ -50,6 +48,27 @@ class Gap:
     unit: str = "K"
 
 
+@dataclass(frozen=True, eq=False)
+class ValidationResiduals:
+    """Free runs on one validation record, with its own session gains; isolated outliers interpolated.
+
+    Parameters
+    ----------
+    name : str
+        Name of the record.
+    time : ndarray, shape (n,)
+        Sample times [s].
+    before, after : dict
+        {sensor: measured − modelled (n,)} [K], nominal system refitted and with the effects; NaN if the model runs
+        away.
+    """
+
+    name: str
+    time: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+
 @dataclass(frozen=True)
 class HoldOut:
     """How the effects do on unseen records.
@@ -65,6 +84,8 @@ class HoldOut:
         right.
     outcome : Outcome
         Code "predicted" or "not_predicted" (not ok).
+    residuals : tuple of ValidationResiduals
+        The free runs that `gap` is the root mean square of, one per validation record.
     """
 
     gap: Gap
@@ -72,6 +93,7 @@ class HoldOut:
     variance_after: float
     p_value: float
     outcome: Outcome
+    residuals: tuple[ValidationResiduals, ...] = ()
 
     @property
     def excess_ratio(self) -> float:
@@ -126,14 +148,16 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     'predicted'
     """
     data = unseen_data(after, validation, operating_point)
-    gap = _unseen_gap(before, after, data)
+    residuals = _residuals(before, after, [one for one in data if isinstance(one, Data)])
+    gap = _unseen_gap(before, after, data, residuals)
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
     text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
             f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
             "nothing has changed in between, diagnose with them among the training records.")
-    return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text))
+    return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text),
+                   residuals)
 
 
 def unseen_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
@@ -161,21 +185,39 @@ def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Da
                                  expected="data the fit has not seen", remedy="Estimate it from another record.")
 
 
-def _unseen_gap(before: Refit, after: Refit, data: Sequence[Data | ResponseData]) -> Gap:
-    records = [one for one in data if isinstance(one, Data)]
-    if not records:
+def _unseen_gap(before: Refit, after: Refit, data: Sequence[Data | ResponseData],
+                residuals: Sequence[ValidationResiduals]) -> Gap:
+    if not residuals:
         return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
-    return Gap(_free_run(before, records), _free_run(after, records), expected_rms(after, records))
+    records = [one for one in data if isinstance(one, Data)]
+    return Gap(rmse(e for one in residuals for e in one.before.values()),
+               rmse(e for one in residuals for e in one.after.values()), expected_rms(after, records))
 
 
-def _free_run(fit: Refit, data: Sequence[Data]) -> float:
-    noise = fit.floor.noise
+def _residuals(before: Refit, after: Refit, records: Sequence[Data]) -> tuple[ValidationResiduals, ...]:
+    runs = (_free_runs(fit, records) for fit in (before, after))
+    return tuple(ValidationResiduals(one.label, one.record.time, old, new)
+                 for one, old, new in zip(records, *runs, strict=True))
+
+
+def _free_runs(fit: Refit, records: Sequence[Data]) -> list[dict[str, Array]]:
+    """Residuals of every record by sensor; NaN where the model runs away."""
     try:
-        residuals = [validate(system, one, "free", noise)[1]
-                     for system, one in zip(_session_systems(fit, data), data, strict=True)]
+        systems = _session_systems(fit, records)
     except Diverged:
-        return float("inf")
-    return float(np.sqrt(np.mean(np.concatenate([r.ravel() for r in residuals]) ** 2)))
+        return [_ran_away(one) for one in records]
+    return [_one_run(fit, system, one) for system, one in zip(systems, records, strict=True)]
+
+
+def _one_run(fit: Refit, system: System, one: Data) -> dict[str, Array]:
+    try:
+        return free_run(system, one, "free", fit.floor.noise).by_sensor
+    except Diverged:
+        return _ran_away(one)
+
+
+def _ran_away(one: Data) -> dict[str, Array]:
+    return dict.fromkeys(one.sensors, np.full(len(one.readings), np.nan))
 
 
 def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from .._fitting import residual, rmse
 from ._along import Along
 from ._noise_floor import NoiseFloor
 from ._whitening import SlowNoise, settled_cost
@@ -156,7 +157,7 @@ def _is_slow(name: str, paths: Sequence[Along], floor: NoiseFloor, levels: Level
 
 
 def _residuals(paths: Sequence[Along]) -> list[Array]:
-    return [path.one.readings - path.readings[:, path.one.columns] for path in paths]
+    return [residual(path.one.readings, path.readings[:, path.one.columns]) for path in paths]
 
 
 def _cost(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, levels: Levels) -> float:
@@ -172,7 +173,7 @@ def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseF
     for name, level in floor.noise.items():
         own = [r[:, path.one.sensors.index(name)] for path, r in zip(paths, residuals, strict=True)
                if name in path.one.sensors]
-        ratio = float(np.sqrt(np.mean(np.concatenate(own) ** 2))) / level
+        ratio = rmse(own) / level
         out[name] = float(np.clip(ratio, 1.0 / limit, limit))
     return out
 

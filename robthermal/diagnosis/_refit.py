@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._fitting import residual, rmse
 from ..errors import Outcome
 from ..thermal import System
 from ._along import Along
@@ -144,7 +145,7 @@ class Refit:
     @cached_property
     def residuals(self) -> tuple[Array, ...]:
         """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]; of a response (2 n_b, m)."""
-        return tuple(path.one.readings - path.readings[:, path.one.columns] for path in self.paths)
+        return tuple(residual(path.one.readings, path.readings[:, path.one.columns]) for path in self.paths)
 
     @property
     def rms(self) -> float:
@@ -153,9 +154,8 @@ class Refit:
         Without any record: of the whitened residual of the responses, in standard deviations of their noise.
         """
         if not self.along:
-            return float(np.sqrt(np.mean(self.z[:self.n_readings] ** 2)))
-        own = [r.ravel() for path, r in zip(self.paths, self.residuals, strict=True) if isinstance(path, Along)]
-        return float(np.sqrt(np.mean(np.concatenate(own) ** 2)))
+            return rmse([self.z[:self.n_readings]])
+        return rmse(r for path, r in zip(self.paths, self.residuals, strict=True) if isinstance(path, Along))
 
     @property
     def along(self) -> tuple[Along, ...]:

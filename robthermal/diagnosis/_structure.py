@@ -12,9 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting._data import Data
-from .._fitting._ranges import Ranges
-from .._fitting._start import Initial, Start, initial_of, start_values
+from .._fitting import Data, Initial, Ranges, Start, initial_of, residual, start_values
 from ..errors import InputError
 from ..thermal import System, Trajectory, trajectory
 from ._along import Along, along
@@ -215,9 +213,9 @@ class Structure:
 
     def _run(self, system: System, one: Data | ResponseData) -> Run:
         if isinstance(one, ResponseData):
-            return Run(one.readings - one.model(system))
+            return Run(residual(one.readings, one.model(system)))
         run = trajectory(system, one.record, tolerance=self.tolerance)
-        return Run(one.readings - run.readings[:, one.columns], run, along(system, one, run))
+        return Run(residual(one.readings, run.readings[:, one.columns]), run, along(system, one, run))
 
     def _slopes(self, v: Array, runs: Sequence[Run]) -> list[Array]:
         names, chain = self._chain(v)

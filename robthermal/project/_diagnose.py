@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from .._fitting._data import as_data
-from .._fitting._free_run import validate
-from ..diagnosis import Along, Diagnosis, Refit, diagnose
+from ..diagnosis import Along, Diagnosis, diagnose
 from ..diagnosis._frequency_model import AlongResponse
-from ..errors import Diverged, InputError
+from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System
@@ -159,8 +157,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
         raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
     progress("running both models freely")
-    records = [one for one in validation if isinstance(one, Record)]
-    return Diagnosed(found, (*_trained(found), *_unseen(found, records)), tuple(_responses(found)), files)
+    return Diagnosed(found, (*_trained(found), *_unseen(found)), tuple(_responses(found)), files)
 
 
 def _trained(found: Diagnosis) -> Iterator[Residuals]:
@@ -180,19 +177,10 @@ def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
                                     *(_by_name(path.one.sensors, size) for size in sizes))
 
 
-def _unseen(found: Diagnosis, records: Sequence[Record]) -> Iterator[Residuals]:
-    """As the hold-out test runs them: initial temperatures from the first tenth, then free."""
-    for record in records:
-        before, after = (_free_run(fit, record) for fit in (found.nominal, found.fit))
-        yield Residuals("validation", record.name or "record", record.time, before, after)
-
-
-def _free_run(fit: Refit, record: Record) -> dict[str, Array]:
-    one = as_data(fit.structure.base, record, "validation")[0]
-    try:
-        return _by_name(one.sensors, validate(fit.system, one, "free", fit.floor.noise)[1])
-    except Diverged:
-        return _by_name(one.sensors, np.full(one.readings.shape, np.nan))
+def _unseen(found: Diagnosis) -> Iterator[Residuals]:
+    """The free runs of the hold-out test: initial temperatures from the first tenth, the session's own gains."""
+    for one in () if found.hold_out is None else found.hold_out.residuals:
+        yield Residuals("validation", one.name, one.time, one.before, one.after)
 
 
 def _by_name(names: Sequence[str], residuals: Array) -> dict[str, Array]:

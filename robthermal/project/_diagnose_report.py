@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .._fitting import rmse
 from ..diagnosis import Diagnosis, effects
 from ..report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
 from ..signals import Record
@@ -123,11 +124,12 @@ def _gap_section(result: Diagnosed) -> Section:
     found = result.diagnosis
     rows = [{"records": kind, "before": gap.before, "after": gap.after, "noise alone": gap.noise, "unit": gap.unit}
             for kind, gap in found.gap.items()]
-    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before": _rms(one.before[name]),
-              "after": _rms(one.after[name]), "noise alone": float("nan"), "unit": "K"}
+    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before": rmse([one.before[name]]),
+              "after": rmse([one.after[name]]), "noise alone": float("nan"), "unit": "K"}
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
-            "the validation records only the initial temperatures were estimated, from the first tenth.")
+            "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
+            "records have gains of their own, those, from the whole record).")
     if found.provisional:
         text += " The effects are provisional, not names."
     figures = [_figure(one, found) for one in result.residuals]
@@ -138,7 +140,7 @@ def _gap_section(result: Diagnosed) -> Section:
 
 
 def _figure(one: Residuals, found: Diagnosis) -> Figure:
-    names = sorted(one.before, key=lambda name: -_rms(one.before[name]))[:_DRAWN]
+    names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     drawn = residuals_before_after(one.time, {n: one.before[n] for n in names}, {n: one.after[n] for n in names},
                                    noise=found.gap[one.kind].noise, title=f"{one.kind}: {one.name}")
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
@@ -148,7 +150,7 @@ def _figure(one: Residuals, found: Diagnosis) -> Figure:
 
 
 def _spectrum(one: Residuals) -> Figure:
-    names = sorted(one.before, key=lambda name: -_rms(one.before[name]))[:_DRAWN]
+    names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     before, after = ({name: sizes[name] for name in names} for sizes in one.spectra())
     drawn = spectra_before_after(one.frequency, before, after, unit="K/√Hz", title=f"{one.kind}: {one.name}")
     return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {one.kind} record, without and with the "
@@ -220,7 +222,3 @@ def _advice(found: Diagnosis) -> str:
 
 def _from_axes(axes: Any, alt: str, caption: str) -> Figure:
     return Figure.draw(np.ravel(axes)[0].figure, alt=alt, caption=caption)
-
-
-def _rms(values: Any) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from .._fitting import as_data, free_run, residual, rmse
 from ..calibration import Fit, calibrate
 from ..signals import Record, read_record
-from ..thermal import System, simulate
+from ..thermal import System
 from ._claims import Certification, certify_system
 from ._schema import Project
 
 Progress = Callable[[str], None]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One record beside the nominal and the calibrated model, free-running from the first readings.
+    """One record beside the nominal and the calibrated model, both run freely as the calibration runs them.
+
+    The calibrated model starts from the initial temperatures that the calibration found (training) or estimated on the
+    first tenth (validation); the nominal one from those estimated on the first tenth.
 
     Parameters
     ----------
@@ -28,7 +34,7 @@ class Comparison:
     record : Record
         Measured.
     nominal, calibrated : Record
-        Simulated with the record's inputs.
+        The record with modelled readings in place of the measured ones.
     """
 
     kind: str
@@ -49,8 +55,22 @@ class Comparison:
         dict
             By sensor [K].
         """
-        return {name: float(np.sqrt(np.mean((self.record[name] - model[name]) ** 2)))
-                for name in self.record.output_names}
+        return {name: rmse([e]) for name, e in self.residuals(model).items()}
+
+    def residuals(self, model: Record) -> dict[str, Array]:
+        """Measured − modelled of every measured sensor.
+
+        Parameters
+        ----------
+        model : Record
+            One of the simulations, `nominal` or `calibrated`.
+
+        Returns
+        -------
+        dict
+            By sensor, (n,) [K].
+        """
+        return {name: residual(self.record[name], model[name]) for name in model.output_names}
 
 
 @dataclass(frozen=True)
@@ -126,6 +146,24 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
                         loss=project.loss)
         system = fit.system
     progress("comparing model and data")
-    comparisons = tuple(Comparison(kind, record, simulate(project.system, record), simulate(system, record))
-                        for kind, records in (("train", train), ("validation", validation)) for record in records)
+    comparisons = _comparisons(project, fit, train, validation)
     return JobResult(project, fit, system, comparisons, certify_system(system, project.boxes, progress))
+
+
+def _comparisons(project: Project, fit: Fit | None, train: Sequence[Record], validation: Sequence[Record]
+                 ) -> tuple[Comparison, ...]:
+    """What the calibration computed, beside free runs of the nominal model."""
+    noise = fit.noise if fit else {name: sensor.noise for name, sensor in project.system.sensors.items()}
+    found = (*fit.residuals, *fit.validation_residuals) if fit else ()
+    out = []
+    for i, record in enumerate([*train, *validation]):
+        nominal = free_run(project.system, as_data(project.system, record, "records")[0], project.initial, noise)
+        before = _modelled(record, nominal.by_sensor)
+        after = _modelled(record, found[i]) if found else before
+        out.append(Comparison("train" if i < len(train) else "validation", record, before, after))
+    return tuple(out)
+
+
+def _modelled(record: Record, residuals: Mapping[str, Array]) -> Record:
+    """A record with what the model reads, from its residuals."""
+    return record.with_outputs(np.column_stack([record[name] - e for name, e in residuals.items()]), list(residuals))

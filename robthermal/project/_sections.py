@@ -21,13 +21,15 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> 
              "calibrated model [K]": c.rmse(c.calibrated)[name]}
             for c in comparisons for name, before in c.rmse(c.nominal).items()]
     table = pd.DataFrame(rows)
-    text = ("Both models run free: they start from the first readings and see only the currents, heaters and ambients. "
-            "The table gives the root-mean-square residual of every sensor.")
+    text = ("Both models run free: they see only the currents, heaters and ambients. On training records the "
+            "calibrated model starts from the initial temperatures of its fit; elsewhere they are estimated on the "
+            "first tenth of the record. The table gives the root mean square of the residual, measured − model, of "
+            "every sensor; for the calibrated model these are the numbers of the calibration itself.")
     if fit is not None:
         text += f"\n\n{fit.outcome.text}"
     figures = tuple(_comparison_figure(c) for c in comparisons)
-    return Section("Model against data", text, figures=figures, tables=(Table(table, "Residuals, root mean square."),),
-                   anchor="model")
+    return Section("Model against data", text, figures=figures,
+                   tables=(Table(table, "Residuals (measured − model), root mean square."),), anchor="model")
 
 
 def _comparison_figure(c: Comparison) -> Figure:

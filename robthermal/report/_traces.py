@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._fitting import residual as residual_of
 from ..errors import InputError
 from ._style import COLOURS, canvas, house_style, plain
 
@@ -30,7 +31,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     model : mapping
         {sensor: simulated readings} [K], for the same sensors.
     residual : bool, optional
-        Whether model − measured is drawn below.
+        Whether the residual, measured − modelled, is drawn below.
     title : str, optional
         Heading.
 
@@ -49,7 +50,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     >>> import robthermal as rt
     >>> figure = rt.report.measured_against_model([0.0, 1.0], {"T1": [300.0, 301.0]}, {"T1": [300.1, 300.9]})
     >>> [axes.get_ylabel() for axes in figure.axes]
-    ['temperature [°C]', 'model −\\nmeasured [K]']
+    ['temperature [°C]', 'measured −\\nmodel [K]']
     """
     t = np.asarray(time, dtype=float)
     pairs = _pairs(t, measured, model)
@@ -63,12 +64,12 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
             _dots(above, *thin(t / scale, data - _ZERO), colour)
             above.plot(*thin(t / scale, answer - _ZERO), dashes, color=colour, label=plain(name))
             if residual:
-                below.plot(*thin(t / scale, answer - data), dashes, color=colour, linewidth=0.8)
+                below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=colour, linewidth=0.8)
         above.set(ylabel="temperature [°C]", title=plain(title))
         _legend(above, len(pairs))
         if residual:
             below.axhline(0.0, color="black", linewidth=0.6)
-            below.set(ylabel="model −\nmeasured [K]")
+            below.set(ylabel="measured −\nmodel [K]")
             figure.align_ylabels()
         below.set(xlabel=f"time [{unit}]")
         below.margins(x=0.01)

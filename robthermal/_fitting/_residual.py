@@ -1,0 +1,62 @@
+"""Residual = measured − modelled, and its root mean square: the one definition of both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@overload
+def residual(measured: NDArray[np.floating[Any]], modelled: NDArray[np.floating[Any]]) -> Array: ...
+
+
+@overload
+def residual(measured: Complex, modelled: Complex) -> Complex: ...
+
+
+def residual(measured: NDArray[Any], modelled: NDArray[Any]) -> NDArray[Any]:
+    """Measured minus modelled readings: a machine 1 K warmer than its model has residual +1 K.
+
+    Parameters
+    ----------
+    measured : ndarray
+        Readings of the sensors [K], or a measured frequency response.
+    modelled : ndarray
+        The model's answer at the same times or frequencies, in the same unit.
+    """
+    return measured - modelled
+
+
+def rmse(residuals: Iterable[Array]) -> float:
+    """Root mean square [K] over all readings of one residual or several; infinite where a model ran away (NaN).
+
+    Parameters
+    ----------
+    residuals : iterable of ndarray
+        Residuals of any shapes [K], at least one.
+    """
+    e = np.concatenate([np.ravel(r) for r in residuals])
+    mean_square = float(np.mean(e**2))
+    return math.inf if math.isnan(mean_square) else math.sqrt(mean_square)
+
+
+def rmse_by_sensor(records: Iterable[Mapping[str, Array]]) -> dict[str, float]:
+    """Root mean square residual of every sensor over all records that hold it [K].
+
+    Parameters
+    ----------
+    records : iterable of mapping
+        One {sensor: residual (n,) [K]} per record.
+    """
+    pooled: dict[str, list[Array]] = {}
+    for record in records:
+        for name, values in record.items():
+            pooled.setdefault(name, []).append(values)
+    return {name: rmse(parts) for name, parts in pooled.items()}
