@@ -12,8 +12,7 @@ import pytest
 import robthermal as rt
 from robthermal import report
 
-SYSTEM = """format = "robthermal/1"
-[system]
+SYSTEM = """[system]
 name = "bar"
 temperature_unit = "degC"
 [ambients.room]
@@ -26,6 +25,7 @@ between = ["bar", "room"]
 conductance = 0.5
 [inputs.Q]
 lump = "bar"
+limits = [0.0, 10.0]
 [sensors.T]
 lump = "bar"
 noise = 0.01

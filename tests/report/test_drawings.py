@@ -17,13 +17,13 @@ def labels(figure: Any) -> list[str]:
     return [text.get_text() for axes in figure.axes for text in axes.texts]
 
 
-def test_traces_are_in_celsius_and_the_residual_is_model_minus_measured() -> None:
+def test_traces_are_in_celsius_and_the_residual_is_measured_minus_model() -> None:
     figure = measured_against_model([0.0, 1.0, 2.0], {"T1": [300.0, np.nan, 301.0]}, {"T1": [300.5, 300.0, 301.25]})
     above, below = figure.axes
     np.testing.assert_allclose(above.lines[0].get_ydata(), [27.35, 26.85, 28.10])
     dots = above.patches[0].get_path().vertices[::2]
     np.testing.assert_allclose(dots, [[0.0, 26.85], [2.0, 27.85]])
-    np.testing.assert_allclose(below.lines[0].get_ydata(), [0.5, np.nan, 0.25])
+    np.testing.assert_allclose(below.lines[0].get_ydata(), [-0.5, np.nan, -0.25])
 
 
 @pytest.mark.parametrize(("span", "unit"), [(100.0, "s"), (3000.0, "min"), (90_000.0, "h")])
