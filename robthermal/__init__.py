@@ -36,7 +36,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from ._fleet import FleetRun as FleetRun
     from ._fleet import fleet as fleet
     from .calibration import calibrate as calibrate
-    from .diagnosis import diagnose as diagnose
+    from .diagnosis.diagnose import diagnose as diagnose
     from .signals import Record as Record
     from .signals import read_record as read_record
     from .thermal import System as System

@@ -1,50 +1,50 @@
 """Where data and simulation part: locate it, name the missing effect, add it, show the gap shrink on unseen records."""
 
-from ._adequacy import Adequacy as Adequacy
-from ._adequacy import adequacy as adequacy
-from ._along import Along as Along
-from ._along import Response as Response
-from ._catalogue import candidates as candidates
-from ._catalogue import effects as effects
-from ._catalogue import forget_effect as forget_effect
-from ._catalogue import register_effect as register_effect
-from ._decide import Decision as Decision
-from ._decide import decide as decide
-from ._diagnose import diagnose as diagnose
-from ._diagnosis import Diagnosis as Diagnosis
-from ._diagnosis import Found as Found
-from ._effect import Candidate as Candidate
-from ._effect import Effect as Effect
-from ._effect import Quantity as Quantity
-from ._hold_out import Gap as Gap
-from ._hold_out import HoldOut as HoldOut
-from ._hold_out import ValidationResiduals as ValidationResiduals
-from ._hold_out import hold_out as hold_out
-from ._joint import JointSelection as JointSelection
-from ._joint import select_jointly as select_jointly
-from ._joint_check import JointCheck as JointCheck
-from ._joint_sets import EffectSet as EffectSet
-from ._levels import Levels as Levels
-from ._locate import Location as Location
-from ._locate import locate as locate
-from ._measurement import Measurement as Measurement
-from ._next_experiment import NextExperiment as NextExperiment
-from ._next_experiment import next_experiment as next_experiment
-from ._noise_floor import NoiseFloor as NoiseFloor
-from ._noise_floor import noise_floor as noise_floor
-from ._refit import Refit as Refit
-from ._refitting import refit as refit
-from ._score import Scores as Scores
-from ._score import score as score
-from ._short_list import Entry as Entry
-from ._short_list import ShortList as ShortList
-from ._short_list import refit_short_list as refit_short_list
-from ._unknown_heat import UnknownHeat as UnknownHeat
-from ._unknown_heat import unknown_heat as unknown_heat
+from .data import NoiseFloor as NoiseFloor
+from .data import noise_floor as noise_floor
+from .diagnose import diagnose as diagnose
+from .diagnosis import Diagnosis as Diagnosis
+from .diagnosis import Found as Found
+from .effects import Candidate as Candidate
+from .effects import Effect as Effect
+from .effects import Quantity as Quantity
+from .effects import Response as Response
+from .effects import candidates as candidates
+from .effects import effects as effects
+from .effects import forget_effect as forget_effect
+from .effects import register_effect as register_effect
+from .evidence import Adequacy as Adequacy
+from .evidence import Gap as Gap
+from .evidence import HoldOut as HoldOut
+from .evidence import Location as Location
+from .evidence import Scores as Scores
+from .evidence import UnknownHeat as UnknownHeat
+from .evidence import ValidationResiduals as ValidationResiduals
+from .evidence import adequacy as adequacy
+from .evidence import hold_out as hold_out
+from .evidence import locate as locate
+from .evidence import score as score
+from .evidence import unknown_heat as unknown_heat
+from .fit import Levels as Levels
+from .fit import Refit as Refit
+from .fit import refit as refit
+from .path import Along as Along
+from .plan import Measurement as Measurement
+from .plan import NextExperiment as NextExperiment
+from .plan import next_experiment as next_experiment
+from .search import Decision as Decision
+from .search import EffectSet as EffectSet
+from .search import Entry as Entry
+from .search import JointCheck as JointCheck
+from .search import JointSelection as JointSelection
+from .search import ShortList as ShortList
+from .search import decide as decide
+from .search import refit_short_list as refit_short_list
+from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found",
-           "Gap", "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "Measurement", "NextExperiment",
+__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
+           "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "Measurement", "NextExperiment",
            "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "ValidationResiduals",
            "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
-           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score", "select_jointly",
-           "unknown_heat"]
+           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score",
+           "select_jointly", "unknown_heat"]

@@ -97,7 +97,7 @@ def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
     assert best.candidate.where == ("left",)
     for name, (value, std) in best.values.items():
         assert abs(value - truth.effects[0][2][name]) < 3.0 * std
-    monkeypatch.setattr("robthermal.diagnosis._short_list.retried", lambda found, before: found)
+    monkeypatch.setattr("robthermal.diagnosis.search._short_list.retried", lambda found, before: found)
     assert rt.diagnosis.refit_short_list(fit, scores).entries[0].candidate.where == ("cover",)
 
 

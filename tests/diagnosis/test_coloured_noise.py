@@ -15,10 +15,10 @@ from scipy.signal import lfilter
 
 import robthermal as rt
 from robthermal._fitting._data import Data, as_data
-from robthermal.diagnosis._along import Along, along
-from robthermal.diagnosis._levels import Levels, refined, with_slow_part
-from robthermal.diagnosis._whitening import SlowNoise, settled_cost, whitener
-from robthermal.diagnosis._wider_noise import with_wider_noise
+from robthermal.diagnosis.fit._levels import Levels, refined, with_slow_part
+from robthermal.diagnosis.path._along import Along, along
+from robthermal.diagnosis.path._whitening import SlowNoise, settled_cost, whitener
+from robthermal.diagnosis.search._wider_noise import with_wider_noise
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from blind.cases import Case, made  # noqa: E402 - beside the benchmarks, not on the path before

@@ -10,17 +10,17 @@ import pytest
 
 import robthermal as rt
 from robthermal._fitting._data import as_data
-from robthermal.diagnosis import _revise
-from robthermal.diagnosis._along import along
-from robthermal.diagnosis._decide import Decision
-from robthermal.diagnosis._descent import descend
-from robthermal.diagnosis._glitches import outliers
-from robthermal.diagnosis._refitting import extended
-from robthermal.diagnosis._scan import scanned
-from robthermal.diagnosis._short_list import Entry, ShortList
-from robthermal.diagnosis._starts import Origin, held, started
-from robthermal.diagnosis._whitened import Whitened
-from robthermal.diagnosis._whitening import whitener
+from robthermal.diagnosis.data._glitches import outliers
+from robthermal.diagnosis.fit._descent import descend
+from robthermal.diagnosis.fit._refitting import extended
+from robthermal.diagnosis.fit._whitened import Whitened
+from robthermal.diagnosis.path._along import along
+from robthermal.diagnosis.path._whitening import whitener
+from robthermal.diagnosis.search import _revise
+from robthermal.diagnosis.search._decide import Decision
+from robthermal.diagnosis.search._scan import scanned
+from robthermal.diagnosis.search._short_list import Entry, ShortList
+from robthermal.diagnosis.search._starts import Origin, held, started
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 

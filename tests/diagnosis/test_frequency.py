@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 import robthermal as rt
-from robthermal.diagnosis._frequency_data import response_data
-from robthermal.diagnosis._frequency_model import slope
-from robthermal.diagnosis._frequency_tails import inflation, sureness, tail
-from robthermal.diagnosis._frequency_whitening import as_complex, as_real, kept_bins
+from robthermal.diagnosis.data._frequency_data import response_data
+from robthermal.diagnosis.data._frequency_whitening import as_complex, as_real, kept_bins
+from robthermal.diagnosis.evidence._frequency_tails import inflation, sureness, tail
+from robthermal.diagnosis.path._frequency_model import slope
 
 Array = NDArray[np.float64]
 Measure = Callable[..., rt.identify.FrequencyResponse]

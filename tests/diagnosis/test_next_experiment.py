@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._next_experiment import _clearest, rivals
-from robthermal.diagnosis._separation import hypotheses_of, separation
-from robthermal.diagnosis._setting import setting_of
-from robthermal.diagnosis._trial_inputs import limits_of
-from robthermal.diagnosis._trial_search import LONGEST, Trial, search_of
+from robthermal.diagnosis.plan._next_experiment import _clearest, rivals
+from robthermal.diagnosis.plan._separation import hypotheses_of, separation
+from robthermal.diagnosis.plan._setting import setting_of
+from robthermal.diagnosis.plan._trial_inputs import limits_of
+from robthermal.diagnosis.plan._trial_search import LONGEST, Trial, search_of
 
 Array = np.ndarray
 H, ROOM = 5.0, 298.15

@@ -12,10 +12,10 @@ from scipy.optimize import lsq_linear, nnls
 
 import robthermal as rt
 from robthermal._fitting._data import as_data
-from robthermal.diagnosis import _score
-from robthermal.diagnosis._along import Along, along
-from robthermal.diagnosis._descent import descend
-from robthermal.diagnosis._whitening import gathered, whitener
+from robthermal.diagnosis.evidence import _score
+from robthermal.diagnosis.fit._descent import descend
+from robthermal.diagnosis.path._along import Along, along
+from robthermal.diagnosis.path._whitening import gathered, whitener
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._hold_out import surprises, unseen_data
-from robthermal.diagnosis._refitting import extended
-from robthermal.diagnosis._told_apart import told_apart
+from robthermal.diagnosis.evidence._hold_out import surprises, unseen_data
+from robthermal.diagnosis.fit._refitting import extended
+from robthermal.diagnosis.search._told_apart import told_apart
 from robthermal.project._diagnose import Diagnosed
 from robthermal.project._diagnose_claims import diagnosis_claims
 from robthermal.project._diagnose_ranking import ranking

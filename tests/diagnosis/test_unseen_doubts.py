@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis._hold_out import _filters, _own_unknowns, surprises, unseen_data
-from robthermal.diagnosis._refit import Refit
-from robthermal.diagnosis._unseen_doubts import supported
+from robthermal.diagnosis.evidence._hold_out import _filters, _own_unknowns, surprises, unseen_data
+from robthermal.diagnosis.fit._refit import Refit
+from robthermal.diagnosis.search._unseen_doubts import supported
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 FEW = ["missing_ambient_link", "natural_convection", "sensor_lag", "heat_source"]
@@ -76,8 +76,8 @@ def test_a_name_whose_model_runs_away_on_unseen_records_is_taken_back(
             raise rt.errors.Diverged("runs away", time=3.0)
         return _filters(fit, *others)
 
-    monkeypatch.setattr("robthermal.diagnosis._hold_out._own_unknowns", runs_away)
-    monkeypatch.setattr("robthermal.diagnosis._hold_out._filters", no_filter)
+    monkeypatch.setattr("robthermal.diagnosis.evidence._hold_out._own_unknowns", runs_away)
+    monkeypatch.setattr("robthermal.diagnosis.evidence._hold_out._filters", no_filter)
     assert surprises([second], second, data) == [np.inf]
     assert np.isfinite(surprises([second, first], second, data)[1])
     assert supported(found.rounds, second, first, data) == ((), first)

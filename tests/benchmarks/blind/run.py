@@ -26,7 +26,7 @@ _GENERATOR = ("cases.py", "hidden.py", "integrate.py", "outside.py", "plants.py"
 def version() -> str:
     """Digest of the code that decides and of the code that makes the data: rows of another one do not count."""
     home = Path(rt.__file__).parent
-    files = sorted(file for room in _SOURCES for file in (home / room).glob("*.py"))
+    files = sorted(file for room in _SOURCES for file in (home / room).rglob("*.py"))
     files += [Path(__file__).parent / name for name in _GENERATOR]
     return hashlib.sha1(b"".join(file.read_bytes() for file in files)).hexdigest()[:10]
 

@@ -1,0 +1,107 @@
+"""Isolated outliers among the readings: found on the record, and left out of every fit.
+
+A spike of a thousand standard deviations would decide any sum of squares. It is told from physics by its neighbours:
+heat cannot make a reading leave and come back within three samples, and where the model itself bends as fast, nothing
+is called a spike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from ..._fitting import Data, residual
+from ...errors import Diverged, InputError
+from ...thermal import System, trajectory
+from ._frequency_data import ResponseData
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_WIDTH = 7  # samples: up to three outliers side by side
+_FAR = 8.0  # standard deviations
+_STEEP = 2.5  # times the spread of the middle three: a bend of the residual
+_BENT = 0.5  # times the largest second difference of the model nearby: where inputs switch, the model may be late
+_PASSES = 5
+MOST = 0.05
+
+
+def without_glitches(system: System, data: Sequence[Data | ResponseData], noise: Mapping[str, float]
+                     ) -> list[Data | ResponseData]:
+    """Records with their isolated outliers marked as missing, and interpolated for display.
+
+    Parameters
+    ----------
+    system : System
+        Nominal; its simulation is subtracted before outliers are looked for.
+    data : sequence of Data or ResponseData
+        Records; frequency responses are left as they are.
+    noise : mapping
+        Standard deviation of every sensor [K].
+    """
+    return [_cleaned(system, one, np.array([noise[name] for name in one.sensors])) if isinstance(one, Data) else one
+            for one in data]
+
+
+def counted(data: Sequence[Data | ResponseData]) -> dict[str, int]:
+    """Number of outliers of every sensor that has any; refuse more than a few per cent."""
+    readings: dict[str, int] = {}
+    found: dict[str, int] = {}
+    for one in data:
+        if isinstance(one, Data) and one.missing is not None:
+            for name, n in zip(one.sensors, one.missing.sum(axis=0).tolist(), strict=True):
+                found[name] = found.get(name, 0) + n
+                readings[name] = readings.get(name, 0) + len(one.missing)
+    for name, n in found.items():
+        if n > MOST * readings[name]:
+            raise InputError(f"{n} of {readings[name]} readings of sensor {name!r} are isolated outliers",
+                             where="argument records", expected=f"at most {MOST:.0%}",
+                             remedy="Mend the sensor or its cable, or leave its column out.")
+    return {name: n for name, n in found.items() if n}
+
+
+def _cleaned(system: System, one: Data, noise: Array) -> Data:
+    try:
+        model = np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
+    except Diverged:  # the refit will say so
+        return one
+    r, missing = residual(one.readings, model), np.zeros(one.readings.shape, bool)
+    allowed: Array = _FAR * noise + _BENT * _bends(model)
+    time = np.arange(len(r))
+    for _ in range(_PASSES):
+        new = outliers(r, allowed) & ~missing
+        if not new.any():
+            break
+        missing |= new
+        for i in np.flatnonzero(missing.any(axis=0)):
+            good = ~missing[:, i]
+            r[:, i] = np.interp(time, time[good], r[good, i])
+    if not missing.any():
+        return one
+    readings = model + r
+    columns = [one.record.output_names.index(name) for name in one.sensors]
+    outputs = np.array(one.record.outputs, float)
+    outputs[:, columns] = readings
+    return replace(one, record=one.record.with_outputs(outputs), readings=readings, missing=missing)
+
+
+def outliers(r: Array, allowed: Array) -> Mask:
+    """Where residuals (n, n_sensors) leave the median of their neighbours by more than is allowed."""
+    window = np.sort(_windows(r), axis=2)
+    middle, half = window[..., _WIDTH // 2], _WIDTH // 2
+    return np.asarray(np.abs(r - middle) > allowed + _STEEP * (window[..., half + 1] - window[..., half - 1]))
+
+
+def _bends(model: Array) -> Array:
+    """Largest second difference of a model nearby, (n, n_sensors) [K]."""
+    bend = np.abs(np.diff(model, 2, axis=0, prepend=model[:1], append=model[-1:]))
+    return np.asarray(_windows(bend).max(axis=2))
+
+
+def _windows(signal: Array) -> Array:
+    """Neighbours of every sample, (n, n_sensors, width)."""
+    half = _WIDTH // 2
+    return np.asarray(sliding_window_view(np.pad(signal, ((half, half), (0, 0)), mode="reflect"), _WIDTH, axis=0))

@@ -1,0 +1,168 @@
+"""Stage 1: what sensor noise and random heat alone would leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._fitting import SMALLEST, Data, declared_noise, quantum
+from ...errors import InputError, Outcome
+from ...thermal import System
+from ._frequency_data import Measured, ResponseData, as_measured
+from ._glitches import counted, without_glitches
+
+Array = NDArray[np.float64]
+_SHORTEST = 50  # samples
+_DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])  # kills parabolas: what is left of a slow signal is its noise
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Noise of the sensors and random heat of the lumps, before any model has been fitted.
+
+    Parameters
+    ----------
+    noise : dict
+        Standard deviation of every sensor in the records [K].
+    estimated : tuple of str
+        Sensors whose noise was not declared, and was read off third differences of the record.
+    disturbance : dict
+        Declared random heat of every lump [W/√Hz].
+    rough : dict
+        Noise read off third differences, of every sensor [K]; for comparison.
+    outcome : Outcome
+        Code "declared", "estimated" or "doubtful" (a declared noise far from what the record shows).
+    glitches : dict
+        Number of isolated outliers of every sensor that has any; no fit sees them.
+    quantised : tuple of str
+        Sensors whose steps are more than two standard deviations of their noise: their errors are no white noise.
+    """
+
+    noise: dict[str, float]
+    estimated: tuple[str, ...]
+    disturbance: dict[str, float]
+    rough: dict[str, float]
+    outcome: Outcome
+    glitches: dict[str, int] = field(default_factory=dict)
+    quantised: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        lines = [f"{'sensor':<12} {'noise [K]':>10} {'differences [K]':>16}"]
+        lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>16.4g}" for name, level in self.noise.items()]
+        lines += [f"{name}: {n} isolated outliers left out" for name, n in self.glitches.items()]
+        lines += [f"{name}: quantised; its errors count as noise of step/√12, and are not tested for whiteness"
+                  for name in self.quantised]
+        return "\n".join([*lines, str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Bars of both noise levels; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, ax = plt.subplots(layout="constrained")
+        place = np.arange(len(self.noise))
+        ax.bar(place - 0.2, list(self.noise.values()), 0.4, label="used")
+        ax.bar(place + 0.2, list(self.rough.values()), 0.4, label="third differences")
+        ax.set(xticks=place, xticklabels=list(self.noise), ylabel="noise [K]", yscale="log")
+        ax.legend()
+        return ax
+
+
+def noise_floor(system: System, records: Measured | Sequence[Measured], *,
+                noise: Mapping[str, float] | float | None = None,
+                operating_point: Mapping[str, float] | None = None) -> NoiseFloor:
+    """Find the noise of every sensor: declared, or else read off the record.
+
+    Parameters
+    ----------
+    system : System
+        With the declared `noise` of its sensors and `disturbance` of its lumps.
+    records : Record, FrequencyResponse, or list of them
+        Measured. Of a frequency response every element "output/input" is listed with its median relative standard
+        deviation, as estimated with the response.
+    noise : mapping or float, optional
+        Overrides the declared noise [K].
+    operating_point : mapping, optional
+        As in `refit`.
+
+    Returns
+    -------
+    NoiseFloor
+
+    Raises
+    ------
+    InputError
+        Fewer than 50 samples; a noise that is neither declared nor visible.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], sensors={"T": {"lump": "bar"}})
+    >>> y = 295.0 + 0.02 * np.random.default_rng(0).standard_normal((400, 1))
+    >>> record = rt.Record(sample_time=1.0, inputs=np.full(400, 295.0), outputs=y, input_names=["room"],
+    ...                    output_names=["T"])
+    >>> floor = rt.diagnosis.noise_floor(bar, record)
+    >>> floor.outcome.code, round(floor.noise["T"], 3)
+    ('estimated', 0.02)
+    """
+    measured = as_measured(system, records, "records", operating_point)
+    relative = {name: float(level) for one in measured if isinstance(one, ResponseData)
+                for name, level in zip(one.sensors, one.noise, strict=True)}
+    data = [one for one in measured if isinstance(one, Data)]
+    if not data and noise is not None:
+        raise InputError("noise is given with a frequency response", where="argument noise",
+                         remedy="Leave it out: the response brings its covariance.")
+    if not data:
+        return NoiseFloor(relative, (), {}, relative, Outcome(True, "estimated", "Noise of the elements as estimated "
+                                                              "with the frequency response, relative to its size."))
+    for one in data:
+        if len(one.record) < _SHORTEST:
+            raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
+                             expected=f"at least {_SHORTEST}", remedy="Measure longer, or sample faster.")
+    levels = declared_noise(system, data, noise)
+    rough = {name: _rough(data, name) for name in levels}
+    unknown = tuple(name for name, level in levels.items() if not level)
+    for name in unknown:
+        if rough[name] < SMALLEST:
+            raise InputError(f"the noise of sensor {name!r} is not declared, and none is visible in the record",
+                             where=f"[sensors.{name}] noise", expected="a positive standard deviation [K]",
+                             remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
+    noise_of = {name: level or rough[name] for name, level in levels.items()}
+    disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
+    glitches = counted(without_glitches(system, data, noise_of))
+    return NoiseFloor({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
+                      _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
+
+
+def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...]) -> Outcome:
+    far = [name for name in noise if rough[name] and not 1 / 3 < noise[name] / rough[name] < 3]
+    if far:
+        listed = ", ".join(f"{name} (declared {noise[name]:.3g} K, record {rough[name]:.3g} K)" for name in far)
+        return Outcome(False, "doubtful", f"The declared noise is far from what the record shows: {listed}. Correct "
+                       "it: every test below rests on it.")
+    if unknown:
+        return Outcome(True, "estimated", f"Noise of {', '.join(unknown)} estimated from third differences.")
+    return Outcome(True, "declared", "Noise as declared.")
+
+
+def _quantised(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:
+    """Sensors whose noise is nothing but their steps: q/√12 of them is most of it."""
+    steps = {name: max(quantum(one.readings[:, one.sensors.index(name)]) for one in data if name in one.sensors)
+             for name in noise}
+    return tuple(name for name, step in steps.items() if step / 12**0.5 > 0.7 * noise[name])
+
+
+def _rough(data: list[Data], name: str) -> float:
+    """Noise from third differences, robustly; a quantised reading has at least step/√12."""
+    pieces, step = [], 0.0
+    for one in data:
+        if name in one.sensors:
+            y = one.readings[:, one.sensors.index(name)]
+            pieces.append(np.convolve(y, _DIFFERENCE, "valid"))
+            step = max(step, quantum(y))
+    d = np.abs(np.concatenate(pieces))
+    return max(1.4826 * float(np.median(d)) / float(np.linalg.norm(_DIFFERENCE)), step / 12**0.5)

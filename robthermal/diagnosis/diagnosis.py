@@ -1,0 +1,182 @@
+"""Diagnosis: what was found, how sure it is, and what to do next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ..errors import Outcome
+from ..thermal import System
+from ._file import write_json
+from .data import NoiseFloor
+from .effects import Candidate
+from .evidence import Adequacy, Gap, HoldOut, Location, Scores, UnknownHeat
+from .fit import Refit
+from .plan import NextExperiment
+from .search import Decision, JointCheck, ruled_out
+
+Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
+Name = tuple[str, tuple[str, ...]]
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect.
+
+    Parameters
+    ----------
+    effect : str
+        Its name.
+    where : tuple of str
+        Parts of the system.
+    values : dict
+        Quantity to (value, standard deviation, unit).
+    p_value : float
+        Family-wise.
+    delta_bic : float
+        Against the model without it; above 10 is very strong.
+    """
+
+    effect: str
+    where: tuple[str, ...]
+    values: dict[str, tuple[float, float, str]]
+    p_value: float
+    delta_bic: float
+
+    @property
+    def label(self) -> str:
+        """For tables: ``sensor_lag(T6)``."""
+        return f"{self.effect}({', '.join(self.where)})"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Diagnosis:
+    """Result of `diagnose`.
+
+    Parameters
+    ----------
+    verdict : {"named", "ambiguous", "consistent", "unexplained"}
+        One set of effects explains the records; several do; nothing is missing; nothing known explains them.
+    effects : tuple of Found
+        In order of acceptance; empty unless named or ambiguous.
+    alternatives : tuple of tuple
+        For every effect, the (effect, where) the records cannot exclude.
+    system : System
+        Nominal parameters refitted, with the effects added.
+    gap : dict
+        `Gap` of "train" and, if given, "validation".
+    located : Location
+        Where the nominal system's misfit sits.
+    not_testable : dict
+        What these records could not have shown, by (effect, where), with the reason.
+    next_experiment : NextExperiment or None
+        What separates the alternatives; None if there are none.
+    outcome : Outcome
+        Code as the verdict; not ok if ambiguous or unexplained.
+    provisional : tuple of Found
+        Effects that helped but do not explain everything: no names.
+    noise_floor, nominal, fit, scores, rounds, adequacy, hold_out
+        Results of the stages.
+    joint : JointCheck or None
+        Two effects or more compared with a selection of all at once; None with fewer.
+    unknown_heat : UnknownHeat or None
+        If nothing known explains the records: the heat into the most suspect lump that would; None otherwise.
+    """
+
+    verdict: Verdict
+    effects: tuple[Found, ...]
+    alternatives: tuple[tuple[Name, ...], ...]
+    system: System
+    gap: dict[str, Gap]
+    located: Location
+    not_testable: dict[Name, str]
+    next_experiment: NextExperiment | None
+    outcome: Outcome
+    provisional: tuple[Found, ...]
+    noise_floor: NoiseFloor
+    nominal: Refit
+    fit: Refit
+    scores: Scores
+    rounds: tuple[Decision, ...]
+    adequacy: Adequacy
+    hold_out: HoldOut | None
+    joint: JointCheck | None = None
+    unknown_heat: UnknownHeat | None = None
+
+    @property
+    def ruled_out(self) -> tuple[Candidate, ...]:
+        """What training could not tell from the accepted effects, and the unseen records could."""
+        return ruled_out(self.rounds)
+
+    def __str__(self) -> str:
+        lines = [f"verdict: {self.verdict}"]
+        for found, others in zip(self.effects, self.alternatives, strict=True):
+            lines.append(f"  {found.label}: " + ", ".join(
+                f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
+                + f"   ΔBIC {found.delta_bic:.1f}, p {found.p_value:.1g}")
+            lines += [f"    or {effect}({', '.join(where)})" for effect, where in others]
+        for name, gap in self.gap.items():
+            lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
+                         f"[{gap.unit}]")
+        lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
+        return "\n".join([*lines, str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Residuals of the first training record [K], or response, before and after; returns the matplotlib axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(2, 1, sharex=True, sharey=True, layout="constrained")
+        for ax, fit, what in zip(axes, (self.nominal, self.fit), ("before", "after"), strict=True):
+            fit.paths[0].draw(ax, fit.residuals[0])
+            ax.set(title=f"{what}: rms {fit.rms:.3g} {fit.unit}")
+        axes[0].legend(fontsize="small")
+        axes[0].set(xlabel="")
+        return np.asarray(axes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds.
+
+        Returns
+        -------
+        dict
+        """
+        plan = self.next_experiment
+        return {
+            "format": "robthermal-diagnosis/1",
+            "verdict": self.verdict,
+            "effects": [_plain(found) for found in self.effects],
+            "alternatives": [[{"effect": effect, "where": list(where)} for effect, where in others]
+                             for others in self.alternatives],
+            "located": {"lumps": self.located.lumps, "sensors": self.located.sensors,
+                        "conditions": "; ".join(self.located.conditions)},
+            "gap": {name: vars(gap) for name, gap in self.gap.items()},
+            "not_testable": [{"effect": effect, "where": list(where), "why": why}
+                             for (effect, where), why in self.not_testable.items()],
+            "next_experiment": {} if plan is None else {
+                "advice": plan.advice, "expected_delta_bic": plan.expected, "present_delta_bic": plan.present,
+                "sample_time": plan.record.sample_time,
+                **({} if plan.measurement is None else {"measure": vars(plan.measurement)}),
+                "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
+            "provisional": [_plain(found) for found in self.provisional],
+            "outcome": vars(self.outcome),
+            **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write ``diagnosis.json``.
+
+        Parameters
+        ----------
+        path : str or Path
+            File.
+        """
+        write_json(path, self.to_dict())
+
+
+def _plain(found: Found) -> dict[str, Any]:
+    return {"effect": found.effect, "where": list(found.where), "p_value": found.p_value, "delta_bic": found.delta_bic,
+            "parameters": {name: {"value": value, "std": std, "unit": unit}
+                           for name, (value, std, unit) in found.values.items()}}

@@ -1,0 +1,29 @@
+"""What a fit leaves: scores of candidate effects, tests of what is left, its place, prediction of validation data."""
+
+from ._adequacy import Adequacy as Adequacy
+from ._adequacy import adequacy as adequacy
+from ._hold_out import Gap as Gap
+from ._hold_out import HoldOut as HoldOut
+from ._hold_out import ValidationResiduals as ValidationResiduals
+from ._hold_out import expected_rms as expected_rms
+from ._hold_out import hold_out as hold_out
+from ._hold_out import refuse_seen as refuse_seen
+from ._hold_out import surprises as surprises
+from ._hold_out import unseen_data as unseen_data
+from ._locate import Location as Location
+from ._locate import locate as locate
+from ._score import ALPHA as ALPHA
+from ._score import BIC_GAP as BIC_GAP
+from ._score import Scores as Scores
+from ._score import columns as columns
+from ._score import explains as explains
+from ._score import promised as promised
+from ._score import promising as promising
+from ._score import score as score
+from ._score import score_candidates as score_candidates
+from ._unknown_heat import UnknownHeat as UnknownHeat
+from ._unknown_heat import unknown_heat as unknown_heat
+
+__all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Gap", "HoldOut", "Location", "Scores", "UnknownHeat",
+           "ValidationResiduals", "adequacy", "columns", "expected_rms", "explains", "hold_out", "locate", "promised",
+           "promising", "refuse_seen", "score", "score_candidates", "surprises", "unknown_heat", "unseen_data"]

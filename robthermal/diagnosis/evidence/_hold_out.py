@@ -1,0 +1,354 @@
+"""Stage 8: records the fit has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
+
+from ..._fitting import Data, Start, free_run, refuse_same, rmse
+from ...errors import Diverged, InputError, Outcome
+from ...thermal import System
+from ..data import Measured, ResponseData, as_measured, without_glitches
+from ..fit import Point, Refit, Structure, White, Whitened, descend, filters, paths_of, start_of
+from ..path import Along, gathered
+from ._frequency_locate import response_rms
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+SMALLEST_P = 1e-4
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root mean square of the free-running residual over all sensors [K]; of responses alone, whitened.
+
+    Parameters
+    ----------
+    before, after : float
+        Nominal system refitted; with the effects.
+    noise : float
+        What sensor noise and random heat alone would give.
+    unit : str
+        "K", or "standard deviations" of a frequency response's noise where there is no record.
+    """
+
+    before: float
+    after: float
+    noise: float
+    unit: str = "K"
+
+
+@dataclass(frozen=True, eq=False)
+class ValidationResiduals:
+    """Free runs on one validation record, with its own session gains; isolated outliers interpolated.
+
+    Parameters
+    ----------
+    name : str
+        Name of the record.
+    time : ndarray, shape (n,)
+        Sample times [s].
+    before, after : dict
+        {sensor: measured − modelled (n,)} [K], nominal system refitted and with the effects; NaN if the model runs
+        away.
+    """
+
+    name: str
+    time: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class HoldOut:
+    """How the effects do on unseen records.
+
+    Parameters
+    ----------
+    gap : Gap
+        Free runs; initial temperatures from the first tenth.
+    variance_before, variance_after : float
+        Whitened variance with the trained parameters; 1 if nothing is missing.
+    p_value : float
+        Of the prediction: chance of a larger misfit if the model, its noise and the trained parameters' covariance are
+        right.
+    outcome : Outcome
+        Code "predicted" or "not_predicted" (not ok).
+    residuals : tuple of ValidationResiduals
+        The free runs that `gap` is the root mean square of, one per validation record.
+    """
+
+    gap: Gap
+    variance_before: float
+    variance_after: float
+    p_value: float
+    outcome: Outcome
+    residuals: tuple[ValidationResiduals, ...] = ()
+
+    @property
+    def excess_ratio(self) -> float:
+        """Excess whitened variance after over before [-]; nan if there was none before."""
+        excess = self.variance_before - 1.0
+        return (self.variance_after - 1.0) / excess if excess > 0.05 else float("nan")
+
+    def __str__(self) -> str:
+        return (f"held out: rms {self.gap.before:.4g} before, {self.gap.after:.4g} after, {self.gap.noise:.4g} "
+                f"{self.gap.unit} noise; whitened variance {self.variance_before:.3g} before, "
+                f"{self.variance_after:.3g} after\n{self.outcome}")
+
+
+def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measured], *,
+             operating_point: Mapping[str, float] | None = None) -> HoldOut:
+    """Predict unseen records with and without the effects.
+
+    Parameters
+    ----------
+    before : Refit
+        Nominal.
+    after : Refit
+        With the effects.
+    validation : Record, FrequencyResponse, or list of them
+        Not among those fitted.
+    operating_point : mapping, optional
+        Of frequency responses, as in `refit`.
+
+    Returns
+    -------
+    HoldOut
+
+    Raises
+    ------
+    InputError
+        A validation record that is a training record.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> def measured(seed):
+    ...     rng = np.random.default_rng(seed)
+    ...     drive = rt.Record(sample_time=10.0, inputs=np.repeat(rng.uniform(0.0, 6.0, 8), 25),
+    ...                       outputs=np.zeros((200, 0)), input_names=["heater"], output_names=[])
+    ...     run = rt.thermal.simulate(bar, drive)
+    ...     return run.with_outputs(run.outputs + 0.05 * rng.standard_normal((200, 1)))
+    >>> fit = rt.diagnosis.refit(bar, measured(1))
+    >>> rt.diagnosis.hold_out(fit, fit, measured(2)).outcome.code
+    'predicted'
+    """
+    data = unseen_data(after, validation, operating_point)
+    residuals = _residuals(before, after, [one for one in data if isinstance(one, Data)])
+    gap = _unseen_gap(before, after, data, residuals)
+    variance_before, _ = predicted(before, after, data)
+    variance_after, p = predicted(after, after, data)
+    ok = p > SMALLEST_P
+    text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
+            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
+            "nothing has changed in between, diagnose with them among the training records.")
+    return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text),
+                   residuals)
+
+
+def unseen_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
+                ) -> list[Data | ResponseData]:
+    """Validation data without glitches; refused if the fit has seen them."""
+    base = fit.structure.base
+    data = without_glitches(base, as_measured(base, validation, "validation", operating_point), fit.floor.noise)
+    refuse_seen(fit.structure.data, data)
+    return list(data)
+
+
+def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Data | ResponseData]) -> None:
+    """Data validate nothing that was fitted to them; a record's noise must be known from training records."""
+    if not any(isinstance(one, Data) for one in training) and any(isinstance(one, Data) for one in validation):
+        raise InputError("a record is to validate what only frequency responses taught", where="argument validation",
+                         expected="a frequency response", remedy="Estimate one from that record with rt.identify.lpm, "
+                         "or train on a record too.")
+    seen, unseen = ([one for one in data if isinstance(one, Data)] for data in (training, validation))
+    refuse_same(seen, unseen)
+    for new in validation:
+        for old in training:
+            if (isinstance(new, ResponseData) and isinstance(old, ResponseData)
+                    and np.array_equal(new.readings, old.readings)):
+                raise InputError("the validation response is the training response", where="argument validation",
+                                 expected="data the fit has not seen", remedy="Estimate it from another record.")
+
+
+def _unseen_gap(before: Refit, after: Refit, data: Sequence[Data | ResponseData],
+                residuals: Sequence[ValidationResiduals]) -> Gap:
+    if not residuals:
+        return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
+    records = [one for one in data if isinstance(one, Data)]
+    return Gap(rmse(e for one in residuals for e in one.before.values()),
+               rmse(e for one in residuals for e in one.after.values()), expected_rms(after, records))
+
+
+def _residuals(before: Refit, after: Refit, records: Sequence[Data]) -> tuple[ValidationResiduals, ...]:
+    runs = (_free_runs(fit, records) for fit in (before, after))
+    return tuple(ValidationResiduals(one.label, one.record.time, old, new)
+                 for one, old, new in zip(records, *runs, strict=True))
+
+
+def _free_runs(fit: Refit, records: Sequence[Data]) -> list[dict[str, Array]]:
+    """Residuals of every record by sensor; NaN where the model runs away."""
+    try:
+        systems = _session_systems(fit, records)
+    except Diverged:
+        return [_ran_away(one) for one in records]
+    return [_one_run(fit, system, one) for system, one in zip(systems, records, strict=True)]
+
+
+def _one_run(fit: Refit, system: System, one: Data) -> dict[str, Array]:
+    try:
+        return free_run(system, one, "free", fit.floor.noise).by_sensor
+    except Diverged:
+        return _ran_away(one)
+
+
+def _ran_away(one: Data) -> dict[str, Array]:
+    return dict.fromkeys(one.sensors, np.full(len(one.readings), np.nan))
+
+
+def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:
+    """Trained system in every unseen session: a new session has a gain of its own, estimated on all of it."""
+    sessions = fit.structure.sessions
+    if not sessions.inputs:
+        return [fit.system] * len(data)
+    structure, own, _ = _own_unknowns(fit, data, _filters(fit, fit, data))
+    return [sessions.applied(fit.system, g) for g in structure.gains(own.v)]
+
+
+def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[float, float]:
+    """Whitened variance with trained parameters, and the p-value of the prediction, with the noise of `reference`.
+
+    The trained parameters enter as a prior with the covariance of their training, what is the records' own (initial
+    temperatures, session gains) with theirs; at the optimum the sum of squares is χ² with as many degrees of freedom as
+    there are readings, fewer where the noise is itself an estimate.
+    """
+    try:
+        structure, only, n = _own_unknowns(fit, data, _filters(fit, reference, data))
+    except Diverged:
+        return float("inf"), 0.0
+    # the trained parameters move by a standard deviation or so: one linear step is their optimum
+    left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
+    rss = float(left @ left) / max(reference.variance, 1e-12)
+    known = reference.degrees_of_freedom * reference.structure.certainty
+    return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
+
+
+def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[Data | ResponseData]) -> list[float]:
+    """-2 log predictive densities of unseen records given the trained parameters' covariance, but for one constant.
+
+    Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
+    One filter serves all fits, with the noise of `reference` and along the first model that survives the records; for
+    a fit that does not it is infinite.
+    """
+    whiteners = next((found for fit in (reference, *fits) if (found := _surviving(fit, reference, data))), None)
+    return [float("inf") if whiteners is None else _surprise(fit, whiteners, reference, data) for fit in fits]
+
+
+def _surviving(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...] | None:
+    try:
+        return _filters(fit, reference, data)
+    except Diverged:
+        return None
+
+
+def _surprise(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[Data | ResponseData]) -> float:
+    try:
+        _, only, n = _own_unknowns(fit, data, whiteners)
+    except Diverged:
+        return float("inf")
+    left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
+    scale = np.linalg.norm(only.J, axis=0)
+    J = only.J / np.where(scale > 0, scale, 1.0)
+    narrowed = _log_volume(J) - _log_volume(J[n:])
+    return float(left @ left) / max(reference.variance, 1e-12) + narrowed
+
+
+def _log_volume(J: Array) -> float:
+    """log det JᵀJ; directions that nothing determines count as much with as without data."""
+    s = np.linalg.svd(J, compute_uv=False)
+    return 2.0 * float(np.sum(np.log(np.maximum(s, 1e-9))))
+
+
+def _over(fit: Refit, data: Sequence[Data | ResponseData], start: Start = "free") -> tuple[Structure, Array]:
+    """The structure over unseen data, and its unknowns: those trained, the data's own at zero."""
+    starts = tuple(start_of(fit.system, one, start) for one in data)
+    structure = replace(fit.structure, data=tuple(data), starts=starts)
+    p = structure.n_parameters + structure.n_effects
+    return structure, np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
+
+
+def _filters(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...]:
+    """Whiteners of unseen data along the trained model, with the noise of `reference`."""
+    return filters(*_over(fit, data), reference.floor, reference.levels)[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Unseen:
+    """Whitened residuals of unseen data, and what training says about the first unknowns: R (v - trained)."""
+
+    of: Whitened
+    R: Array
+    trained: Array
+
+    @property
+    def _kept(self) -> Places:
+        """All rows but the parameters' own priors, which are in R already."""
+        structure = self.of.structure
+        n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
+        return np.r_[0:n, n + n_known:n + n_known + structure.n_own]
+
+    def residual(self, v: Array) -> Array:
+        """As `Problem.residual`."""
+        return np.concatenate([self.of.residual(v)[self._kept], -self.R @ (v[:self.trained.size] - self.trained)])
+
+    def slopes(self, v: Array) -> Array:
+        """As `Problem.slopes`."""
+        prior = np.zeros((len(self.R), v.size))
+        prior[:, :self.trained.size] = self.R
+        return np.concatenate([self.of.slopes(v)[self._kept], prior])
+
+
+def _own_unknowns(fit: Refit, data: Sequence[Data | ResponseData], whiteners: Sequence[White]
+                  ) -> tuple[Structure, Point, int]:
+    """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
+    structure, v = _over(fit, data)
+    p = structure.n_parameters + structure.n_effects
+    trained = fit.v[:p]
+    low, high = (bound.copy() for bound in structure.bounds)
+    low[:p], high[:p] = trained, trained
+    problem = _Unseen(Whitened(structure, whiteners), _information_root(fit.J, p), trained)
+    return structure, descend(problem, v, (low, high), 20, 1e-4).at, structure.n_readings
+
+
+def _information_root(J: Array, p: int) -> Array:
+    """R with RᵀR the information on the first p unknowns, the others marginalised."""
+    rest = J.shape[1] - p
+    R: Array = np.asarray(np.linalg.qr(np.concatenate([J[:, p:], J[:, :p]], axis=1)).R, np.float64)
+    return R[rest:, rest:]
+
+
+def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
+    """Free-run rms that sensor noise and random heat alone would give [K]; 1 of frequency responses alone."""
+    paths = fit.paths if data is None else paths_of(*_over(fit, data, "measured"))
+    total, count = 0.0, 0
+    for path in paths:
+        if not isinstance(path, Along):
+            continue
+        noise, disturbance = fit.levels.of(path, fit.floor)
+        slow = fit.levels.slow(path, fit.floor)
+        spread = float(noise @ noise) + (0.0 if slow is None else float(slow.std @ slow.std))
+        A, P = path.steps[0], np.zeros(path.M.shape[1:])
+        Q = gathered(path, disturbance)
+        for k in range(len(A)):
+            total += float(np.trace(path.C @ P @ path.C.T)) + spread
+            P = A[k] @ P @ A[k].T + Q[k]
+        count += path.one.readings.size
+    return float(np.sqrt(total / count)) if count else 1.0

@@ -1,0 +1,204 @@
+"""Gauss-Newton with bounds; where a step fails, shorter ones, then Marquardt's damping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+from scipy.optimize import lsq_linear
+
+from ...errors import Diverged, InputError
+
+Array = NDArray[np.float64]
+_FLAT = 1e-10  # relative singular value that is rounding
+_TOO_LONG = 0.5  # a shorter step is tried if the parabola's lowest point lies at this part of it, or farther
+_DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squares of the derivatives
+
+
+class Problem(Protocol):
+    """What is minimised."""
+
+    def residual(self, v: Array) -> Array:
+        """Weighted residuals, (m,)."""
+
+    def slopes(self, v: Array) -> Array:
+        """Derivative of the model, - ∂z/∂v, (m, p)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Residuals at some unknowns, and derivatives once they are asked for: they cost more, and few points need them.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is minimised.
+    v : ndarray, shape (p,)
+        Unknowns.
+    """
+
+    problem: Problem
+    v: Array
+
+    @cached_property
+    def z(self) -> Array:
+        """Weighted residuals, (m,)."""
+        return self.problem.residual(self.v)
+
+    @cached_property
+    def J(self) -> Array:
+        """Derivative of the model, - ∂z/∂v, (m, p)."""
+        return self.problem.slopes(self.v)
+
+    @cached_property
+    def small(self) -> tuple[Array, Array]:
+        """Derivatives (p + 1, p) and residuals (p + 1,) turned so that all other rows are 0: for linear problems."""
+        whole = np.column_stack([self.J, self.z])
+        rows = whole.shape[1]
+        R = np.zeros((rows, rows))
+        R[:len(whole)] = np.triu(qr(whole, mode="raw", overwrite_a=True, check_finite=False)[0][0])[:rows]
+        return R[:, :-1], R[:, -1]
+
+
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where a minimisation ended.
+
+    Parameters
+    ----------
+    at : Point
+        The best one.
+    converged : bool
+        Whether a further step, shortened or damped where longer ones fail, would change the sum of squares by less
+        than `enough`.
+    iterations : int
+        Evaluations.
+    """
+
+    at: Point
+    converged: bool
+    iterations: int
+
+
+def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int, enough: float) -> Descent:
+    """Minimise |z(v)|² from v.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to minimise.
+    v : ndarray
+        Start; moved inside the bounds.
+    bounds : tuple of ndarray
+        Lower and upper.
+    limit : int
+        Evaluations; whether the last one has converged is not looked at.
+    enough : float
+        Predicted decrease of the sum of squares, relative to it, at which to stop; ten times as much per factor e by
+        which the mean square exceeds 1: what is hopeless is not polished.
+    """
+    now, count, damped = Point(problem, np.clip(v, *bounds)), 1, 0.0
+    now.z  # noqa: B018  # a start that does not survive its simulation raises here
+    while count < limit:
+        power = float(now.z @ now.z)
+        little = enough * power * (1.0 + 10.0 * np.log(max(power / now.z.size, 1.0)))
+        lowest = 0.0
+        for share, damping in _lengths(damped):
+            if share < 1.0 and lowest < share * _TOO_LONG:
+                continue
+            step = share * _damped_step(now, damping, bounds, little)
+            J, z = now.small
+            decrease = power - float(np.sum((z - J @ step) ** 2))
+            if decrease <= little:
+                return Descent(now, True, count)
+            if count >= limit:
+                return Descent(now, False, count)
+            count += 1
+            new = Point(problem, np.clip(now.v + step, *bounds))  # a rounding may lie beyond
+            if _better(new, power - 1e-4 * decrease, count < limit):
+                break
+            lowest = _lowest(now, new, step)
+        else:
+            return Descent(now, False, count)
+        now, damped = new, damping
+    return Descent(now, False, count)
+
+
+def _better(new: Point, power: float, goes_on: bool) -> bool:
+    """Whether the point survives, as its derivatives must if they will be needed, with a smaller sum of squares."""
+    try:
+        if not new.z @ new.z < power:
+            return False
+        if goes_on:
+            new.J  # noqa: B018
+    except (Diverged, InputError):  # beyond what the system accepts or survives
+        return False
+    return True
+
+
+def _lengths(damped: float) -> list[tuple[float, float]]:
+    """Share and damping of the steps tried one after the other, if the step before had to be damped by so much.
+
+    The full step; shorter ones in its direction; then ones that turn away from what the data hardly determine. In a
+    bent valley step after step needs the same damping: it is not looked for again from the beginning.
+    """
+    shares = [(1.0, 0.0)] if damped else [(1.0, 0.0), (0.5, 0.0), (0.25, 0.0)]
+    return shares + [(1.0, damping) for damping in _DAMPINGS if damping > 0.05 * damped]
+
+
+def _lowest(now: Point, new: Point, step: Array) -> float:
+    """Share of a step at which the parabola through both sums of squares is lowest; 0 if the step leads nowhere."""
+    J, z = now.small
+    slope = -2.0 * float(z @ (J @ step))
+    try:
+        bend = float(new.z @ new.z) - float(now.z @ now.z) - slope
+    except (Diverged, InputError):
+        return 0.0
+    return -slope / (2.0 * bend) if np.isfinite(bend) and bend > 0 else 0.0
+
+
+def _damped_step(at: Point, damping: float, bounds: tuple[Array, Array], little: float) -> Array:
+    """Step within the bounds, with Marquardt's damping relative to the squares of the derivatives."""
+    J, z = at.small
+    if damping:
+        J = np.concatenate([J, np.diag(np.sqrt(damping) * np.linalg.norm(J, axis=0))])
+        z = np.append(z, np.zeros(at.v.size))
+    return _step(z, J, at.v, bounds, little)
+
+
+def _step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array], little: float) -> Array:
+    """Least-squares step within the bounds; unknowns that would leave are put on their bound, the rest solved again.
+
+    Where that leaves no decrease to speak of, the best step within the bounds says whether there is one.
+    """
+    step, free = np.zeros(v.size), np.ones(v.size, bool)
+    for _ in range(v.size + 1):
+        step[free] = _solve(J[:, free], z - J[:, ~free] @ step[~free])
+        out = free & ((v + step < bounds[0]) | (v + step > bounds[1]))
+        if not out.any():
+            break
+        step[out] = np.clip(v + step, *bounds)[out] - v[out]
+        free &= ~out
+    if not free.all() and z @ z - np.sum((z - J @ step) ** 2) <= little:
+        return _best_step(z, J, v, bounds)
+    return step
+
+
+def _best_step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Array:
+    """Least-squares step within the bounds, exactly (Stark and Parker's active sets)."""
+    step, free = np.zeros(v.size), bounds[1] > bounds[0]
+    scale = np.linalg.norm(J[:, free], axis=0)
+    scale[scale == 0] = 1.0
+    low, high = ((bound - v)[free] * scale for bound in bounds)
+    step[free] = lsq_linear(J[:, free] / scale, z, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x / scale
+    return step
+
+
+def _solve(J: Array, z: Array) -> Array:
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(J / scale, z, rcond=_FLAT)[0] / scale, np.float64)

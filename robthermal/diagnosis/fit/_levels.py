@@ -1,0 +1,181 @@
+"""Noise levels as nuisance parameters: re-estimated by likelihood, within limits, never free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._fitting import residual, rmse
+from ..data import NoiseFloor
+from ..path import Along, SlowNoise, settled_cost
+
+Array = NDArray[np.float64]
+LARGEST_FACTOR = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
+WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
+_CLOSE = 0.03
+_N_TRIED = 15  # five per cent apart
+_SHARES = np.geomspace(0.25, 1.0, 9)  # never more than the declared noise: it must not swallow physics
+_MEMORIES = np.geomspace(2.0, 30.0, 9)  # samples; what drifts more slowly is physics
+_ROUNDS = 2  # of slow part and levels: each was found with the other
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Factors on the noise levels.
+
+    Parameters
+    ----------
+    disturbance : float
+        On the random heat of all lumps.
+    noise : dict
+        On the noise of every sensor.
+    limit : float
+        Largest factor, and the inverse of the smallest.
+    share : float
+        Standard deviation of a slow part of every sensor's noise, beside the white one, over that of the white one; 0
+        without.
+    memory : float
+        Time constant of the slow part [s].
+    """
+
+    disturbance: float
+    noise: dict[str, float]
+    limit: float = LARGEST_FACTOR
+    share: float = 0.0
+    memory: float = 0.0
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether any level would be higher still, but for the limit."""
+        return max([self.disturbance, *self.noise.values()]) > 0.98 * self.limit
+
+    def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
+        """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
+
+        Parameters
+        ----------
+        path : Along
+            Simulated record.
+        floor : NoiseFloor
+            Declared levels.
+
+        Returns
+        -------
+        tuple of ndarray
+        """
+        noise = np.array([floor.noise[name] * self.noise.get(name, 1.0) for name in path.one.sensors])
+        return noise, self.disturbance * np.array([floor.disturbance.get(name, 0.0) for name in path.system.lumps])
+
+    def slow(self, path: Along, floor: NoiseFloor) -> SlowNoise | None:
+        """Slow part of the noise of the record's sensors, at most as large as the declared noise; None without one.
+
+        Parameters
+        ----------
+        path : Along
+            Simulated record.
+        floor : NoiseFloor
+            Declared levels.
+
+        Returns
+        -------
+        SlowNoise or None
+        """
+        if not self.share:
+            return None
+        declared = np.array([floor.noise[name] for name in path.one.sensors])
+        std = np.minimum(self.share * self.of(path, floor)[0], declared)
+        return SlowNoise(std, float(np.exp(-path.h / self.memory)))
+
+    def close_to(self, other: Levels) -> bool:
+        """Whether all factors agree within three per cent, with the same slow part.
+
+        Parameters
+        ----------
+        other : Levels
+            To compare with.
+
+        Returns
+        -------
+        bool
+        """
+        pairs = [(self.disturbance, other.disturbance)]
+        pairs += [(value, other.noise.get(name, 1.0)) for name, value in self.noise.items()]
+        same = (self.share, self.memory) == (other.share, other.memory)
+        return same and all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
+
+    def __str__(self) -> str:
+        sensors = ", ".join(f"{name} {factor:.2f}" for name, factor in self.noise.items())
+        text = f"noise levels times: {sensors}; random heat {self.disturbance:.2f}"
+        return text if not self.share else (
+            f"{text}; and the noise of every sensor has, besides its white part, a slow part of {self.share:.2f} times "
+            f"its size that remembers {self.memory:.3g} s")
+
+
+def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels:
+    """Most likely factors within the limits, one after the other, once round."""
+    residuals = _residuals(paths)
+    cost = partial(_cost, paths, residuals, floor)
+    tried = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
+    heated = any(floor.disturbance.values())
+    if not heated and not levels.share:
+        return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
+    for name in floor.noise:
+        levels = _best([replace(levels, noise={**levels.noise, name: factor}) for factor in tried], cost)
+    return _best([replace(levels, disturbance=factor) for factor in tried], cost) if heated else levels
+
+
+def with_slow_part(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels | None:
+    """Most likely slow part of the sensors' noise, one for all, and the factors that go with it.
+
+    None if the smallest size or the longest memory tried is the most likely, or if any sensor is more likely to have
+    white noise of the same size: weak physics looks like that, not noise.
+    """
+    cost, h = partial(_cost, paths, _residuals(paths), floor), min(path.h for path in paths)
+    for _ in range(_ROUNDS):
+        levels = _best([replace(levels, share=float(share), memory=float(memory * h))
+                        for share in _SHARES for memory in _MEMORIES], cost)
+        levels = refined(paths, floor, levels)
+    inside = levels.share > _SHARES[0] and levels.memory < _MEMORIES[-1] * h
+    return levels if inside and all(_is_slow(name, paths, floor, levels) for name in floor.noise) else None
+
+
+def _is_slow(name: str, paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> bool:
+    """Whether a slow part of this sensor's noise is more likely than white noise of the same size."""
+    gain = 0.0
+    for path, r in zip(paths, _residuals(paths), strict=True):
+        (noise, disturbance), slow = levels.of(path, floor), levels.slow(path, floor)
+        assert slow is not None
+        own = np.array([sensor == name for sensor in path.one.sensors])
+        white, others = np.where(own, np.hypot(noise, slow.std), noise), replace(slow, std=np.where(own, 0.0, slow.std))
+        gain += settled_cost(path, r, white, disturbance, others) - settled_cost(path, r, noise, disturbance, slow)
+    return gain > 0.0 or not any(name in path.one.sensors for path in paths)
+
+
+def _residuals(paths: Sequence[Along]) -> list[Array]:
+    return [residual(path.one.readings, path.readings[:, path.one.columns]) for path in paths]
+
+
+def _cost(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, levels: Levels) -> float:
+    """-2 log likelihood of the residuals of all records."""
+    return sum(settled_cost(path, r, *levels.of(path, floor), levels.slow(path, floor))
+               for path, r in zip(paths, residuals, strict=True))
+
+
+def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, limit: float
+               ) -> dict[str, float]:
+    """Without random heat the most likely level is the root mean square of the residual."""
+    out = {}
+    for name, level in floor.noise.items():
+        own = [r[:, path.one.sensors.index(name)] for path, r in zip(paths, residuals, strict=True)
+               if name in path.one.sensors]
+        ratio = rmse(own) / level
+        out[name] = float(np.clip(ratio, 1.0 / limit, limit))
+    return out
+
+
+def _best(tried: list[Levels], cost: Callable[[Levels], float]) -> Levels:
+    return min(tried, key=cost)

@@ -1,0 +1,230 @@
+"""Result of stage 2: a structure fitted to the records, and what is left after the nominal parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._fitting import residual, rmse
+from ...errors import Outcome
+from ...thermal import System
+from ..data import NoiseFloor
+from ..effects import Candidate
+from ..path import Along, AlongResponse
+from ._levels import Levels
+from ._sessions import session_table
+from ._structure import Structure
+from ._whitened import White, Whitened
+
+Array = NDArray[np.float64]
+Path = Along | AlongResponse
+_FLAT = 1e-9  # relative size of a direction of J that counts as none
+_CONTRADICTED = 6.0  # standard deviations of a prior
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A structure fitted to the records, with everything the tests need.
+
+    Parameters
+    ----------
+    structure : Structure
+        Unknowns.
+    v : ndarray
+        Their values.
+    floor : NoiseFloor
+        Where the noise levels came from.
+    levels : Levels
+        Factors on them, re-estimated within limits.
+    paths : tuple of Along or AlongResponse
+        Linearisation along every record; the modelled frequency response beside every measured one.
+    whiteners : tuple of Whitener or ResponseWhitener
+        One per record or frequency response.
+    z : ndarray, shape (m,)
+        Whitened residuals of all readings, then of the priors.
+    outcome : Outcome
+        Codes "converged", "not_converged" (not ok).
+    """
+
+    structure: Structure
+    v: Array
+    floor: NoiseFloor
+    levels: Levels
+    paths: tuple[Path, ...]
+    whiteners: tuple[White, ...]
+    z: Array
+    outcome: Outcome
+
+    @cached_property
+    def J(self) -> Array:
+        """Whitened derivatives, (m, p)."""
+        return Whitened(self.structure, self.whiteners).slopes(self.v)
+
+    @cached_property
+    def system(self) -> System:
+        """Refitted system."""
+        return self.structure.system(self.v)
+
+    @property
+    def n_readings(self) -> int:
+        """Readings in all records."""
+        return self.structure.n_readings
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal basis (m, r) of what the unknowns can explain."""
+        scale = np.linalg.norm(self.J, axis=0)
+        U, s, _ = np.linalg.svd(self.J / np.where(scale > 0, scale, 1.0), full_matrices=False)
+        return U[:, s > _FLAT * s[0]]
+
+    @cached_property
+    def rest(self) -> Array:
+        """Whitened residual that the unknowns cannot explain, (m,)."""
+        return self.project(self.z)
+
+    def project(self, columns: Array) -> Array:
+        """Remove from columns what the unknowns can explain.
+
+        Parameters
+        ----------
+        columns : ndarray, shape (m, ...)
+            Whitened.
+
+        Returns
+        -------
+        ndarray, shape (m, ...)
+        """
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    @property
+    def rss(self) -> float:
+        """Sum of squares of the whitened residuals, priors included."""
+        return float(self.z @ self.z)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Rows less missing readings and directions fitted."""
+        return self.z.size - self.basis.shape[1] - sum(
+            int(path.one.missing.sum()) for path in self.along if path.one.missing is not None)
+
+    @property
+    def variance(self) -> float:
+        """Whitened variance [-]: 1 if the model and its noise are right."""
+        return self.rss / self.degrees_of_freedom
+
+    def whiten(self, per_record: Sequence[Array]) -> Array:
+        """Whiten changes of the readings; the rows of the priors are 0.
+
+        Parameters
+        ----------
+        per_record : sequence of ndarray, shape (n, n_sensors, k)
+            One per record [K]; (2 n_b, m, k) for a frequency response.
+
+        Returns
+        -------
+        ndarray, shape (m, k)
+        """
+        k = per_record[0].shape[2]
+        rows = [w(r).reshape(-1, k) for w, r in zip(self.whiteners, per_record, strict=True)]
+        return np.concatenate([*rows, np.zeros((self.z.size - self.n_readings, k))])
+
+    def innovations(self) -> list[Array]:
+        """Whitened residuals of every record, (n, n_sensors)."""
+        out, row = [], 0
+        for one in self.structure.data:
+            out.append(self.z[row:row + one.readings.size].reshape(one.readings.shape))
+            row += one.readings.size
+        return out
+
+    @cached_property
+    def residuals(self) -> tuple[Array, ...]:
+        """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]; of a response (2 n_b, m)."""
+        return tuple(residual(path.one.readings, path.readings[:, path.one.columns]) for path in self.paths)
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the free-run residual over all sensors of the records [K].
+
+        Without any record: of the whitened residual of the responses, in standard deviations of their noise.
+        """
+        if not self.along:
+            return rmse([self.z[:self.n_readings]])
+        return rmse(r for path, r in zip(self.paths, self.residuals, strict=True) if isinstance(path, Along))
+
+    @property
+    def along(self) -> tuple[Along, ...]:
+        """Linearisations along the records, without the frequency responses."""
+        return tuple(path for path in self.paths if isinstance(path, Along))
+
+    @property
+    def unit(self) -> str:
+        """Unit of `rms`."""
+        return "K" if self.along else "standard deviations"
+
+    def testable(self, tested: Iterable[Candidate]) -> list[Candidate]:
+        """Candidates that these data may show.
+
+        Parameters
+        ----------
+        tested : iterable of Candidate
+            All.
+
+        Returns
+        -------
+        list of Candidate
+        """
+        return [candidate for candidate in tested if not self.structure.hides(candidate)]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the unknowns, (p, p), in the optimiser's coordinates, scaled by the whitened variance."""
+        scale = np.linalg.norm(self.J, axis=0)
+        scale[scale == 0] = 1.0
+        # of J, not of JᵀJ: its rounding would make variances negative where the data tell next to nothing
+        _, s, Vt = np.linalg.svd(self.J / scale, full_matrices=False)
+        root = (Vt[s > _FLAT * s[0]] / s[s > _FLAT * s[0], None]).T / scale[:, None]
+        return np.asarray(root @ root.T * max(self.variance, 1.0), np.float64)
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Priors that the records contradict, a sentence each: by more than six standard deviations.
+
+        With the leverage h of a prior's row its residual r has the variance 1 - h, so that r / sqrt(1 - h) is the
+        distance between the prior and what everything else says, in standard deviations of that distance.
+        """
+        ranges = self.structure.ranges
+        known = np.flatnonzero(np.isfinite(ranges.sigma))
+        rows = slice(self.n_readings, self.n_readings + known.size)
+        free = 1.0 - np.sum(self.basis[rows] ** 2, axis=1)
+        distance = np.abs(self.z[rows]) / np.sqrt(np.maximum(free, 1e-9) * max(self.variance, 1.0))
+        values = ranges.values(self.v[:len(ranges.names)])
+        return tuple(f"The prior of {ranges.names[i]} is contradicted by the records: {ranges.start[i]:.6g} ± "
+                     f"{ranges.sigma[i]:.2g} declared, {values[i]:.6g} fitted, {far:.0f} standard deviations from what "
+                     "the records say without it." for i, far in zip(known, distance, strict=True)
+                     if far > _CONTRADICTED)
+
+    def __str__(self) -> str:
+        ranges = self.structure.ranges
+        values = ranges.values(self.v[:len(ranges.names)])
+        lines = [f"{name} = {value:.6g}" for name, value in zip(ranges.names, values, strict=True)]
+        labels = [path.one.label for path in self.along]
+        gains = [g for path, g in zip(self.paths, self.structure.gains(self.v), strict=True) if isinstance(path, Along)]
+        lines += session_table(self.structure.sessions, labels, gains)
+        lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), rms {self.rms:.4g} {self.unit}")
+        return "\n".join([*lines, str(self.levels), *self.contradictions, str(self.outcome)])
+
+    def plot(self) -> Any:
+        """Residuals of every record against time [K], of every response against frequency; returns the axes."""
+        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+        _, axes = plt.subplots(len(self.paths), 1, squeeze=False, layout="constrained")
+        for ax, path, r in zip(axes[:, 0], self.paths, self.residuals, strict=True):
+            path.draw(ax, r)
+            ax.set(title=path.one.label)
+            ax.legend(fontsize="small")
+        return axes[:, 0]

@@ -1,0 +1,151 @@
+"""Stage 2: refit a structure to the records with its priors, filters and noise levels renewed at the estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._fitting import NONE, Choice, chosen_ranges
+from ...errors import Diverged, InputError, Outcome
+from ...thermal import System
+from ..data import Measured, NoiseFloor, ResponseData, as_measured, noise_floor, without_glitches
+from ..path import Along, AlongResponse, along, along_response, whitener
+from ._descent import Descent, descend
+from ._levels import Levels, refined
+from ._refit import Path, Refit
+from ._sessions import SessionGain, sessions_of
+from ._structure import Structure, start_of, structure_of
+from ._whitened import White, Whitened
+
+Array = NDArray[np.float64]
+LIMIT = 40  # evaluations of a refit
+ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
+_ROUNDS = 3  # of filter and noise levels
+
+
+def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFloor | None = None, *,
+          parameters: Choice = None, operating_point: Mapping[str, float] | None = None,
+          session_gain: SessionGain = False) -> Refit:
+    """Refit the nominal parameters and the initial temperatures to the records, with their priors.
+
+    Parameters
+    ----------
+    system : System
+        Nominal. `sigma` in its fit table are the priors.
+    records : Record, FrequencyResponse, or list of them
+        Measured.
+    floor : NoiseFloor, optional
+        From `noise_floor`.
+    parameters : iterable or mapping, optional
+        As in `rt.calibrate`. Default: the fit table; without one, all parameters are taken as known.
+    operating_point : mapping, optional
+        For frequency responses: mean heaters [unit], module currents [A] and ambients [K] of the experiment; default
+        off and nominal.
+    session_gain : bool or mapping
+        Whether every record has a gain of its own of every heater and module: True, with a prior of 5 %, or a mapping
+        from input to the standard deviation of its gain [-].
+
+    Returns
+    -------
+    Refit
+
+    Raises
+    ------
+    InputError
+        As `noise_floor`; a nominal model that runs away; priors that contradict the bounds.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
+    >>> drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
+    ...                   output_names=[])
+    >>> run = rt.thermal.simulate(bar, drive)
+    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> fit = rt.diagnosis.refit(bar, noisy, parameters={"lumps.bar.capacity": (10.0, 500.0)})
+    >>> 0.8 < fit.variance < 1.2
+    True
+    """
+    floor = noise_floor(system, records) if floor is None else floor
+    data = without_glitches(system, as_measured(system, records, "records", operating_point), floor.noise)
+    ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
+    starts = [start_of(system, one) for one in data]
+    structure = structure_of(system, ranges, data, starts, sessions_of(system, session_gain))
+    n_unknown = structure.n_parameters + structure.n_own
+    if structure.n_readings <= 2 * n_unknown:
+        raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
+                         expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
+    try:
+        return fitted(structure, structure.start(ranges.start, []), floor, Levels(1.0, {}))
+    except Diverged as error:
+        raise InputError(f"the nominal model runs away: {error}", where="argument system",
+                         remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
+
+
+def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) -> Refit:
+    """Fit from v; filter and noise levels are renewed at the estimate, and the fit repeated."""
+    for _ in range(_ROUNDS):
+        paths, whiteners = filters(structure, v, floor, levels)
+        found = minimised(structure, v, whiteners)
+        v = found.at.v
+        paths = paths_of(structure, v)
+        new = _refined(paths, floor, levels)
+        if new.close_to(levels):
+            break
+        levels = new
+    paths, whiteners = filters(structure, v, floor, levels)
+    z = Whitened(structure, whiteners).residual(v)
+    return Refit(structure, v, floor, levels, paths, whiteners, z, _outcome(found))
+
+
+def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
+    """Fit another structure with the same filters, so that sums of squares can be compared."""
+    found = minimised(structure, v, fit.whiteners, limit)
+    return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
+
+
+def relinearised(fit: Refit) -> Refit:
+    """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
+    return replace(fit, paths=paths_of(fit.structure, fit.v))
+
+
+def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
+            ) -> tuple[tuple[Path, ...], tuple[White, ...]]:
+    """Linearisation and filter of every record; whitener of every response."""
+    paths = paths_of(structure, v)
+    return paths, tuple(path.one.white if isinstance(path, AlongResponse) else
+                        whitener(path, *levels.of(path, floor), levels.slow(path, floor)) for path in paths)
+
+
+def paths_of(structure: Structure, v: Array) -> tuple[Path, ...]:
+    """Linearisation along every record; the modelled response beside every measured one."""
+    return tuple(along_response(system, one) if isinstance(one, ResponseData) else run.path or along(system, one)
+                 for system, one, run in zip(structure.systems(v), structure.data, structure.runs(v), strict=True))
+
+
+def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels:
+    """Noise levels of the records; those of responses come with them."""
+    records = [path for path in paths if isinstance(path, Along)]
+    if not records:
+        return levels
+    sensors = {name for path in records for name in path.one.sensors}
+    return refined(records, replace(floor, noise={name: floor.noise[name] for name in floor.noise if name in sensors}),
+                   levels)
+
+
+def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
+    """Gauss-Newton with fixed filters."""
+    return descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH)
+
+
+def _outcome(found: Descent) -> Outcome:
+    if found.converged:
+        return Outcome(True, "converged", f"Converged in {found.iterations} evaluations.")
+    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow "
+                   "the bounds, or give priors (sigma) to parameters the data do not determine.")

@@ -1,0 +1,107 @@
+"""Every record its own gain of every input: days differ, and that is no physics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...thermal import System
+from ..effects import Candidate
+
+Array = NDArray[np.float64]
+SessionGain = bool | Mapping[str, float]
+SIGMA = 0.05  # relative
+_FARTHEST = 0.9  # relative: an input never vanishes
+
+
+@dataclass(frozen=True)
+class Sessions:
+    """Nuisance gains of every record, with their priors; unknowns in units of the prior.
+
+    Parameters
+    ----------
+    inputs : tuple of str
+        Heaters and modules whose gain may differ from record to record.
+    numbers : tuple of str
+        The system's number behind each.
+    sigma : tuple of float
+        Prior standard deviation of each gain [-].
+    """
+
+    inputs: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
+    sigma: tuple[float, ...] = ()
+
+    @property
+    def n_free(self) -> int:
+        """Unknowns of every record."""
+        return len(self.inputs)
+
+    @property
+    def reach(self) -> Array:
+        """Bound of every unknown, in units of its prior."""
+        return np.array([min(20.0, _FARTHEST / sigma) for sigma in self.sigma])
+
+    def applied(self, system: System, g: Array) -> System:
+        """System as it was in one session.
+
+        Parameters
+        ----------
+        system : System
+            Common to all.
+        g : ndarray, shape (n_free,)
+            Gains in units of their priors.
+
+        Returns
+        -------
+        System
+        """
+        if not self.inputs:
+            return system
+        return system.with_parameters({name: system.parameter(name) + sigma * float(value)
+                                       for name, sigma, value in zip(self.numbers, self.sigma, g, strict=True)})
+
+    def hides(self, candidate: Candidate) -> str:
+        """Why an effect cannot be told from the sessions' gains; empty if it can."""
+        if candidate.effect.name == "input_gain" and candidate.where[0] in self.inputs:
+            return "every session has a gain of its own for this input"
+        return ""
+
+
+def sessions_of(system: System, session_gain: SessionGain) -> Sessions:
+    """Check the argument: which inputs, and how far their gains may be from 1.
+
+    Parameters
+    ----------
+    system : System
+        Nominal.
+    session_gain : bool or mapping
+        True: 5 % for every heater and module. A mapping: from input to standard deviation [-].
+    """
+    driven = (*system.inputs, *system.modules)
+    table = dict.fromkeys(driven, SIGMA) if session_gain is True else session_gain or {}
+    if not isinstance(table, Mapping):
+        raise InputError(f"session_gain is {session_gain!r}", where="argument session_gain",
+                         expected="True, False, or a mapping from input to standard deviation")
+    for name, sigma in table.items():
+        if name not in driven:
+            raise InputError(f"there is no input {name!r}", where="argument session_gain",
+                             expected="some of " + ", ".join(driven))
+        number = not isinstance(sigma, bool) and isinstance(sigma, int | float)
+        if not number or not (math.isfinite(sigma) and sigma > 0):
+            raise InputError(f"the standard deviation of the gain of {name!r} is {sigma!r}",
+                             where="argument session_gain", expected="a positive number, 0.05 for 5 %")
+    numbers = tuple(f"{'inputs' if name in system.inputs else 'modules'}.{name}.drive.gain" for name in table)
+    return Sessions(tuple(table), numbers, tuple(float(sigma) for sigma in table.values()))
+
+
+def session_table(sessions: Sessions, labels: Sequence[str], gains: Sequence[Array]) -> list[str]:
+    """Estimated gains of every record, in words."""
+    return [f"session {label}: " + ", ".join(f"{name} × {1.0 + sigma * float(value):.4g}" for name, sigma, value in
+                                             zip(sessions.inputs, sessions.sigma, g, strict=True))
+            for label, g in zip(labels, gains, strict=True)] if sessions.inputs else []

@@ -1,0 +1,363 @@
+"""Unknowns of a refit: nominal parameters, quantities of the added effects, and what is every record's own.
+
+A record's own are its initial temperatures and its session gains; a frequency response has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._fitting import Data, Initial, Ranges, Start, initial_of, residual, start_values
+from ...errors import InputError
+from ...thermal import System, Trajectory, trajectory
+from ..data import ResponseData
+from ..effects import Candidate
+from ..path import Along, along, hidden_from_response, response_slopes
+from ._sessions import Sessions
+
+Array = NDArray[np.float64]
+_KEPT = 2
+_STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+_UNLIKE = 0.01  # of a change: more than the curvature of a step makes
+NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One record simulated: residual measured - modelled, (n, n_sensors) [K].
+
+    Of a frequency response: (2 n_b, m), see `ResponseData.readings`.
+    """
+
+    residual: Array
+    trajectory: Trajectory | None = None
+    path: Along | None = None
+
+
+@dataclass(eq=False)
+class _Lately:
+    """What has been computed at some unknowns."""
+
+    runs: list[Run]
+    slopes: list[Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The nominal system with some effects; what may change in it, and where the priors are.
+
+    Parameters
+    ----------
+    base : System
+        Nominal system with its starting values.
+    ranges : Ranges
+        Nominal parameters that may change.
+    data : tuple of Data or ResponseData
+        Records and frequency responses.
+    starts : tuple of Initial
+        Prior of every record's initial temperatures.
+    effects : tuple of Candidate
+        What has been added.
+    tolerance : float
+        Of the simulation [K].
+    sessions : Sessions
+        Gains of their own that the records may have.
+    """
+
+    base: System
+    ranges: Ranges
+    data: tuple[Data | ResponseData, ...]
+    starts: tuple[Initial, ...]
+    effects: tuple[Candidate, ...] = ()
+    tolerance: float = 1e-4
+    sessions: Sessions = Sessions()
+    _last: dict[bytes, _Lately] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of nominal parameters."""
+        return len(self.ranges.names)
+
+    @property
+    def n_effects(self) -> int:
+        """Number of quantities of all effects."""
+        return sum(len(c.effect.free) for c in self.effects)
+
+    @property
+    def n_readings(self) -> int:
+        """Readings in all records; a frequency response counts two per complex number."""
+        return sum(one.readings.size for one in self.data)
+
+    @property
+    def certainty(self) -> float:
+        """Degrees of freedom of the sum of squares, per reading: below 1 where the noise is itself an estimate."""
+        sure = [one.readings.size * (one.certainty if isinstance(one, ResponseData) else 1.0) for one in self.data]
+        return sum(sure) / self.n_readings
+
+    @property
+    def n_starts(self) -> int:
+        """Number of unknown initial temperatures in all records."""
+        return sum(start.n_free for start in self.starts)
+
+    @property
+    def n_own(self) -> int:
+        """Number of unknowns that belong to one record each: initial temperatures, then session gains."""
+        return self.n_starts + self.sessions.n_free * sum(isinstance(one, Data) for one in self.data)
+
+    def quantities(self, v: Array) -> list[dict[str, float]]:
+        """Quantities of every effect by name."""
+        out, at = [], self.n_parameters
+        for candidate in self.effects:
+            q = dict(candidate.shape)
+            for quantity in candidate.effect.free:
+                q[quantity.name] = float(np.exp(v[at]) if quantity.lower > 0 else v[at])
+                at += 1
+            out.append(q)
+        return out
+
+    def start(self, parameters: Array, quantities: Sequence[dict[str, float]]) -> Array:
+        """Unknowns from values; initial temperatures at the centre of their priors."""
+        coordinates = [np.log(q[quantity.name]) if quantity.lower > 0 else q[quantity.name]
+                       for candidate, q in zip(self.effects, quantities, strict=True)
+                       for quantity in candidate.effect.free]
+        return np.concatenate([self.ranges.coordinates(parameters), coordinates, np.zeros(self.n_own)])
+
+    def carried(self, other: Structure, v: Array, quantities: Sequence[dict[str, float]]) -> Array:
+        """Unknowns at the parameters and initial temperatures of another structure; a lump that it lacks starts at its
+        prior.
+        """
+        out = self.start(other.ranges.values(v[:other.n_parameters]), quantities)
+        at = self.n_parameters + self.n_effects
+        known = other.temperatures(v)
+        for start, T in zip(self.starts, known, strict=True):
+            if start.n_free:
+                n = min(start.mean.size, T.size)
+                out[at:at + n] = (T[:n] - start.mean[:n]) / start.sigma
+            at += start.n_free
+        n_gains = self.n_own - self.n_starts
+        out[out.size - n_gains:] = v[v.size - n_gains:]
+        return out
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds of the unknowns."""
+        lower, upper = [], []
+        for candidate in self.effects:
+            for quantity in candidate.effect.free:
+                log = quantity.lower > 0
+                lower.append(np.log(quantity.lower) if log else quantity.lower)
+                upper.append(np.log(quantity.upper) if log else quantity.upper)
+        n_sessions = sum(isinstance(one, Data) for one in self.data)
+        reach = np.concatenate([np.full(self.n_starts, 20.0), np.tile(self.sessions.reach, n_sessions)])
+        q = self.ranges.coordinates
+        return (np.concatenate([q(self.ranges.lower), lower, -reach]),
+                np.concatenate([q(self.ranges.upper), upper, reach]))
+
+    def system(self, v: Array) -> System:
+        """Nominal system at these parameters with the effects added."""
+        values = np.clip(self.ranges.values(v[:self.n_parameters]), self.ranges.lower, self.ranges.upper)  # a rounding
+        system = self.base.with_parameters(self.ranges.assigned(values)) if self.n_parameters else self.base
+        for candidate, q in zip(self.effects, self.quantities(v), strict=True):
+            system = candidate.effect.add(system, candidate.where, q)
+        return system
+
+    def temperatures(self, v: Array) -> list[Array]:
+        """Initial lump temperatures of every record [K]; empty for a frequency response."""
+        out, at = [], self.n_parameters + self.n_effects
+        for start in self.starts:
+            free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0
+            out.append(start.mean + free)
+            at += start.n_free
+        return out
+
+    def systems(self, v: Array) -> list[System]:
+        """System of every record, with its initial temperatures and session gains; of a response, the common one."""
+        system = self.system(v)
+        return [system if isinstance(one, ResponseData) else
+                self.sessions.applied(system.with_parameters(start_values(system, T)), g)
+                for one, T, g in zip(self.data, self.temperatures(v), self.gains(v), strict=True)]
+
+    def gains(self, v: Array) -> list[Array]:
+        """Session gains of every record, in units of their priors; empty for a frequency response."""
+        out, at = [], v.size - (self.n_own - self.n_starts)
+        for one in self.data:
+            n = self.sessions.n_free if isinstance(one, Data) else 0
+            out.append(v[at:at + n])
+            at += n
+        return out
+
+    def runs(self, v: Array) -> list[Run]:
+        """All records simulated; the last few are kept: filters and noise levels change more often than unknowns."""
+        return self._lately(v).runs
+
+    def slopes(self, v: Array) -> list[Array]:
+        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all records; kept too."""
+        lately = self._lately(v)
+        if lately.slopes is None:
+            lately.slopes = self._slopes(v, lately.runs)
+        return lately.slopes
+
+    def _lately(self, v: Array) -> _Lately:
+        key = v.tobytes()
+        if key not in self._last:
+            while len(self._last) >= _KEPT:
+                del self._last[next(iter(self._last))]
+            self._last[key] = _Lately([self._run(*each) for each in zip(self.systems(v), self.data, strict=True)])
+        return self._last[key]
+
+    def _run(self, system: System, one: Data | ResponseData) -> Run:
+        if isinstance(one, ResponseData):
+            return Run(residual(one.readings, one.model(system)))
+        run = trajectory(system, one.record, tolerance=self.tolerance)
+        return Run(residual(one.readings, run.readings[:, one.columns]), run, along(system, one, run))
+
+    def _slopes(self, v: Array, runs: Sequence[Run]) -> list[Array]:
+        names, chain = self._chain(v)
+        at, gain_at, out = self.n_parameters + self.n_effects, v.size - (self.n_own - self.n_starts), []
+        own = [number for number in self.sessions.numbers if number not in names]
+        gains = [[*names, *own].index(number) for number in self.sessions.numbers]
+        for run, one, start in zip(runs, self.data, self.starts, strict=True):
+            if isinstance(one, ResponseData):
+                out.append(self._response_slopes(v, one))
+                continue
+            assert run.trajectory is not None
+            initial = [f"lumps.{lump}.initial" for lump in run.trajectory.system.lumps] if start.n_free else []
+            J = run.trajectory.derivative([*names, *own, *initial])[:, one.columns]
+            slopes = np.zeros((*J.shape[:2], v.size))
+            slopes[..., :chain.shape[1]] = J[..., :len(names)] @ chain
+            slopes[..., at:at + start.n_free] = J[..., len(names) + len(own):] * start.sigma
+            slopes[..., gain_at:gain_at + len(gains)] = J[..., gains] * self.sessions.sigma
+            out.append(slopes)
+            at, gain_at = at + start.n_free, gain_at + len(gains)
+        return out
+
+    def _response_slopes(self, v: Array, one: ResponseData) -> Array:
+        """Of a frequency response: differences of second order."""
+        n = self.n_parameters + self.n_effects
+        steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
+        slopes = np.zeros((*one.readings.shape, v.size))
+        slopes[..., :n] = response_slopes(lambda moved: one.model(self.system(moved)), v, steps, self.bounds)
+        return slopes
+
+    @property
+    def _typical(self) -> Array:
+        """A small value of every effect's coordinate."""
+        return np.array([1.0 if quantity.lower > 0 else quantity.typical for candidate in self.effects
+                         for quantity in candidate.effect.free])
+
+    def prior(self, v: Array) -> tuple[Array, Array]:
+        """Distances from the priors' centres, in standard deviations, with the sign of `Run`, and their derivatives."""
+        known = np.flatnonzero(np.isfinite(self.ranges.sigma))
+        n_free = self.n_own
+        first = self.n_parameters + self.n_effects
+        values = self.ranges.values(v[:self.n_parameters])
+        J = np.zeros((known.size + n_free, v.size))
+        J[np.arange(known.size), known] = self.ranges.prior_slopes(values)[known]
+        J[known.size:, first:] = np.eye(n_free)
+        return -np.concatenate([self.ranges.prior(values), v[first:]]), J
+
+    def with_effect(self, candidate: Candidate) -> Structure:
+        """The same with one more effect; a new lump gets an initial temperature of its own."""
+        return self.with_effects((*self.effects, candidate))
+
+    def with_effects(self, effects: tuple[Candidate, ...]) -> Structure:
+        """The same base with these effects."""
+        system = self.base
+        for candidate in effects:
+            system = candidate.add(system, candidate.effect.size.typical)
+        starts = tuple(start if isinstance(one, ResponseData) or start.mean.size == len(system.lumps) else
+                       initial_of(system, one, "free" if start.n_free else "measured")
+                       for one, start in zip(self.data, self.starts, strict=True))
+        return replace(self, effects=effects, starts=starts)
+
+    def hides(self, candidate: Candidate) -> str:
+        """Why an effect is not tried on these data, known before they are looked at; empty if it is.
+
+        Parameters
+        ----------
+        candidate : Candidate
+            Any.
+
+        Returns
+        -------
+        str
+        """
+        if any(part in self._added for part in candidate.where):
+            return "it would act on a part that another effect has added"
+        responses = all(isinstance(one, ResponseData) for one in self.data)
+        return (responses and hidden_from_response(self.base, candidate)) or self.sessions.hides(candidate)
+
+    @cached_property
+    def _added(self) -> frozenset[str]:
+        """Lumps and links that the effects have added."""
+        system = self.base
+        for candidate in self.effects:
+            system = candidate.add(system, candidate.effect.size.typical)
+        before, after = ({*one.lumps, *(link.name for link in one.links)} for one in (self.base, system))
+        return frozenset(after - before)
+
+    def _chain(self, v: Array) -> tuple[list[str], Array]:
+        """The system's numbers that depend on parameters and quantities, and their derivatives by these coordinates."""
+        p, n = self.n_parameters, self.n_parameters + self.n_effects
+        here = self.system(v)
+        names = dict.fromkeys(self.ranges.flat)
+        columns: list[dict[str, float]] = []
+        slopes = self.ranges.slopes(self.ranges.values(v[:p]))
+        for group, slope in zip(self.ranges.members, slopes, strict=True):
+            columns.append({name: float(slope) for name in group})
+        if self.n_effects:
+            values = here.parameters
+            for i in range(p, n):
+                moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-6)
+                step = -step if v[i] + step > self.bounds[1][i] else step
+                moved[i] += step
+                other = self.system(moved).parameters
+                columns.append({name: (other[name] - values[name]) / step for name in values
+                                if other[name] != values[name]})
+            if _derives(self, v, values, columns[:p]):
+                for i in range(p):  # what an effect derives from a nominal parameter moves with it
+                    columns[i] = _moved_by(self, v, i, values, columns[i])
+        for column in columns:
+            names |= dict.fromkeys(column)
+        return list(names), np.array([[column.get(name, 0.0) for column in columns] for name in names]
+                                     ).reshape(len(names), n)
+
+
+def _derives(structure: Structure, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
+    """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?"""
+    p = len(columns)
+    steps = _STEP * np.maximum(np.abs(v[:p]), 1e-3)
+    moved = structure.system(np.concatenate([v[:p] + steps, v[p:]])).parameters
+    known = dict.fromkeys(values, 0.0)
+    for step, column in zip(steps, columns, strict=True):
+        for name, slope in column.items():
+            known[name] += float(step) * slope
+    changes = {name: moved[name] - value for name, value in values.items()}
+    return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
+
+
+def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], own: dict[str, float]
+              ) -> dict[str, float]:
+    moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-3)
+    moved[i] += step
+    other = structure.system(moved).parameters
+    return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
+
+
+def start_of(system: System, one: Data | ResponseData, start: Start = "free") -> Initial:
+    """Prior of the initial temperatures; a frequency response has none."""
+    return NO_START if isinstance(one, ResponseData) else initial_of(system, one, start)
+
+
+def structure_of(system: System, ranges: Ranges, data: Sequence[Data | ResponseData], starts: Sequence[Initial],
+                 sessions: Sessions) -> Structure:
+    """Nominal structure, checked: the system must be small enough for derivatives."""
+    if len(system.lumps) > 100:
+        raise InputError(f"a network of {len(system.lumps)} lumps", where="argument system", expected="at most 100",
+                         remedy="Reduce the model first (rt.thermal.reduce).")
+    return Structure(system, ranges, tuple(data), tuple(starts), sessions=sessions)

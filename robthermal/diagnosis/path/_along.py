@@ -1,0 +1,232 @@
+"""A system linearised along a simulated record: how readings answer to a small extra heat, sample by sample.
+
+dδ/dt = E⁻¹(∂f/∂x δ + q): with ∂f/∂x frozen at the middle of each sample and the extra heat q linear within it, the step
+is exact, δ(k+1) = A δ(k) + h φ₁(Mh) q₀ + h φ₂(Mh)(q₁ - q₀). All candidates go through the recursion together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from ..._fitting import Data
+from ...errors import InputError
+from ...thermal import Equations, System, Trajectory, trajectory
+from ..effects import Response
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+_SAME = 1e-4  # change of a rate times the sample time [-]
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A simulated record and the system linearised along it.
+
+    Parameters
+    ----------
+    system : System
+        With the record's initial temperatures.
+    one : Data
+        The record and its sensors.
+    x : ndarray, shape (n, n_lumps)
+        Simulated lump temperatures [K].
+    readings : ndarray, shape (n, n_sensors)
+        Simulated readings of all sensors of the system [K].
+    u : ndarray, shape (n, n_u)
+        Held inputs, in the order of `System.exogenous_names`.
+    """
+
+    system: System
+    one: Data
+    x: Array
+    readings: Array
+    u: Array
+
+    @property
+    def h(self) -> float:
+        """Sample time [s]."""
+        return self.one.record.sample_time
+
+    @property
+    def time(self) -> Array:
+        """Time of every sample [s]."""
+        return self.one.record.time
+
+    @property
+    def reference(self) -> float:
+        """Temperature about which sensor gains act [K]."""
+        return next(iter(self.system.ambients.values())).temperature
+
+    @property
+    def span(self) -> float:
+        """Length of the record [s]."""
+        return len(self.x) * self.h
+
+    def draw(self, ax: Any, r: Array) -> None:
+        """Draw residuals (n, n_sensors) [K] against time.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes
+            Where.
+        r : ndarray, shape (n, n_sensors)
+            Residuals [K].
+        """
+        ax.plot(self.time, r, linewidth=0.7, label=self.one.sensors)
+        ax.set(xlabel="time [s]", ylabel="measured − model [K]")
+
+    @cached_property
+    def equations(self) -> Equations:
+        """Equations of the system."""
+        return Equations(self.system)
+
+    @cached_property
+    def end(self) -> Array:
+        """Lump temperatures at the end of every sample (n, n_lumps) [K]."""
+        return np.concatenate([self.x[1:], self.x[-1:]])
+
+    @cached_property
+    def lags(self) -> list[str]:
+        """Sensors with a state of their own."""
+        return [name for name, sensor in self.system.sensors.items() if sensor.time_constant > 0]
+
+    @cached_property
+    def M(self) -> Array:
+        """Rate of the deviations of lumps and lagged sensors, (n, n_z, n_z) [1/s]."""
+        n, nl = self.x.shape
+        nz = nl + len(self.lags)
+        M = np.zeros((n, nz, nz))
+        slopes = _heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u)
+        M[:, :nl, :nl] = slopes / self.equations.capacity[:, None]
+        for row, name in enumerate(self.lags, start=nl):
+            sensor = self.system.sensors[name]
+            M[:, row, row] = -1.0 / sensor.time_constant
+            M[:, row, self.system.lump_names.index(sensor.lump)] = 1.0 / sensor.time_constant
+        return M
+
+    @cached_property
+    def kinds(self) -> tuple[Array, Places]:
+        """The different rates among the samples, (n_kinds, n_z, n_z), and which one each sample has, (n,).
+
+        Rates that differ by less than 1e-4 of a sample are one: a held current has one matrix, not one per sample.
+        """
+        rounded = np.round(self.M * (self.h / _SAME)).reshape(len(self.M), -1)
+        _, first, kind = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        return self.M[first], kind.reshape(-1)
+
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array]:
+        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end."""
+        M, kind = self.kinds
+        Mh = M * self.h
+        A = expm(Mh)
+        one = np.eye(A.shape[1])
+        phi1 = np.linalg.solve(Mh, A - one)
+        phi2 = np.linalg.solve(Mh, phi1 - one)
+        nl = self.x.shape[1]
+        per_watt = self.h / self.equations.capacity
+        return A[kind], ((phi1 - phi2)[..., :nl] * per_watt)[kind], (phi2[..., :nl] * per_watt)[kind]
+
+    @cached_property
+    def C(self) -> Array:
+        """What the sensors in the record read of the states, (n_sensors, n_z)."""
+        C = np.zeros((len(self.one.sensors), self.M.shape[1]))
+        for i, name in enumerate(self.one.sensors):
+            sensor = self.system.sensors[name]
+            state = (self.x.shape[1] + self.lags.index(name) if name in self.lags
+                     else self.system.lump_names.index(sensor.lump))
+            C[i, state] = sensor.gain
+        return C
+
+    def heat_of(self, system: System) -> tuple[Array, Array]:
+        """Extra heat of a changed system, at the start and at the end of every sample.
+
+        Parameters
+        ----------
+        system : System
+            With the same lumps.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n, n_lumps)
+            [W].
+        """
+        other = Equations(system)
+        return (other.heat(self.x, self.u) - self.equations.heat(self.x, self.u),
+                other.heat(self.end, self.u) - self.equations.heat(self.end, self.u))
+
+    def readings_of(self, responses: list[Response]) -> Array:
+        """Change of the record's sensors that each response causes.
+
+        Parameters
+        ----------
+        responses : list of Response
+            Of m effects; some dozens, so that they stay in the cache.
+
+        Returns
+        -------
+        ndarray, shape (n, n_sensors, m)
+            [K].
+        """
+        n, nl = self.x.shape
+        start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
+        for j, response in enumerate(responses):
+            if response.heat is not None:
+                start[..., j], end[..., j] = response.heat
+        out = self.answer(start, end)
+        for j, response in enumerate(responses):
+            if response.reading is not None:
+                out[..., j] += response.reading[:, self.one.columns]
+        return out
+
+    def answer(self, start: Array, end: Array) -> Array:
+        """Change of the readings that extra heats cause.
+
+        Parameters
+        ----------
+        start, end : ndarray, shape (n, n_lumps, m)
+            Heat at the start and at the end of every sample [W].
+
+        Returns
+        -------
+        ndarray, shape (n, n_sensors, m)
+            [K].
+        """
+        A, by_start, by_end = self.steps
+        push = by_start @ start
+        push += by_end @ end
+        state = np.zeros(push.shape)
+        for k in range(len(push) - 1):
+            np.matmul(A[k], state[k], out=state[k + 1])
+            state[k + 1] += push[k]
+        return self.C @ state
+
+
+def along(system: System, one: Data, run: Trajectory | None = None) -> Along:
+    """Simulate a record, unless it has been, and prepare its linearisation."""
+    run = trajectory(system, one.record) if run is None else run
+    columns = [one.record[name] if name in one.record.input_names
+               else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
+    if not np.isfinite(run.lumps).all():
+        raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
+    return Along(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
+                 np.column_stack(columns))
+
+
+def _heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
+    """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
+    nl = x.shape[1]
+    out = np.broadcast_to(equations.A.toarray(), (len(x), nl, nl)).copy()
+    for term in equations.terms:
+        s = term.slopes(*equations.ends(term, x, u))
+        for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
+            for row, column, slope in ((a, a, s.aa), (a, b, s.ab), (b, a, s.ba), (b, b, s.bb)):
+                if row < nl and column < nl:
+                    out[:, row, column] += slope[..., pair]
+    return out

@@ -1,0 +1,101 @@
+"""Stage 6: name the effect, or the set of effects that the records cannot tell apart, or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..evidence import ALPHA, BIC_GAP
+from ..fit import Refit, fitted
+from ._short_list import Entry, ShortList, refiltered
+
+_CONTENDERS = 60.0  # ΔBIC behind the best within which a candidate is refitted with the renewed filters
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What one round found.
+
+    Parameters
+    ----------
+    alarm : bool
+        Whether any effect is beyond doubt: p < 0.01 for the family and ΔBIC > 10.
+    before : Refit
+        Without the new effect.
+    best : Entry or None
+        The best candidate, noise levels and filters renewed; None without an alarm.
+    contenders : tuple of Entry
+        Others whose BIC is within 10 of the best: the records cannot exclude them.
+    ruled_out : tuple of Entry
+        Those among them that the unseen records exclude.
+    """
+
+    alarm: bool
+    before: Refit
+    best: Entry | None
+    contenders: tuple[Entry, ...]
+    ruled_out: tuple[Entry, ...] = ()
+
+    def __str__(self) -> str:
+        if self.best is None:
+            return "no candidate is beyond doubt"
+        names = [self.best.candidate.label, *(c.candidate.label for c in self.contenders)]
+        names += [c.label for entry in (self.best, *self.contenders) for c in entry.aliases]
+        return f"{' or '.join(names)}, ΔBIC {self.best.delta_bic:.1f}"
+
+    def plot(self) -> Any:
+        """Bars of ΔBIC of best and contenders; returns the matplotlib axes."""
+        entries = () if self.best is None else (self.best, *self.contenders)
+        return ShortList(self.before, entries, {}).plot()
+
+
+def decide(short: ShortList) -> Decision:
+    """Decide on a short list.
+
+    Parameters
+    ----------
+    short : ShortList
+        From `refit_short_list`.
+
+    Returns
+    -------
+    Decision
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
+    >>> drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
+    ...                   output_names=[])
+    >>> run = rt.thermal.simulate(bar.with_parameters({"sensors.T.time_constant": 30.0}), drive)
+    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> fit = rt.diagnosis.refit(bar, noisy)
+    >>> short = rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit), length=3)
+    >>> rt.diagnosis.decide(short).best.candidate.label
+    'sensor_lag(T)'
+    """
+    sure = [entry for entry in short.entries if entry.p_value < ALPHA and entry.delta_bic > BIC_GAP]
+    if not sure:
+        return Decision(False, short.before, None, ())
+    return settled(short.before, short.entries)
+
+
+def settled(before: Refit, entries: tuple[Entry, ...]) -> Decision:
+    """Renew filters and noise levels at the best entry, refit those near it, and compare again."""
+    best = entries[0]
+    renewed = fitted(best.fit.structure, best.fit.v, best.fit.floor, best.fit.levels)
+    near = [entry for entry in entries if best.delta_bic - entry.delta_bic < _CONTENDERS]
+    again = sorted(refiltered(before, renewed, near), key=lambda entry: -entry.delta_bic)
+    winner = again[0]
+    others = tuple(entry for entry in again[1:] if winner.delta_bic - entry.delta_bic < BIC_GAP)
+    if winner.fit.structure is best.fit.structure:
+        winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.aliases)
+    else:
+        own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
+        winner = Entry(winner.candidate, own, next(e.delta_bic for e in entries
+                                                   if e.fit.structure is winner.fit.structure), winner.p_value,
+                       winner.aliases)
+    return Decision(True, before, winner, others)

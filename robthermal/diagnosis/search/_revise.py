@@ -1,0 +1,131 @@
+"""With several effects, the first was chosen before the others were known: choose every one again, given the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import Diverged, InputError
+from ..evidence import BIC_GAP, score
+from ..fit import Refit, Whitened, extended, relinearised
+from ._decide import Decision, settled
+from ._short_list import Entry, delta_bic, quantities_of, refit_short_list
+
+_SWEEPS = 2
+_LENGTH = 4
+_EVALUATIONS = 20  # without an effect: where it is strong the misfit is large, and need not be polished
+_SURE = 8.0  # standard deviations of a size that is certainly worth a ΔBIC of 10
+
+
+def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
+            ) -> tuple[tuple[Decision, ...], Refit]:
+    """Choose each effect again with the others in place, until none changes; drop what is not needed any more.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In order of acceptance.
+    nominal : Refit
+        Without any effect.
+    effects : iterable of str, optional
+        Catalogue.
+    last_is_new : bool
+        Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
+    """
+    names = None if effects is None else list(effects)
+    chosen = [round_.best for round_ in rounds if round_.best is not None]
+    fit = chosen[-1].fit
+    decisions = list(rounds)
+    for sweep in range(_SWEEPS):
+        changed = False
+        for place in range(len(decisions) - 1 - (last_is_new and sweep == 0), -1, -1):
+            before = without(fit, place, nominal, decisions[place].before)
+            if before is None:
+                continue
+            old = decisions[place].best
+            assert old is not None
+            short = refit_short_list(before, score(before, names), length=_LENGTH, tried=old.candidate.key)
+            entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
+            if entries[0].delta_bic < BIC_GAP:
+                decisions.pop(place)
+                fit, changed = before, True
+                break
+            decision = settled(before, entries)
+            assert decision.best is not None
+            # the effect chosen again stands last in the new structure: keep the order of the decisions the same
+            decisions.append(decision)
+            decisions.pop(place)
+            fit = decision.best.fit
+            changed = changed or decision.best.candidate.key != old.candidate.key
+        if not changed:
+            break
+    kept, less = needed(tuple(decisions), fit, nominal)
+    return revised(kept, nominal, names) if 0 < len(kept) < len(decisions) else (kept, less)
+
+
+def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Decision, ...], Refit]:
+    """Without effects that are not worth ΔBIC 10 in the end: beside one chosen later, one may shrink to nothing.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In the order of the effects of the fit.
+    fit, nominal : Refit
+        With them, without any.
+    """
+    for place in range(len(rounds)):
+        value, std = quantities_of(fit, place)[fit.structure.effects[place].effect.size.name]
+        if abs(value) > _SURE * std:
+            continue
+        less = without(fit, place, nominal, rounds[place].before)
+        if less is not None and delta_bic(less, fit) < BIC_GAP:
+            kept = [round_ for at, round_ in enumerate(rounds) if at != place]
+            if kept and (last := kept[-1].best) is not None:
+                kept[-1] = replace(kept[-1], best=replace(last, fit=less))
+            return needed(tuple(kept), less, nominal)
+    return rounds, fit
+
+
+def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, before: Refit) -> tuple[Entry, ...]:
+    """The list with the accepted effect as it is: far from the truth its score may be too low to be listed."""
+    fit = accepted.fit
+    values = fit.structure.quantities(fit.v)
+    structure = before.structure.with_effect(fit.structure.effects[place])
+    v = structure.carried(fit.structure, fit.v, [*values[:place], *values[place + 1:], values[place]])
+    again = extended(before, structure, v)
+    own = replace(accepted, fit=again, delta_bic=delta_bic(before, again))
+    twice = [entry for entry in entries if entry.candidate.key == own.candidate.key]
+    if any(entry.delta_bic >= own.delta_bic for entry in twice):
+        return entries
+    others = [entry for entry in entries if entry.candidate.key != own.candidate.key]
+    return tuple(sorted([own, *others], key=lambda entry: -entry.delta_bic))
+
+
+def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None) -> Refit | None:
+    """The fit without one of its effects; None where another acts on a part that this one adds, or nothing survives.
+
+    Parameters
+    ----------
+    fit : Refit
+        With all effects.
+    place : int
+        Of the effect to leave out.
+    nominal : Refit
+        Without any.
+    before : Refit, optional
+        From which the effect was chosen; if it had the other effects, its unknowns are a start, too.
+    """
+    effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
+    others = effects[:place] + effects[place + 1:]
+    try:
+        structure = nominal.structure.with_effects(others)
+        starts = [structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])]
+        if before is not None and [c.key for c in before.structure.effects] == [c.key for c in others]:
+            starts.append(structure.carried(before.structure, before.v, before.structure.quantities(before.v)))
+        problem = Whitened(structure, fit.whiteners)
+        v = starts[0] if len(starts) == 1 else min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))
+        return relinearised(extended(fit, structure, v, _EVALUATIONS))
+    except (Diverged, InputError):
+        return None

@@ -1,0 +1,170 @@
+"""Where the refit of a candidate starts: from the nominal fit, or from the declared parameters.
+
+A strong effect that is missing pulls the nominal parameters far away; the linearisation there knows little of the
+truth. The declared parameters are wrong by their priors only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import Diverged, InputError
+from ..effects import Candidate
+from ..evidence import BIC_GAP, columns
+from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended, paths_of
+
+Array = NDArray[np.float64]
+_SETTLING = 2  # evaluations before what shapes an effect is moved
+_FEW = 3  # evaluations of every start
+_KEPT = 0.7  # share of the predicted decrease that a good start keeps
+_MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
+_MANY = 12  # evaluations along a bent valley
+BEHIND = 60.0  # ΔBIC by which a candidate may lie below the best, and still get there
+_SHARE = 0.3  # of the best ΔBIC, less that much
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """A fit and, where needed, its structure at the declared parameters.
+
+    Parameters
+    ----------
+    fit : Refit
+        Without the candidate.
+    """
+
+    fit: Refit
+
+    @cached_property
+    def declared(self) -> Refit:
+        """The structure at the declared parameters, with the filters of the fit and its effects as they are."""
+        structure = self.fit.structure
+        v = structure.start(structure.ranges.start, structure.quantities(self.fit.v))
+        z = Whitened(structure, self.fit.whiteners).residual(v)
+        return replace(self.fit, v=v, z=z, paths=paths_of(structure, v))
+
+
+def in_reach(delta_bic: float, best: float) -> bool:
+    """Whether more evaluations could bring a candidate to the top: not if it is far behind the best already."""
+    return delta_bic > _SHARE * best - BEHIND
+
+
+def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0) -> Refit:
+    """The candidate added and refitted a little: from the first start that keeps its promise, or else from the best.
+
+    Other starts than the first are for candidates that promise enough beside the best ΔBIC that another has reached.
+    """
+    fit = origin.fit
+    tried: list[Refit] = []
+    least = fit.rss
+    for start in _starts(origin, candidate, size):
+        if tried and not in_reach(fit.n_readings * np.log(fit.rss / start.promise), best):
+            continue
+        new = _refitted(fit, start)
+        if new is not None:
+            if start.promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - start.promise):
+                return new
+            tried.append(new)
+            least = min(least, start.promise)
+    worth = not tried or in_reach(fit.n_readings * np.log(fit.rss / least), best)
+    if worth and not any(new.rss < fit.rss for new in tried):
+        nothing = float(np.sign(size)) * candidate.effect.size.typical
+        new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
+        if new is None and not tried:
+            raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
+        further = _along_the_valley(fit, tried, least, fit.rss if new is None else new.rss)
+        tried += [one for one in (new, further) if one is not None]
+    return min(tried, key=lambda new: new.rss)
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """Linearised at a fit: trial values, unknowns, size, and the sum of squares that the linearisation promises."""
+
+    at: Refit
+    trial: Candidate
+    v: Array
+    size: float
+    promise: float
+
+
+def _starts(origin: Origin, candidate: Candidate, size: float) -> Iterator[_Start]:
+    """From the fit, and from the declared parameters."""
+    yield _Start(origin.fit, candidate, *_linear(origin.fit, candidate, size))
+    try:
+        declared = origin.declared
+    except (Diverged, InputError):
+        declared = origin.fit
+    trial, best = _best_trial(declared, candidate)
+    yield _Start(declared, trial, *_linear(declared, trial, best))
+
+
+def _refitted(fit: Refit, start: _Start) -> Refit | None:
+    """A few evaluations from a start; None if it does not survive its simulation."""
+    structure = start.at.structure.with_effect(start.trial)
+    values = [*start.at.structure.quantities(start.v), {**start.trial.shape, start.trial.effect.size.name: start.size}]
+    v = structure.carried(start.at.structure, start.v, values)
+    try:
+        if any(callable(quantity.grid) for quantity in start.trial.effect.free[1:]):
+            v = descend(Whitened(structure, fit.whiteners), v, held(structure, v), _SETTLING, ENOUGH).at.v
+        return extended(fit, structure, v, _FEW)
+    except (Diverged, InputError):
+        return None
+
+
+def held(structure: Structure, v: Array) -> tuple[Array, Array]:
+    """Bounds that hold the times and levels that shape the last effect where the trial put them.
+
+    Until the nominal parameters have settled around it their misfit would move a time across the record. A time
+    constant stays free: it and its capacity have to move together.
+    """
+    low, high = (bound.copy() for bound in structure.bounds)
+    quantities = structure.effects[-1].effect.free
+    for at, quantity in enumerate(quantities, start=structure.n_parameters + structure.n_effects - len(quantities)):
+        if quantity is not quantities[0] and callable(quantity.grid):
+            low[at] = high[at] = np.clip(v[at], low[at], high[at])
+    return low, high
+
+
+def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
+    """The best of the starts iterated on, where a start from nothing stands still and much more is promised.
+
+    A capacity beside a capacity lies in a bent valley: from nothing no step along its tangent survives.
+    """
+    promised = fit.rss - least
+    if not tried or fit.rss - stands > _MOVES * promised or fit.n_readings * np.log(fit.rss / least) < 2.0 * BIC_GAP:
+        return None
+    best = min(tried, key=lambda new: new.rss)
+    return extended(best, best.structure, best.v, _MANY)
+
+
+def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
+    """Optimum of the linearised problem for a size within its bounds, and its sum of squares."""
+    size = _believable(candidate, size)
+    target = fit.z - size * fit.whiten([columns(path, [candidate]) for path in fit.paths])[:, 0]
+    shift = np.linalg.lstsq(fit.J, target, rcond=1e-9)[0]
+    left = target - fit.J @ shift
+    return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
+
+
+def _believable(candidate: Candidate, size: float) -> float:
+    """Within the bounds; near the trial value, if the signature holds only there."""
+    bounds, trial = candidate.effect.size, candidate.shape.get(candidate.effect.size.name)
+    low, high = (bounds.lower, bounds.upper) if trial is None else (0.7 * trial, 1.4 * trial)
+    return float(np.clip(size, low, high))
+
+
+def _best_trial(fit: Refit, candidate: Candidate) -> tuple[Candidate, float]:
+    """Trial values and size that explain most."""
+    trials = [candidate] if candidate.effect.paired else candidate.trials(fit.paths[0])
+    J = fit.project(fit.whiten([columns(path, trials) for path in fit.paths]))
+    power, along = np.sum(J**2, axis=0), J.T @ fit.rest
+    sizes = np.array([_believable(trial, size) for trial, size in zip(trials, along / np.maximum(power, 1e-300),
+                                                                      strict=True)])
+    best = int(np.argmax(2 * sizes * along - sizes**2 * power))
+    return trials[best], float(sizes[best])

@@ -1,0 +1,77 @@
+"""Effects that the training records cannot tell apart, and the unseen records can."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..._fitting import Data
+from ..data import ResponseData
+from ..effects import Candidate
+from ..evidence import BIC_GAP, surprises
+from ..fit import Refit, fitted
+from ._decide import Decision
+from ._short_list import Entry, Key, delta_bic, refiltered
+
+
+def told_apart(rounds: tuple[Decision, ...], fit: Refit, data: Sequence[Data | ResponseData]
+               ) -> tuple[tuple[Decision, ...], Refit]:
+    """Order the names of every ambiguous set by the evidence of all records, and drop those beyond doubt worse.
+
+    BIC stands for -2 log p(training); -2 log p(unseen | training) is added. Nothing is fitted to the unseen records,
+    and no name comes back that the training records have excluded.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In the order of the effects of the fit.
+    fit : Refit
+        With them.
+    data : sequence of Data or ResponseData
+        Unseen.
+    """
+    for round_ in rounds:
+        rivals = [entry for entry in round_.contenders if _takes_the_place(entry, round_, fit)]
+        if rivals:
+            decision, fit = _weighed(round_, rivals, fit, data)
+            rounds = tuple(decision if one is round_ else one for one in rounds)
+    places = [candidate.key for candidate in fit.structure.effects]
+    return tuple(sorted(rounds, key=lambda one: places.index(_best(one).candidate.key))), fit
+
+
+def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
+    """Everything that the unseen records have dropped from the sets."""
+    return tuple(entry.candidate for round_ in rounds for entry in round_.ruled_out)
+
+
+def _weighed(round_: Decision, rivals: Sequence[Entry], fit: Refit, data: Sequence[Data | ResponseData]
+             ) -> tuple[Decision, Refit]:
+    """One set with all records, and the fit with its best name."""
+    best = _best(round_)
+    own = replace(best, fit=fit, delta_bic=delta_bic(round_.before, fit))
+    entries = [own, *refiltered(round_.before, fit, rivals)]
+    unseen = surprises([entry.fit for entry in entries], fit, data)
+    evidence = [density - entry.delta_bic for density, entry in zip(unseen, entries, strict=True)]
+    order = sorted(range(len(entries)), key=evidence.__getitem__)
+    most = evidence[order[0]] + BIC_GAP
+    alike = [entries[i] for i in order if evidence[i] <= most]
+    worse = tuple(entries[i] for i in order if evidence[i] > most)
+    first = alike[0]
+    if first is not own:
+        fit = fitted(first.fit.structure, first.fit.v, first.fit.floor, first.fit.levels)
+    first = replace(first, fit=fit, delta_bic=best.delta_bic + first.delta_bic - own.delta_bic)
+    unweighed = (entry for entry in round_.contenders if not any(entry is rival for rival in rivals))
+    return replace(round_, best=first, contenders=(*alike[1:], *unweighed), ruled_out=worse), fit
+
+
+def _takes_the_place(entry: Entry, round_: Decision, fit: Refit) -> bool:
+    """Whether the entry was fitted beside all the other accepted effects."""
+    def others(one: Refit, name: Entry) -> set[Key]:
+        return {candidate.key for candidate in one.structure.effects} - {name.candidate.key}
+
+    return others(entry.fit, entry) == others(fit, _best(round_))
+
+
+def _best(round_: Decision) -> Entry:
+    assert round_.best is not None
+    return round_.best

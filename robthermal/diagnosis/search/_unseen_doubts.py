@@ -1,0 +1,39 @@
+"""An accepted effect that the unseen records speak against is taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..._fitting import Data
+from ..data import ResponseData
+from ..evidence import BIC_GAP, surprises
+from ..fit import Refit, fitted
+from ._decide import Decision
+from ._revise import without
+
+
+def supported(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, data: Sequence[Data | ResponseData]
+              ) -> tuple[tuple[Decision, ...], Refit]:
+    """Drop effects, the worst first, without which the unseen records are predicted beyond doubt better.
+
+    Parameters
+    ----------
+    rounds : tuple of Decision
+        In the order of the effects of the fit.
+    fit, nominal : Refit
+        With them, without any.
+    data : sequence of Data or ResponseData
+        Unseen. They only take names back: no parameter and no name comes from them.
+    """
+    while rounds:
+        lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal, round_.before)
+                  for place, round_ in enumerate(rounds)]
+        with_all, *others = surprises([fit, *(fit if less is None else less for less in lesser)], fit, data)
+        gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
+        worst = max(range(len(gains)), key=gains.__getitem__)
+        less = lesser[worst]
+        if less is None or not gains[worst] > BIC_GAP:
+            return rounds, fit
+        rounds = rounds[:worst] + rounds[worst + 1:]
+        fit = fitted(less.structure, less.v, less.floor, less.levels) if rounds else nominal
+    return rounds, fit
