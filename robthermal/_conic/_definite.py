@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, vstack
+from scipy.sparse.csgraph import connected_components
 
 from ._solver import LOOSE, Array, semidefinite, solved
 from ._stacked import stack, strictly
@@ -76,20 +77,22 @@ def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: 
     """
     n = len(pattern)
     rows, columns = np.nonzero(np.triu(pattern))
-    identity = Form(((0.5 * np.eye(n), np.eye(n)),))
-    own = _columns(identity, rows, columns)
     # s = b - A y >= 0 with y = (free entries of Q, t)
     blocks = [strictly(_columns(form, rows, columns), 1.0) for form in forms]
-    still = np.zeros((len(own), 1))
-    blocks += [np.hstack([own, still]), np.hstack([-own, still])]
-    unit = stack(np.eye(n)[None])[0]
-    offset = np.concatenate([np.zeros(sum(map(len, blocks[:-2]))), -least * unit, unit])
+    sides = [form.terms[0][0].shape[1] for form in forms]
+    offsets = [np.zeros(len(block)) for block in blocks]
+    for group in _independent(pattern):  # least I <= Q <= I, one small cone for each block of Q
+        pick = np.eye(n)[:, group]
+        own = _columns(Form(((0.5 * pick, pick),)), rows, columns)
+        still, unit = np.zeros((len(own), 1)), stack(np.eye(len(group))[None])[0]
+        blocks += [np.hstack([own, still]), np.hstack([-own, still])]
+        offsets += [-least * unit, unit]
+        sides += [len(group)] * 2
     A = vstack([csc_matrix(-block) for block in blocks], format="csc")
     cost = np.zeros(len(rows) + 1)
     cost[-1] = -1.0
-    sides = [form.terms[0][0].shape[1] for form in forms] + [n, n]
     cones = [semidefinite(side) for side in sides]
-    found = solved(cost, A, offset, cones, tolerance=LOOSE)
+    found = solved(cost, A, np.concatenate(offsets), cones, tolerance=LOOSE)
     y = found.x
     Q = np.zeros((n, n))
     if not np.isfinite(y).all():
@@ -97,6 +100,12 @@ def largest_margin(forms: Sequence[Form], pattern: NDArray[np.bool_], *, least: 
     Q[rows, columns] = y[:-1]
     Q = Q + np.triu(Q, 1).T
     return Candidate(Q, float(y[-1]), found.status)
+
+
+def _independent(pattern: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """Indices of the diagonal blocks of a pattern."""
+    count, label = connected_components(pattern, directed=False)
+    return [np.flatnonzero(label == k) for k in range(count)]
 
 
 def _columns(form: Form, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:

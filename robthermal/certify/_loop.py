@@ -50,6 +50,7 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
         (q, n_modules); `rt.design.certify_loop` takes them from a controller.
     plant : {"continuous", "held"}
         Temperatures move continuously between samples, or as the observer's sampled model says: x⁺ = A_d x + Γ f(x, I).
+        A claim about the sampled model is not one about the machine.
     drift : float, optional
         Claim it only for trajectories on which no face of a module moves further than this within a sample [K].
     parameters : mapping, optional

@@ -84,7 +84,7 @@ def search(found: Picture, sample_time: float, scale: Array, pattern: NDArray[np
     pattern : ndarray of bool, shape (N, N)
         Entries of P that may differ from zero.
     held : bool
-        The plant is the sampled form: nothing happens between the samples.
+        The plant is the sampled model: nothing happens between the samples.
     """
     problem = _Problem(found, sample_time, scale, held)
     use: list[int] = []

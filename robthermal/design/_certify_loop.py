@@ -29,16 +29,18 @@ Matrices = dict[str, Array]
 
 @dataclass(frozen=True)
 class CertifiedLoop:
-    """What is proven of a closed loop.
+    """What is proven of a closed loop: of the continuous plant, or with an observer only of its sampled model.
 
     Parameters
     ----------
     loop : Certificate
-        In the box the loop contracts, limits active or not.
+        In the box the loop contracts, limits active or not. With an observer this is about the sampled model (the heat
+        of the modules held over a sample), which says nothing about what the machine does between the samples: it may
+        oscillate where the sampled model does not.
     invariance : Certificate
-        Currents within the limits never drive a temperature out of the box.
+        Currents within the limits never drive a temperature of the continuous plant out of the box.
     observer : Certificate or None
-        In the box the estimation error shrinks; none where the temperatures are measured.
+        In the box the estimation error of the sampled model shrinks; none where the temperatures are measured.
     outcome : Outcome
         "certified", or what is missing and why.
     """
@@ -79,8 +81,9 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     ambient, heat : mapping, optional
         {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, none.
     observer : GainObserver, optional
-        Where the law and the controller use estimates. The claim is then about the sampled model of the observer, the
-        heat of the modules held over a sample; without one it is about the plant in continuous time.
+        Where the law and the controller use estimates. The claim is then about the *sampled model* of the observer,
+        the heat of the modules held over a sample, not about the machine between the samples; without an observer it
+        is about the plant in continuous time.
     drift : float, optional
         As in `rt.certify.loop`.
     parameters : mapping, optional
@@ -90,7 +93,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     -------
     CertifiedLoop
         If it holds there is, for constant set-points, ambients and loads, one steady state, reached from everywhere in
-        the box.
+        the box; with an observer this is said of the sampled model only, and the outcome says so.
 
     Raises
     ------
@@ -150,10 +153,14 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
         if part is not None and not part.holds:
             return Outcome(False, "not_certified", f"Not certified: it is not shown that {what}: {part.reason}")
     low, high = min(pair[0] for pair in box.values()) - 273.15, max(pair[1] for pair in box.values()) - 273.15
-    where = "" if estimate is None else " of temperatures and estimates, as long as the estimates stay in it"
-    moves = "" if drift is None or estimate is not None else (
-        f", as long as no face of a module moves by more than {drift:g} K within a sample")
-    return Outcome(True, "certified", f"Certified: whatever its start in the box{where}, {low:.1f} to {high:.1f} °C, "
+    if estimate is not None:
+        return Outcome(True, "certified_sampled_model", "Certified for the sampled model only (the heat of the modules "
+                       f"held over a sample): whatever its start in the box of temperatures and estimates, {low:.1f} to "
+                       f"{high:.1f} °C, the sampled model of the loop forgets it, with limits active or not, as long as "
+                       "its temperatures and estimates stay in the box. The machine moves between the samples and is "
+                       "not covered; of the continuous plant it is proven that it stays in the box.")
+    moves = "" if drift is None else f", as long as no face of a module moves by more than {drift:g} K within a sample"
+    return Outcome(True, "certified", f"Certified: whatever its start in the box, {low:.1f} to {high:.1f} °C, "
                    f"the loop forgets it, with limits active or not{moves}.")
 
 

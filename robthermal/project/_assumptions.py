@@ -48,7 +48,8 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
     "frequency": (_LINEAR,),
     "loop": (
         "Controller and law run as in the certificate file, read the true temperatures at the samples, and the current "
-        "is held between them.",
+        "is held between them. Where the sentence says \"sampled model\", nothing is claimed of what the machine does "
+        "between the samples.",
         "Temperatures stay in the box of the claim; where that is proven, \"The box is never left\" says so.",
     ),
 }

@@ -26,7 +26,7 @@ from ._uncertain import Parameters, read_parameters, say_parameters, worst_syste
 
 Rows = tuple[tuple[fmpq, ...], ...]
 _PLANTS = {"continuous": "currents held and temperatures moving continuously in between",
-           "held": "in its sampled form x+ = A_d x + Γ f(x, I), the heat f of the modules held in between"}
+           "held": "as a sampled model x+ = A_d x + Γ f(x, I), the heat f of the modules held in between"}
 _PIECES = 16
 
 

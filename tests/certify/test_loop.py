@@ -147,6 +147,7 @@ def test_with_an_observer_the_sampled_model_converges():
     estimator = rt.design.observer(system, ["Th", "Tc"], sensor_noise=0.01)
     proven = rt.design.certify_loop(system, pi, law, observer=estimator)
     assert proven.holds and "estimates" in proven.outcome.text and proven.loop.region["plant"] == "held"
+    assert "sampled model only" in str(proven) and "sampled model" in proven.loop.claim
     rng, starts, ends = np.random.default_rng(3), [], []
     for _ in range(2):
         x, guess, z = rng.uniform(290, 305, 4), rng.uniform(290, 305, 4), rng.uniform(-2, 2, 1)
