@@ -155,10 +155,10 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
     low, high = min(pair[0] for pair in box.values()) - 273.15, max(pair[1] for pair in box.values()) - 273.15
     if estimate is not None:
         return Outcome(True, "certified_sampled_model", "Certified for the sampled model only (the heat of the modules "
-                       f"held over a sample): whatever its start in the box of temperatures and estimates, {low:.1f} to "
-                       f"{high:.1f} °C, the sampled model of the loop forgets it, with limits active or not, as long as "
-                       "its temperatures and estimates stay in the box. The machine moves between the samples and is "
-                       "not covered; of the continuous plant it is proven that it stays in the box.")
+                       "held over a sample): whatever its start in the box of temperatures and estimates, "
+                       f"{low:.1f} to {high:.1f} °C, the sampled model of the loop forgets it, with limits active or "
+                       "not, as long as its temperatures and estimates stay in the box. The machine moves between the "
+                       "samples and is not covered; of the continuous plant it is proven that it stays in the box.")
     moves = "" if drift is None else f", as long as no face of a module moves by more than {drift:g} K within a sample"
     return Outcome(True, "certified", f"Certified: whatever its start in the box, {low:.1f} to {high:.1f} °C, "
                    f"the loop forgets it, with limits active or not{moves}.")
