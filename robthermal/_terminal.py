@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +14,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
+
+from .errors import Outcome
 
 _PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
@@ -39,7 +41,7 @@ def drawing(file: Path | None) -> Path | None:
     return place(file)
 
 
-def show_report(report: Any, out: Path, as_json: bool, **more: Any) -> None:
+def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome] = (), **more: Any) -> None:
     """Claims of a report as a table or JSON; exit status 1 unless all hold and are verified."""
     def show() -> None:
         table = Table("claim", "answer", "box", "margin")
@@ -50,11 +52,13 @@ def show_report(report: Any, out: Path, as_json: bool, **more: Any) -> None:
         if not console.is_terminal:
             console.width = max(console.width, _PIPE_WIDTH)
         console.print(table)
-        say(*(f"{name}: {value}" for name, value in more.items()), f"report: {out / 'report.html'}")
+        say(*(f"{name}: {value}" for name, value in more.items()), *(f"remark: {remark.text}" for remark in remarks),
+            f"report: {out / 'report.html'}")
 
     summary = {"holds": report.holds, "out": str(out), "report": str(out / "report.html"), **more,
                "claims": [{"title": c.title, "holds": c.holds, "verified": c.verified, "reason": c.reason}
-                          for c in report.claims]}
+                          for c in report.claims],
+               "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
     answer(summary, as_json, show)
     exit_unless(report.holds)
 

@@ -38,6 +38,9 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
 
+OperatingPoint = Annotated[list[str] | None, typer.Option(
+    help="Of frequency responses: mean of an input [unit, A] or ambient [unit of the file], may repeat.",
+    metavar="NAME=VALUE")]
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
 
 
@@ -121,21 +124,24 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 
 
 @app.command()
-def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(help="Training records.")],
+def calibrate(system: SystemFile,
+              records: Annotated[list[Path], typer.Argument(
+                  help="Training records, or one frequency response from `robthermal frf`.")],
               validation: Annotated[list[Path] | None, typer.Option("--validation", help="Held-out record.")] = None,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
-              median_filter: MedianFilter = None, as_json: Json = False) -> None:
-    """Fit the parameters in the [fit] table of a system to records.
+              median_filter: MedianFilter = None,
+              operating_point: OperatingPoint = None, as_json: Json = False) -> None:
+    """Fit the parameters in the [fit] table of a system to records, or to a frequency response.
 
     Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
     """
     found = rt.read_system(system)
-    train, held_out = ([rt.read_record(path, found, median_filter=median_filter) for path in paths]
-                       for paths in (records, validation or []))
+    point = rt.project.point_from_text(found, operating_point or [])
     with progress() as stage:
         stage("calibrating")
-        fit = rt.calibrate(found, train, validation=held_out or None)
+        fit = rt.project.calibrate_files(found, records, validation or [], median_filter=median_filter,
+                                         operating_point=point)
     rt.thermal.write_system(fit.system, out)
     answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
     exit_unless(bool(fit.outcome))
@@ -144,15 +150,13 @@ def calibrate(system: SystemFile, records: Annotated[list[Path], typer.Argument(
 @app.command()
 def diagnose(system: SystemFile,
              records: Annotated[list[Path], typer.Argument(
-                 help="Training records, or frequency responses from `robthermal frf` (.json, .npz).",
+                 help="Training records, or frequency responses from `robthermal frf`.",
                  metavar="TRAIN.csv...")],
              validation: Annotated[list[Path] | None, typer.Option(
                  "--validation", help="Record or response that no fit sees, may repeat.")] = None,
              session_gain: Annotated[bool, typer.Option(
                  "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
-             operating_point: Annotated[list[str] | None, typer.Option(
-                 help="Of frequency responses: mean of an input [unit, A] or ambient [K], may repeat.",
-                 metavar="NAME=VALUE")] = None,
+             operating_point: OperatingPoint = None,
              out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
     """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
 
@@ -334,7 +338,7 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
         result = rt.project.couple_subsystems(job, stage)
         stage("writing the report")
         report = rt.project.write_coupling(result, out)
-    show_report(report, out, as_json, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
+    show_report(report, out, as_json, job.remarks, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
 
 
 for _command in (_cli_results.report, _cli_results.verify, _cli_learn.new, _cli_learn.explain):

@@ -48,12 +48,12 @@ SURFACE = {
         Diverged InputError Outcome RobthermalError
     """,
     "identify": """
-        FrequencyResponse bla closed_loop etfe lpm lrm lrmp spectral
+        FrequencyResponse bla closed_loop etfe is_response lpm lrm lrmp read_response spectral
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
         Explanation FileCheck JobResult MapRequest Project Residuals ResponseResiduals boxes_from_text
-        certificate_files certify_system check_free couple_subsystems demo_project design_excitation
+        calibrate_files certificate_files certify_system check_free couple_subsystems demo_project design_excitation
         design_from_text design_system diagnose_records estimate_response explain explainable map_from_text
         map_system new_project output_folder point_from_text read_coupling read_measured read_project
         rebuild_report run_job verify_files write_certify write_checks write_coupling write_design

@@ -33,7 +33,8 @@ def export(filters: Filters, path: str | Path, name: str) -> None:
 
 def _mat(filters: Filters, name: str) -> bytes:
     """One struct per filter with A, B, C, D; sections as (n, 6) matrices; numbers that are not finite are NaN."""
-    content: dict[str, Any] = {key: value for key, value in document(filters, name).items() if key != "filters"}
+    content: dict[str, Any] = {key: value for key, value in document(filters, name).items()
+                               if key not in ("filters", "remarks")}
     for key in ("norms", "performance"):
         content[key] = {entry: np.nan if value is None else value for entry, value in content[key].items()}
     content["sections"] = {key: np.array(rows) for key, rows in content["sections"].items()}

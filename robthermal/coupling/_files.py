@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ import control
 import numpy as np
 
 from .._export import json_bytes, write
-from ..errors import InputError
+from ..errors import InputError, Outcome
 from ._sections import sections
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ _SYSTEMS = ("X", "Y", "X_hat", "Y_hat", "Z1", "Z2", "X_input", "Y_input", "contr
 _PERFORMANCE = ("ma_before", "ma_after", "msd_before", "msd_after")
 
 
-def document(filters: Filters, name: str) -> dict[str, Any]:
+def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> dict[str, Any]:
     """Content of coupling.json; numbers that are not finite become null.
 
     Parameters
@@ -29,15 +30,18 @@ def document(filters: Filters, name: str) -> dict[str, Any]:
         What is written.
     name : str
         Name of the design.
+    remarks : sequence of Outcome
+        What the verdict leaves out.
     """
     return {"format": FORMAT, "name": name, "sample_time": filters.problem.dt, "verdict": filters.verdict,
             "filters": {key: _matrices(getattr(filters, key)) for key in _SYSTEMS},
             "sections": _sections(filters),
             "norms": {key: _number(value) for key, value in filters.norms.items()},
-            "performance": {key: _number(getattr(filters.performance, key)) for key in _PERFORMANCE}}
+            "performance": {key: _number(getattr(filters.performance, key)) for key in _PERFORMANCE},
+            "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
 
 
-def save(filters: Filters, path: str | Path, name: str) -> None:
+def save(filters: Filters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()) -> None:
     """Write the file whole, or not at all.
 
     Parameters
@@ -48,8 +52,10 @@ def save(filters: Filters, path: str | Path, name: str) -> None:
         File to write.
     name : str
         Name of the design.
+    remarks : sequence of Outcome
+        What the verdict leaves out.
     """
-    write(path, json_bytes(document(filters, name)))
+    write(path, json_bytes(document(filters, name, remarks)))
 
 
 def _sections(filters: Filters) -> dict[str, Any]:

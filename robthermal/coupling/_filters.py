@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -212,8 +212,8 @@ class Filters:
         """
         return fixed_point(self, largest)
 
-    def save(self, path: str | Path, name: str = "") -> None:
-        """Write coupling.json: filters, sections, norms, performance and verdict.
+    def save(self, path: str | Path, name: str = "", remarks: Sequence[Outcome] = ()) -> None:
+        """Write coupling.json: filters, sections, norms, performance, verdict and remarks.
 
         Parameters
         ----------
@@ -221,13 +221,15 @@ class Filters:
             File to write, replaced in one step.
         name : str
             Name of the design.
+        remarks : sequence of Outcome
+            What the verdict leaves out, for example a measurement without covariance.
 
         Raises
         ------
         InputError
             If the file cannot be written.
         """
-        _files.save(self, path, name)
+        _files.save(self, path, name, remarks)
 
     def export(self, path: str | Path, name: str = "coupling") -> None:
         """Write the filters for another program: MATLAB (.mat) or C99 (.c, .h).

@@ -53,7 +53,7 @@ def _label(where: str, index: int, count: int) -> str:
 def _one(plant: Measured, dt: float, where: str, size: int) -> tuple[Array, Array, Array | None]:
     if isinstance(plant, FrequencyResponse):
         omega, response = 2 * np.pi * plant.frequencies, plant.response
-        if dt and not np.isclose(plant.sample_time, dt, rtol=1e-6):
+        if dt and np.isfinite(plant.sample_time) and not np.isclose(plant.sample_time, dt, rtol=1e-6):
             raise InputError(f"sample time {plant.sample_time:g} s, the loop has {dt:g} s", where=where,
                              expected=f"{dt:g} s", remedy="Measure at the rate of the controllers.")
     elif isinstance(plant, control.FrequencyResponseData):
@@ -86,7 +86,7 @@ def _check_grid(omega: Array, response: Array, dt: float, where: str) -> None:
 
 
 def _radius(plant: Measured, order: Array) -> Array | None:
-    if not isinstance(plant, FrequencyResponse):
+    if not isinstance(plant, FrequencyResponse) or not plant.has_covariance:
         return None
     radius = np.asarray(plant.confidence_radius(0.95))[:, :, order]
     return radius if np.any(radius > 0) else None

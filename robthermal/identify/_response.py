@@ -185,6 +185,11 @@ class FrequencyResponse:
     def __len__(self) -> int:
         return self.n_frequencies
 
+    @property
+    def has_covariance(self) -> bool:
+        """Whether anything is known about the noise; False for responses read from CSV."""
+        return bool(np.any(self.degrees_of_freedom > 0) or np.any(np.isfinite(self.variance)))
+
     @cached_property
     def noise_covariance(self) -> Array:
         """E[V_o V_p*], shape (n_y, n_y, n_f) [output unit squared]."""
@@ -363,12 +368,12 @@ class FrequencyResponse:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> FrequencyResponse:
-        """Read what :meth:`save` wrote.
+        """Read a file, as :func:`robthermal.identify.read_response`.
 
         Parameters
         ----------
         path : str or path-like
-            ``.json``, ``.mat`` or ``.npz``.
+            File that :meth:`save` wrote, or CSV; the content tells the format.
 
         Returns
         -------

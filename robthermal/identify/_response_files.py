@@ -1,4 +1,7 @@
-"""Frequency responses on disk: JSON for people, .mat for MATLAB, .npz for speed. Nothing is pickled."""
+"""Frequency responses on disk: JSON for people, .mat for MATLAB, .npz for speed, CSV from elsewhere.
+
+The content tells the format, not the ending. Nothing is pickled.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import io
 
+from robthermal._checks import excerpt, quoted
 from robthermal._matfile import kind_of, read_matlab
 from robthermal.errors import InputError
+
+from ._response_csv import is_table, read_table
 
 if TYPE_CHECKING:
     from ._response import FrequencyResponse
@@ -43,12 +49,18 @@ _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method":
 _UNREADABLE = (ValueError, TypeError, KeyError, OSError, EOFError, OverflowError, RuntimeError, MemoryError,
                zipfile.BadZipFile, zlib.error)
 _LARGEST = 500_000_000  # bytes, unpacked
+_LARGEST_TABLE = 100_000_000  # bytes of CSV
 _SUFFIXES = (".json", ".mat", ".npz")
+_HEAD = 65_536  # bytes that tell the format; the header row of a CSV file is among them
+_EXPECTED = "a frequency response: a file that robthermal frf wrote, or CSV with frequency [Hz], real, imag"
 
 
 def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
     """Write `result`; the suffix of `path` chooses the format."""
     path = _checked(path)
+    if not result.n_samples:
+        raise InputError("the response was read from CSV and has no covariance", where="save",
+                         remedy="Keep the CSV file it was read from.")
     arrays = {name: getattr(result, name) for name in _ARRAYS if getattr(result, name) is not None}
     texts = {name: list(getattr(result, name)) for name in _LISTS}
     scalars = {name: getattr(result, name) for name in _SCALARS}
@@ -63,24 +75,86 @@ def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
         io.savemat(path, {"format": FORMAT, **scalars, **cells, **arrays}, long_field_names=True)
 
 
-def load(path: str | PathLike[str]) -> dict[str, Any]:
-    """Arguments for `FrequencyResponse` from a file that `save` wrote."""
-    path = _checked(path)
-    if not path.is_file():
-        raise InputError(f"no such file: {path}", where="path")
+def format_of(path: Path) -> str:
+    """What a file holds, by its first bytes: "json", "npz", "mat", "csv", or "" for none of them.
+
+    Parameters
+    ----------
+    path : Path
+        File to look into.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened.
+    """
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if head.startswith(b"PK"):
+        return "npz"
+    if head.startswith(b"MATLAB"):
+        return "mat"
+    text = head.decode("utf-8-sig", errors="replace")
+    if text.lstrip().startswith(("{", "[")):
+        return "json"
+    return "" if "\0" in text or text.count("\ufffd") > 1 else "csv"  # one: a character that the head ends in
+
+
+def is_response(path: str | PathLike[str]) -> bool:
+    """Whether a file is a frequency response, or means to be one, rather than a record.
+
+    Parameters
+    ----------
+    path : str or path-like
+        File of any format; False where there is none.
+
+    Returns
+    -------
+    bool
+        True for JSON and NumPy archives, which records never are; for MATLAB files that `FrequencyResponse.save` wrote;
+        for CSV with the columns of a frequency response.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> _ = Path("G.csv").write_text("frequency,real,imag\\n1,2,3\\n2,2,3\\n")
+    >>> rt.identify.is_response("G.csv"), rt.identify.is_response("absent.csv")
+    (True, False)
+    """
+    path = Path(path)
     try:
-        _refuse_large(path)
-        content = {".json": _read_json, ".npz": _read_npz, ".mat": _read_mat}[path.suffix](path)
+        kind = format_of(path)
+        if kind == "csv":
+            with path.open(encoding="utf-8-sig", errors="replace") as file:
+                return is_table(file.read(_HEAD))
+        if kind == "mat":
+            return "response" in read_matlab(path.read_bytes(), _LARGEST)
+    except (OSError, ValueError, MemoryError):  # whoever reads it says what is wrong
+        return False
+    return kind in ("json", "npz")
+
+
+def load(path: str | PathLike[str], sample_time: float = math.nan) -> dict[str, Any]:
+    """Arguments for `FrequencyResponse` from a file of any of the formats; `sample_time` is for CSV, which has none."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"no such file: {path}", where="path", remedy="Check the path.")
+    try:
+        kind = format_of(path)
+        _refuse_large(path, kind)
+        if kind == "csv":
+            return {**read_table(path.read_bytes().decode("utf-8-sig"), path), "sample_time": sample_time}
+        if not kind:
+            raise ValueError("binary data of another kind")
+        content = {"json": _read_json, "npz": _read_npz, "mat": _read_mat}[kind](path)
     except InputError:  # says it better than what follows
         raise
     except _UNREADABLE as error:
-        raise InputError(
-            f"cannot be read: {error}", where=str(path), expected="a file written by FrequencyResponse.save"
-        ) from error
+        raise InputError(f"cannot be read: {excerpt(error)}", where=str(path), expected=_EXPECTED) from None
     if content.get("format") != FORMAT:
-        raise InputError(
-            f"its format is {content.get('format')!r}", where=str(path), expected=f"{FORMAT!r}, as save writes it"
-        )
+        raise InputError(f"its format is {quoted(content.get('format'))}", where=str(path),
+                         expected=f"{FORMAT!r}, as robthermal frf writes it")
     missing = [name for name in (*_ARRAYS[:5], *_LISTS, *_SCALARS) if name not in content]
     if missing:
         raise InputError(f"lacks {', '.join(missing)}", where=str(path), remedy="Write it again with save.")
@@ -89,30 +163,30 @@ def load(path: str | PathLike[str]) -> dict[str, Any]:
     arguments |= {name: _scalar(content[name], name, kind, path) for name, kind in _SCALARS.items()}
     shape = len(arguments["output_names"]), len(arguments["input_names"]), arguments["frequencies"].size
     if arguments["response"].shape != shape:
-        raise InputError(f"its response has shape {arguments['response'].shape}", where=str(path),
+        raise InputError(f"its response has shape {excerpt(arguments['response'].shape)}", where=str(path),
                          expected=f"{shape}, from its names and frequencies", remedy="Write it again with save.")
     return arguments
 
 
-def _refuse_large(path: Path) -> None:
+def _refuse_large(path: Path, kind: str) -> None:
     """Refuse files that would fill the memory, also once an archive is unpacked."""
-    size = path.stat().st_size
-    if size <= _LARGEST and zipfile.is_zipfile(path):
+    size, most = path.stat().st_size, _LARGEST_TABLE if kind == "csv" else _LARGEST
+    if kind == "npz" and size <= most:
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
-    if size > _LARGEST:
-        raise _too_large(path, size)
+    if size > most:
+        raise _too_large(path, size, most)
 
 
-def _too_large(path: Path, size: float) -> InputError:
+def _too_large(path: Path, size: float, most: int) -> InputError:
     how_large = f"{size / 1e6:.0f} MB large" if math.isfinite(size) else "larger when unpacked"
-    return InputError(f"it is {how_large}", where=str(path), expected=f"at most {_LARGEST / 1e6:.0f} MB",
+    return InputError(f"it is {how_large}", where=str(path), expected=f"at most {most / 1e6:.0f} MB",
                       remedy="Keep fewer frequencies or channels in one file.")
 
 
 def _texts(value: Any, name: str, path: Path) -> list[str]:
     if not isinstance(value, list | np.ndarray) or not all(isinstance(text, str) for text in value):
-        raise InputError(f"its {name} are {str(value)[:40]!r}", where=str(path), expected="a list of texts")
+        raise InputError(f"its {name} are {quoted(value)}", where=str(path), expected="a list of texts")
     return [str(text) for text in value]
 
 
@@ -125,7 +199,7 @@ def _scalar(value: Any, name: str, kind: type, path: Path) -> Any:
         good = numeric and abs(value) <= sys.float_info.max and value == kind(value)
         good = good and (value > 0 or (name == "half_width" and value == 0))
     if not good:
-        raise InputError(f"its {name} is {str(value)[:40]!r}", where=str(path),
+        raise InputError(f"its {name} is {quoted(value)}", where=str(path),
                          expected={float: "a number above 0", int: "a whole number", str: "a text"}[kind])
     return kind(value)
 
@@ -182,7 +256,7 @@ def _read_mat(path: Path) -> dict[str, Any]:
     try:
         variables = read_matlab(stored, _LARGEST)
     except MemoryError:
-        raise _too_large(path, math.inf) from None
+        raise _too_large(path, math.inf, _LARGEST) from None
     content: dict[str, Any] = {}
     for name, value in variables.items():
         if name in _LISTS:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 def outcome(result: FrequencyResponse) -> Outcome:
     """Whether the estimate may be used as it stands, and what to distrust."""
+    if not result.has_covariance:
+        return Outcome(False, "frf_without_covariance", " ".join(result.notes))
     undetermined = np.isnan(result.response).any(axis=(0, 1))
     if undetermined.any():
         text = f"{int(undetermined.sum())} of {len(result)} bins are not determined by the data (NaN). "

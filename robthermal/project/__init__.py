@@ -30,6 +30,7 @@ from ._explain import explain as explain
 from ._explain import explainable as explainable
 from ._folder import check_free as check_free
 from ._folder import output_folder as output_folder
+from ._frequency import calibrate_files as calibrate_files
 from ._frequency import design_excitation as design_excitation
 from ._frequency import estimate_response as estimate_response
 from ._frequency import read_measured as read_measured
@@ -51,8 +52,8 @@ from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
            "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project",
-           "Residuals", "ResponseResiduals", "boxes_from_text", "certificate_files", "certify_system", "check_free",
-           "couple_subsystems", "demo_project", "design_excitation", "design_from_text", "design_system",
+           "Residuals", "ResponseResiduals", "boxes_from_text", "calibrate_files", "certificate_files",
+           "certify_system", "check_free", "couple_subsystems", "demo_project", "design_excitation", "design_from_text", "design_system",
            "diagnose_records", "estimate_response", "explain", "explainable", "map_from_text", "map_system",
            "new_project", "output_folder", "point_from_text", "read_coupling", "read_measured", "read_project",
            "rebuild_report", "run_job", "verify_files", "write_certify", "write_checks", "write_coupling",

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from .. import coupling
-from ..coupling import Filters, Simulation, Spectra, WorstCase
+from ..coupling import Filters, Simulation, Spectra, Uncertainty, WorstCase
 from ..errors import InputError
+from ..identify import FrequencyResponse
 from ..verification import verify
 from ._claims import Checked
 from ._couple_file import CouplingJob
@@ -102,11 +103,25 @@ def couple_subsystems(job: CouplingJob, progress: Callable[[str], None] = lambda
 def _filters(job: CouplingJob) -> Filters:
     find = coupling.evaluate if job.manual else coupling.synthesize
     try:
-        return find(*job.plants, *job.controllers, uncertainty=list(job.measured) or None,
-                    disturbances=job.disturbances, **job.options)
+        return find(*job.plants, *job.controllers, uncertainty=_uncertainty(job), disturbances=job.disturbances,
+                    **job.options)
     except InputError as error:
         raise InputError(error.what, where=f"{job.files[0]} {_place(error.where, job)}", expected=error.expected,
                          remedy=error.remedy) from None
+
+
+def _uncertainty(job: CouplingJob) -> Uncertainty | list[FrequencyResponse] | None:
+    """The measured plants, with what their noise may hide unless the file says otherwise."""
+    if not job.circles or not any(plant.has_covariance for plant in job.measured):
+        return list(job.measured) or None
+    try:
+        return coupling.dual_youla(list(job.measured), job.plants, job.controllers).with_confidence()
+    except InputError as error:
+        if error.where != "with_confidence":
+            raise InputError(error.what, where=error.where.replace("P_frf", "uncertainty"), expected=error.expected,
+                             remedy=error.remedy) from None
+        remedy = f"{error.remedy} circles = false leaves the circles out, and the report says so."
+        raise InputError(error.what, where="uncertainty", expected=error.expected, remedy=remedy) from None
 
 
 def _place(where: str, job: CouplingJob) -> str:

@@ -52,6 +52,10 @@ def coupling_assumptions(result: Coupling) -> Iterator[str]:
     if result.job.measured:
         yield ("Between two measured frequencies the larger of the two envelope values holds, below the first and "
                "above the last the end value; the measured plants have as many unstable poles as the model.")
+        yield from (remark.text for remark in result.job.remarks)
+        if result.job.circles and any(plant.has_covariance for plant in result.job.measured):
+            yield ("The envelope includes the 95 % circle of every measured value: the plants are in it with that "
+                   "probability at each frequency, not at all together.")
     yield ARITHMETIC
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import control
 import numpy as np
 from pydantic import Field
 
-from ..errors import InputError
-from ._couple_frf import plants_from_pairs, plants_from_whole
+from .._checks import quoted
+from ..errors import InputError, Outcome
+from ..identify import FrequencyResponse
+from ._couple_frf import plant_remarks, plants_from_pairs, plants_from_whole
 from ._couple_systems import LTI, System, SystemTable, files_of, linear_system
 from ._toml import Number, Table, read_toml
 
@@ -53,6 +54,7 @@ class UncertaintyTable(Table):
     frf_1: Files | None = None
     frf_2: Files | None = None
     frf: Files | None = None
+    circles: Annotated[bool, Field(strict=True)] = True
 
 
 class DesignTable(Table):
@@ -96,7 +98,7 @@ class CouplingJob:
         Of the subsystems.
     plants, controllers, disturbances : tuple of LTI
         Of subsystems 1 and 2.
-    measured : tuple of control.FrequencyResponseData
+    measured : tuple of FrequencyResponse
         2x2 plants, one per machine position; empty without uncertainty.
     measured_files : tuple of str
         The files of each, for messages.
@@ -108,6 +110,8 @@ class CouplingJob:
         The coupling file and every file it names.
     exports : tuple of str
         Endings of further files with the filters: "mat", "c", "h".
+    circles : bool
+        Whether the 95 % circles of measured plants with covariance enter the envelope.
     """
 
     name: str
@@ -115,12 +119,18 @@ class CouplingJob:
     plants: tuple[LTI, LTI]
     controllers: tuple[LTI, LTI]
     disturbances: tuple[LTI | float, LTI | float]
-    measured: tuple[control.FrequencyResponseData, ...]
+    measured: tuple[FrequencyResponse, ...]
     measured_files: tuple[str, ...]
     manual: bool
     options: dict[str, Any]
     files: tuple[Path, ...]
     exports: tuple[str, ...] = ()
+    circles: bool = True
+
+    @property
+    def remarks(self) -> tuple[Outcome, ...]:
+        """What the claims about the measured plants leave out; empty if nothing."""
+        return tuple(plant_remarks(self.measured, self.measured_files, self.circles))
 
 
 def read_coupling(path: str | Path) -> CouplingJob:
@@ -165,7 +175,8 @@ def read_coupling(path: str | Path) -> CouplingJob:
         data.coupling.name, (halves[0].name or "subsystem 1", halves[1].name or "subsystem 2"),
         (plants[0], plants[1]), (controllers[0], controllers[1]), _disturbances(halves, dt, path), measured,
         tuple(", ".join(file.name for file in group) for group in groups), manual,
-        dict(_options(data.design, manual, dt, path)), files, _exports(data.coupling.export, dt, path))
+        dict(_options(data.design, manual, dt, path)), files, _exports(data.coupling.export, dt, path),
+        data.uncertainty is None or data.uncertainty.circles)
 
 
 def _exports(endings: Sequence[str], dt: float, path: Path) -> tuple[str, ...]:
@@ -187,7 +198,7 @@ def _disturbances(halves: tuple[SubsystemTable, SubsystemTable], dt: float, path
 
 
 def _measured(table: UncertaintyTable | None, dt: float, path: Path
-              ) -> tuple[tuple[control.FrequencyResponseData, ...], list[list[Path]]]:
+              ) -> tuple[tuple[FrequencyResponse, ...], list[list[Path]]]:
     """Plants, and the files of each."""
     if table is None:
         return (), []
@@ -235,5 +246,6 @@ def _poles(value: Any, where: str) -> Any:
             return [complex(*map(float, pole)) if isinstance(pole, list) else complex(pole) for pole in value]
         return float(value)
     except (TypeError, ValueError):
-        raise InputError(f"pole = {value!r}", where=where, expected="a number, or a list of numbers and pairs [re, im]",
+        raise InputError(f"pole = {quoted(value)}", where=where,
+                         expected="a number, or a list of numbers and pairs [re, im]",
                          remedy="Poles are points of the z or s plane.") from None

@@ -1,107 +1,104 @@
-"""Measured frequency responses of a coupling file: CSV with a header row, hertz in, rad/s out."""
+"""Measured plants of a coupling file: frequency responses of one subsystem each, or of both together."""
 
 from __future__ import annotations
 
-from itertools import product
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import control
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import InputError
-from ._toml import read_text
+from ..errors import InputError, Outcome
+from ..identify import FrequencyResponse, read_response
 
-_MAX_BYTES = 100_000_000
-_ONE = ("frequency", "real", "imag")
-_FOUR = ("frequency", *(f"{part}{row}{column}" for row, column in product("12", "12") for part in ("re", "im")))
-_ALIAS = {"freq": "frequency", "f": "frequency", "re": "real", "im": "imag"}
-_HERTZ = ("", "hz")
+CIRCLES_LEFT_OUT = Outcome(
+    False, "circles_left_out", "The 95 % circles of the measured responses are not in the envelope (circles = false): "
+    "a plant in them need not be stabilised. Leave circles out of [uncertainty] to have them included.")
 
 
-def plants_from_pairs(first: list[Path], second: list[Path], dt: float) -> tuple[control.FrequencyResponseData, ...]:
+def plants_from_pairs(first: list[Path], second: list[Path], dt: float) -> tuple[FrequencyResponse, ...]:
     """Diagonal 2x2 plants, the k-th file of each list one machine position.
 
     Parameters
     ----------
     first, second : list of Path
-        Files of the subsystems: frequency [Hz], real, imag.
+        Files of the subsystems, one input and one output each.
     dt : float
-        Sample time [s].
+        Sample time of the loops [s]; CSV files do not say theirs.
     """
-    found = []
-    for one, two in zip(first, second, strict=True):
-        (frequencies, upper), (others, lower) = _read(one, _ONE), _read(two, _ONE)
-        if frequencies.shape != others.shape or not np.allclose(frequencies, others, rtol=1e-9, atol=0.0):
-            raise InputError(f"its frequencies differ from those of {one.name!r}", where=str(two),
-                             expected="the same frequencies in both files of a machine position")
-        response = np.zeros((2, 2, len(frequencies)), dtype=complex)
-        response[0, 0], response[1, 1] = upper[0], lower[0]
-        found.append(_plant(frequencies, response, dt))
-    return tuple(found)
+    return tuple(_diagonal(_read(one, dt, 1), _read(two, dt, 1), one, two)
+                 for one, two in zip(first, second, strict=True))
 
 
-def plants_from_whole(files: list[Path], dt: float) -> tuple[control.FrequencyResponseData, ...]:
+def plants_from_whole(files: list[Path], dt: float) -> tuple[FrequencyResponse, ...]:
     """2x2 plants, one file each.
 
     Parameters
     ----------
     files : list of Path
-        Files: frequency [Hz], re11, im11, re12, im12, re21, im21, re22, im22.
+        Files with two inputs and two outputs.
     dt : float
-        Sample time [s].
+        Sample time of the loops [s]; CSV files do not say theirs.
     """
-    return tuple(_plant(frequencies, entries.reshape(2, 2, -1), dt)
-                 for frequencies, entries in (_read(file, _FOUR) for file in files))
+    return tuple(_read(file, dt, 2) for file in files)
 
 
-def _plant(frequencies: NDArray[np.float64], response: NDArray[np.complex128], dt: float
-           ) -> control.FrequencyResponseData:
-    return control.FrequencyResponseData(response, 2 * np.pi * frequencies, dt=dt)
+def plant_remarks(measured: Sequence[FrequencyResponse], names: Sequence[str], circles: bool) -> Iterator[Outcome]:
+    """What the claims about the measured plants leave out.
+
+    Parameters
+    ----------
+    measured : sequence of FrequencyResponse
+        Plants of all machine positions.
+    names : sequence of str
+        Files of each, for the text.
+    circles : bool
+        Whether confidence circles are to be in the envelope.
+    """
+    bare = [name for plant, name in zip(measured, names, strict=True) if not plant.has_covariance]
+    if bare:
+        listed = ", ".join(bare[:3]) + (f" and {len(bare) - 3} more" if len(bare) > 3 else "")
+        yield Outcome(False, "frf_without_covariance",
+                      f"Responses without covariance: {listed}. The envelope holds their values without the noise of "
+                      "the measurement. Give the .json files that robthermal frf writes.")
+    if len(bare) < len(measured) and not circles:
+        yield CIRCLES_LEFT_OUT
 
 
-def _read(path: Path, columns: tuple[str, ...]) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Frequencies [Hz] and one row of complex numbers per entry."""
-    lines = enumerate(read_text(path, "CSV", _MAX_BYTES).splitlines(), start=1)
-    rows = [(number, [cell.strip(' "') for cell in line.split(",")]) for number, line in lines
-            if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise InputError("is empty", where=str(path), expected=f"columns {', '.join(columns)}")
-    names = rows[0][1]
-    header = _header(names, columns, path)
-    values = np.array([_numbers(row, f"{path}, line {number}", names) for number, row in rows[1:]])
-    if len(values) < 2:
-        raise InputError(f"has {len(values)} frequencies", where=str(path), expected="at least two")
-    table = dict(zip(header, values.T, strict=True))
-    entries = [table[real] + 1j * table[imag] for real, imag in zip(columns[1::2], columns[2::2], strict=True)]
-    return table["frequency"], np.array(entries)
-
-
-def _header(names: list[str], columns: tuple[str, ...], path: Path) -> list[str]:
-    found = []
-    for name in names:
-        plain, _, unit = name.lower().partition("[")
-        unit = unit.rstrip("] ")
-        plain = _ALIAS.get(plain.strip(), plain.strip())
-        if plain == "frequency" and unit not in _HERTZ:
-            raise InputError(f"column {name!r}", where=str(path), expected="frequencies in hertz",
-                             remedy="Convert them: f = omega / (2 pi).")
-        found.append(plain)
-    if sorted(found) != sorted(columns):
-        raise InputError(f"columns are {', '.join(names)}", where=str(path),
-                         expected=f"a header row with {', '.join(columns)}; frequency in Hz")
+def _read(path: Path, dt: float, size: int) -> FrequencyResponse:
+    found = read_response(path, sample_time=dt or None)
+    shape = len(found.output_names), len(found.input_names)
+    if shape != (size, size):
+        raise InputError(f"is a response with {shape[0]} outputs and {shape[1]} inputs", where=str(path),
+                         expected=f"{size} of each",
+                         remedy="Files of frf hold both subsystems, those of frf_1 and frf_2 one each; robthermal frf "
+                                "--input --output chooses the columns.")
     return found
 
 
-def _numbers(row: list[str], where: str, header: list[str]) -> list[float]:
-    if len(row) != len(header):
-        raise InputError(f"has {len(row)} values", where=where, expected=f"{len(header)}, one per column")
-    try:
-        values = [float(text) for text in row]
-    except ValueError as error:
-        raise InputError(str(error), where=where, expected="numbers") from None
-    wrong = [name for name, value in zip(header, values, strict=True) if not np.isfinite(value)]
-    if wrong:
-        raise InputError(f"column {wrong[0]!r} is not a finite number", where=where, expected="finite numbers",
-                         remedy="Leave that frequency out.")
-    return values
+def _diagonal(one: FrequencyResponse, two: FrequencyResponse, first: Path, second: Path) -> FrequencyResponse:
+    """Two subsystems measured by themselves as one plant; where one has no covariance the pair has none."""
+    if len(one) != len(two) or not np.allclose(one.frequencies, two.frequencies, rtol=1e-9, atol=0.0):
+        raise InputError(f"its frequencies differ from those of {first.name!r}", where=str(second),
+                         expected="the same frequencies in both files of a machine position")
+    times = [G.sample_time for G in (one, two) if not np.isnan(G.sample_time)]
+    if len(times) == 2 and not np.isclose(times[0], times[1], rtol=1e-6):
+        raise InputError(f"its sample time is {times[1]:g} s, that of {first.name!r} {times[0]:g} s",
+                         where=str(second), expected="one sample time", remedy="Measure both at one rate.")
+    n_f = len(one)
+    response, noise = np.zeros((2, 2, n_f), dtype=complex), np.zeros((2, 2, n_f), dtype=complex)
+    covariance = np.zeros((4, 4, n_f), dtype=complex)  # entries of the columns of G: 11, 21, 12, 22
+    ratio = np.zeros((2, 2, n_f))
+    for k, G in enumerate((one, two)):
+        response[k, k], noise[k, k], covariance[3 * k, 3 * k] = G.response, G.noise_covariance, G.covariance
+        if G.ratio_uncertainty is not None:
+            ratio[k, k] = G.ratio_uncertainty
+    known = one.has_covariance and two.has_covariance
+    freedom = np.minimum(one.degrees_of_freedom, two.degrees_of_freedom)  # fewer: a wider circle
+    notes = tuple(dict.fromkeys((*one.notes, *two.notes)))
+    return FrequencyResponse(
+        frequencies=one.frequencies, response=response, noise_covariance=noise,
+        covariance=covariance if known else np.full_like(covariance, np.nan),
+        degrees_of_freedom=freedom if known else np.zeros(n_f), suspect=one.suspect | two.suspect,
+        ratio_uncertainty=ratio, input_names=("u1", "u2"), output_names=("y1", "y2"),
+        sample_time=times[0] if times else np.nan, n_samples=min(one.n_samples, two.n_samples),
+        half_width=max(one.half_width, two.half_width), method=f"{one.method}; {two.method}", notes=notes)

@@ -69,7 +69,7 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
                     provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now())
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
-        result.filters.save(folder / "coupling.json", job.name)
+        result.filters.save(folder / "coupling.json", job.name, remarks=job.remarks)
         for ending in job.exports:
             result.filters.export(folder / f"coupling.{ending}", job.name)
     return report

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..calibration import Fit, ResponseFit, calibrate
 from ..errors import InputError
-from ..identify import FrequencyResponse, etfe, lpm, lrm, lrmp, spectral
+from ..identify import FrequencyResponse, etfe, is_response, lpm, lrm, lrmp, read_response, spectral
 from ..signals import Excitation, Record, multisines, read_record
 from ..thermal import System
 
@@ -156,15 +157,18 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
     return written
 
 
-def read_measured(paths: Sequence[Path], system: System) -> list[Record | FrequencyResponse]:
-    """Read what a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
+def read_measured(paths: Sequence[Path], system: System, *, median_filter: float | None = None
+                  ) -> list[Record | FrequencyResponse]:
+    """Read what a calibration or a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
 
     Parameters
     ----------
     paths : sequence of Path
-        Responses end in .json or .npz; everything else is a record.
+        Records and responses in any order; the content tells which is which.
     system : System
-        Gives the columns.
+        Gives the columns of records.
+    median_filter : float, optional
+        Length of a median filter over the sensors of records [s].
 
     Returns
     -------
@@ -173,7 +177,7 @@ def read_measured(paths: Sequence[Path], system: System) -> list[Record | Freque
     Raises
     ------
     InputError
-        As the readers.
+        As the readers; also for a response without covariance, whose misfit cannot be weighed.
 
     Examples
     --------
@@ -181,5 +185,66 @@ def read_measured(paths: Sequence[Path], system: System) -> list[Record | Freque
     >>> rt.project.read_measured([], rt.systems.two_module())
     []
     """
-    return [FrequencyResponse.load(path) if path.suffix.lower() in (".json", ".npz") else read_record(path, system)
+    return [_response(path) if is_response(path) else read_record(path, system, median_filter=median_filter)
             for path in paths]
+
+
+def _response(path: Path) -> FrequencyResponse:
+    found = read_response(path)
+    if not found.has_covariance:
+        raise InputError("is a frequency response without covariance and without names of channels", where=str(path),
+                         expected="the .json, .npz or .mat file that robthermal frf writes",
+                         remedy="Without a covariance no misfit can be called large.")
+    return found
+
+
+def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
+                    median_filter: float | None = None, operating_point: Mapping[str, float] | None = None
+                    ) -> Fit | ResponseFit:
+    """Calibrate a system with record files, or with one file of a frequency response.
+
+    Parameters
+    ----------
+    system : System
+        With starting values and a [fit] table.
+    records : sequence of Path
+        Training records, or one frequency response.
+    validation : sequence of Path
+        Records that the fit does not see; not for a frequency response.
+    median_filter : float, optional
+        Length of a median filter over the sensors of records [s].
+    operating_point : mapping, optional
+        Of a frequency response: means of heaters [unit], module currents [A] and ambients [K].
+
+    Returns
+    -------
+    Fit or ResponseFit
+
+    Raises
+    ------
+    InputError
+        As the readers and `rt.calibrate`; for a response beside other files, or an operating point of records.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.project.calibrate_files(rt.systems.two_module(), [])
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: records: no file is given. Expected records, or one frequency response.
+    """
+    train, held_out = (read_measured(paths, system, median_filter=median_filter) for paths in (records, validation))
+    expected = "records, or one frequency response"
+    if not train:
+        raise InputError("no file is given", where="records", expected=expected)
+    runs = [one for one in train if isinstance(one, Record)]
+    seen = [one for one in held_out if isinstance(one, Record)]
+    if len(runs) == len(train) and len(seen) == len(held_out):
+        if operating_point:
+            raise InputError("an operating point is given with records", where="--operating-point",
+                             remedy="Leave it out: a record brings its own inputs.")
+        return calibrate(system, runs, validation=seen or None)
+    if len(train) > 1 or held_out or isinstance(train[0], Record):
+        raise InputError("a frequency response stands beside other files", where="records", expected=expected,
+                         remedy="Give all records of one machine to robthermal frf, and its result here, alone.")
+    return calibrate(system, train[0], operating_point=operating_point or None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
@@ -10,37 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._checks import finite_number as finite_number
+from .._checks import positive_number as positive_number
 from ..errors import InputError
 
 Array = NDArray[np.float64]
-
-
-def finite_number(value: object, where: str, unit: str = "") -> float:
-    """`value` as a finite float; booleans, text, complex numbers, NaN and infinity are refused."""
-    expected = f"a finite number{f' [{unit}]' if unit else ''}"
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value[()]
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.integer, np.floating)):
-        raise InputError(f"{where} is {value!r}, not a number", where=f"argument {where}", expected=expected)
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise InputError(f"{where} is {number}, not finite", where=f"argument {where}", expected=expected)
-    return number
-
-
-def positive_number(value: object, where: str, unit: str = "") -> float:
-    """`value` as a finite float above zero."""
-    number = finite_number(value, where, unit)
-    if number <= 0.0:
-        raise InputError(
-            f"{where} is {number!r}",
-            where=f"argument {where}",
-            expected=f"a positive number{f' [{unit}]' if unit else ''}",
-        )
-    return number
 
 
 def channel_names(value: object, where: str) -> tuple[str, ...]:

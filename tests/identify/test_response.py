@@ -92,14 +92,14 @@ def test_json_is_plain_json(estimate: FrequencyResponse, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("G.pkl", b"", "suffix"),
+        ("G.pkl", b"\x80\x04N.", "cannot be read"),
         ("absent.json", None, "no such file"),
         ("G.json", b"[1, 2]", "cannot be read"),
         ("G.json", b"{", "cannot be read"),
         ("G.json", b'{"format": "else"}', "format"),
         ("G.json", b'{"format": "robthermal frequency response 1"}', "lacks"),
         ("G.npz", b"PK nonsense", "cannot be read"),
-        ("G.mat", b"nonsense", "cannot be read"),
+        ("G.mat", b"nonsense", "no frequency response"),
     ],
 )
 def test_files_that_are_not_ours_are_refused(tmp_path, name: str, content: bytes | None, message: str) -> None:
