@@ -21,9 +21,10 @@ SURFACE = {
         convection_law join_models module_properties
     """,
     "certify": """
-        CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds contraction frequency_norm
-        frequency_radius gains heater_heat hinf invariance largest_current largest_regulated_current limit_map
-        loop network observer peak regulated runaway runaway_free stability thesis_bounds
+        CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
+        contraction frequency_norm frequency_radius gains heater_heat hinf invariance largest_current
+        largest_regulated_current limit_map loop network observer peak regulated runaway runaway_free stability
+        thesis_bounds usable_current
     """,
     "coupling": """
         CoprimeFactors Destabilising Filters FixedPoint Joint MuBound NormalizedFactors Performance ScaledPath

@@ -8,7 +8,6 @@ from .._linear import peak as peak
 from .._linear import stability as stability
 from ._contraction import contraction as contraction
 from ._enclosure import RunawayFree as RunawayFree
-from ._enclosure import heater_heat as heater_heat
 from ._enclosure import runaway_free as runaway_free
 from ._gains import Gains as Gains
 from ._gains import gains as gains
@@ -24,10 +23,14 @@ from ._regulated import largest_regulated_current as largest_regulated_current
 from ._regulated import regulated as regulated
 from ._runaway import Runaway as Runaway
 from ._runaway import runaway as runaway
+from ._surroundings import heater_heat as heater_heat
 from ._thesis import ThesisBounds as ThesisBounds
 from ._thesis import thesis_bounds as thesis_bounds
+from ._usable import usable_current as usable_current
+from ._usable_result import CurrentBound as CurrentBound
+from ._usable_result import UsableCurrent as UsableCurrent
 
-__all__ = ["CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds", "contraction",
-           "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
-           "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
-           "runaway_free", "stability", "thesis_bounds"]
+__all__ = ["CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds",
+           "UsableCurrent", "contraction", "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf",
+           "invariance", "largest_current", "largest_regulated_current", "limit_map", "loop", "network", "observer",
+           "peak", "regulated", "runaway", "runaway_free", "stability", "thesis_bounds", "usable_current"]

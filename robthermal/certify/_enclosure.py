@@ -8,34 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import spsolve
 
-from ..errors import InputError, Outcome
-from ..thermal import Equations, System
+from ..errors import Outcome
+from ..thermal import System
 from ..verification import Certificate, not_certified
 from ._contraction import Method, contraction
+from ._energy import energy_rate
+from ._faces import Array, Faces
 from ._invariance import invariance
+from ._jacobian import box_jacobian
 from ._lyapunov import Structure
 from ._sections import (
     Currents,
     Interval,
     current_box,
     made_by,
-    named_ranges,
+    parameter_box,
     region_section,
     system_section,
 )
+from ._smallest_box import COLDEST, HOTTEST, smallest_box
+from ._surroundings import ambient_ranges, heater_heat
 
-_HOTTEST = 1000.0  # K
-_COLDEST = 60.0
-_MARGIN = 1e-3  # W of inward heat left on every face of the box
-_ITERATIONS = 400
-_STEP = 0.01  # K, for the slope of a loss
+RESERVE = 0.005  # share of every heat kept in reserve in boxes: three standard deviations of an ordinary calibration
+RESERVE_OF_RANGES = 0.001  # where ranges of the parameters say themselves how uncertain they are
+_TIGHTER = (1.0, 0.2, 0.0)  # shares of the reserve that are tried where there is no box with all of it
 
 
 @dataclass(frozen=True)
@@ -45,17 +46,21 @@ class RunawayFree:
     Parameters
     ----------
     temperature : dict
-        Lump to [lower, upper] [K]: the box; empty if none was found.
+        Lump to (lower, upper) [K]: the box; empty if none was found.
     invariance, contraction : Certificate
         The box is never left; in it the network contracts.
     outcome : Outcome
         "certified", or which of the two is missing and why.
+    limiting_parameter : str or None
+        Where it fails only because of the ranges of `parameters`: the one without whose range it would hold, or come
+        closest to it.
     """
 
     temperature: dict[str, Interval]
     invariance: Certificate
     contraction: Certificate
     outcome: Outcome
+    limiting_parameter: str | None = None
 
     @property
     def holds(self) -> bool:
@@ -73,8 +78,11 @@ class RunawayFree:
 
 def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Interval] | None = None,
                  heat: Mapping[str, Interval] | None = None, method: Method = "energy", structure: Structure = "full",
-                 large: bool = False) -> RunawayFree:
+                 large: bool = False, parameters: Mapping[str, Interval] | None = None) -> RunawayFree:
     """Certify that a machine cannot run away thermally.
+
+    The box is chosen with a reserve of 0.5 % of every single heat (a link's, Peltier, Joule, conducted), where it
+    exists, so that the claim survives the errors of an ordinary calibration; 0.1 % where `parameters` are given.
 
     Parameters
     ----------
@@ -90,6 +98,9 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
         Norm of the contraction.
     structure, large
         As in `contraction`.
+    parameters : mapping, optional
+        Ranges of uncertain numbers of the system as in `contraction`; ranges of heaters' gains widen `heat` where it is
+        not given.
 
     Returns
     -------
@@ -98,135 +109,84 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     Raises
     ------
     InputError
-        Ranges that do not fit the system; a heater without limits when `heat` is not given.
+        Ranges that do not fit the system; a heater without limits when `heat` is not given; ranges of parameters that
+        no checker covers.
 
     Examples
     --------
     >>> import robthermal as rt
-    >>> safe = rt.certify.runaway_free(rt.systems.two_module(), current={"m1": (0.0, 1.0), "m2": (0.0, 1.0)})
-    >>> safe.holds
+    >>> found = rt.certify.runaway_free(rt.systems.two_module(), current={"m1": (0.0, 1.0), "m2": (0.0, 1.0)})
+    >>> found.holds
     True
     """
     system_section(system)  # refuses effects before they meet the box
     currents = current_box(system, current)
-    heat = heater_heat(system) if heat is None else heat
-    box = invariant_box(system, currents, ambient or {}, heat)
+    ranges = parameter_box(system, parameters or {})
+    around = ambient_ranges(system, ambient, parameters)
+    heat = heater_heat(system, parameters) if heat is None else heat
+
+    def faces(kept: Mapping[str, Any]) -> Faces:
+        return Faces(system, around, heat, kept, RESERVE_OF_RANGES if kept else RESERVE)
+
+    box = box_with_reserve(faces(ranges), currents)
     if box is None:
-        region = region_section(system, current, (_COLDEST + 200, _HOTTEST))
-        reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
-                  "diverges. Narrow the currents, or improve the heat sink.")
-        refused = not_certified("invariance", system=system_section(system), region=region, evidence={}, reason=reason,
-                                made_by=made_by("monotone iteration", "none"))
-        return RunawayFree({}, refused, refused, Outcome(False, "not_certified", f"Not certified: {reason}"))
-    stays = invariance(system, current=current, temperature=box, ambient=ambient, heat=heat or None)
-    shrinks = contraction(system, current=current, temperature=box, method=method, structure=structure, large=large)
-    return RunawayFree(box, stays, shrinks, _outcome(stays, shrinks, box))
+        refused = no_box(system, current)
+        return RunawayFree({}, refused, refused, Outcome(False, "not_certified", f"Not certified: {refused.reason}"),
+                           _limiting(ranges, lambda kept: _size(box_with_reserve(faces(kept), currents))))
+    named = named_box(system, box)
+    stays = invariance(system, current=current, temperature=named, ambient=around, heat=heat or None,
+                       parameters=parameters)
+    shrinks = contraction(system, current=current, temperature=named, method=method, structure=structure, large=large,
+                          parameters=parameters)
+    limiting = None
+    if not (stays.holds and shrinks.holds):
+        limiting = _limiting(ranges, lambda kept: _rate(system, currents, kept, faces(kept)))
+    return RunawayFree(named, stays, shrinks, _outcome(stays, shrinks, named), limiting)
 
 
-def heater_heat(system: System) -> dict[str, Interval]:
-    """Heat range of every heated lump from the declared limits of the heaters.
-
-    Parameters
-    ----------
-    system : System
-        Whose heaters.
-
-    Returns
-    -------
-    dict
-        {lump: (lower, upper)} [W]; heaters on one lump add up.
-
-    Raises
-    ------
-    InputError
-        A heater without limits.
-
-    Examples
-    --------
-    >>> import robthermal as rt
-    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
-    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}],
-    ...                 inputs={"foil": {"lump": "bar", "gain": 2.0, "limits": (0.0, 10.0)}})
-    >>> rt.certify.heater_heat(bar)
-    {'bar': (0.0, 20.0)}
-    """
-    heat: dict[str, Interval] = {}
-    for name, heater in system.inputs.items():
-        if heater.limits is None:
-            raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
-                             remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
-        ends = sorted(heater.gain * limit for limit in heater.limits)
-        low, high = heat.get(heater.lump, (0.0, 0.0))
-        heat[heater.lump] = (low + ends[0], high + ends[1])
-    return heat
-
-
-def invariant_box(system: System, currents: Mapping[str, list[float]], ambient: Mapping[str, Interval],
-                  heat: Mapping[str, Interval]) -> dict[str, Interval] | None:
-    """Smallest box by monotone iteration from the ambient range, with heat to spare; None if it diverges.
-
-    Parameters
-    ----------
-    system : System
-        Whose.
-    currents, ambient, heat : mapping
-        Ranges by name [A], [K], [W].
-
-    Returns
-    -------
-    dict or None
-        {lump: (lower, upper)} [K].
-    """
-    eq = Equations(system)
-    ranges = named_ranges(ambient, system.ambient_names, "ambient", "ambient", kelvin=True)
-    around = np.array([ranges.get(name, [a.temperature] * 2) for name, a in system.ambients.items()], float).T
-    loads = np.zeros((2, len(system.lumps)))
-    for name, pair in named_ranges(heat, system.lump_names, "heat", "lump").items():
-        loads[:, system.lump_names.index(name)] = pair
-    loads += np.array([[-_MARGIN], [_MARGIN]])  # so that heat flows strictly inwards on every face
-    limits = np.array([currents[name] for name in system.modules], float).reshape(-1, 2).T
-    box = np.array([np.full(len(system.lumps), around[0].min()), np.full(len(system.lumps), around[1].max())])
-    for _ in range(_ITERATIONS):
-        outward = [_outward(eq, box, box[side], side, around, loads, limits) for side in (0, 1)]
-        if max(heat.max() for heat in outward) <= 0.5 * _MARGIN:
-            return {name: (float(a), float(b)) for name, a, b in zip(system.lumps, *np.round(box, 6), strict=True)}
-        # Newton in each lump's own face, which a loss bends: the matrix stays an M-matrix, so that no face moves in.
-        for side, sign in ((0, -1), (1, 1)):
-            moved = _outward(eq, box, box[side] + sign * _STEP, side, around, loads, limits)
-            steeper = np.maximum(0.0, (outward[side] - moved) / _STEP + eq.A.diagonal())
-            step = spsolve(csc_array(diags_array(steeper) - eq.A), np.maximum(outward[side], 0.0))
-            box[side] += sign * step
-        if not np.isfinite(box).all() or box[1].max() > _HOTTEST or box[0].min() < _COLDEST:
-            return None
+def box_with_reserve(faces: Faces, current: Mapping[str, Any]) -> Array | None:
+    """Smallest box that is never left, with as much of the reserve of the faces as there is; None if there is none."""
+    for share in _TIGHTER:
+        box = smallest_box(Faces(faces.system, faces.ambient, faces.heat, faces.parameters, share * faces.reserve),
+                           current)
+        if box is not None:
+            return box
     return None
 
 
-def _outward(eq: Equations, box: np.ndarray, face: np.ndarray, side: int, around: np.ndarray, loads: np.ndarray,
-             limits: np.ndarray) -> np.ndarray:
-    """Largest heat into every lump that pushes it out of its lower (0) or upper (1) face [W].
-
-    The lump is at ``face``, all others anywhere in the box; linear links are taken at the same side.
-    """
-    n, na, sign = len(eq.capacity), around.shape[1], (-1, 1)[side]
-    own_heat = eq.A.diagonal() * (face - box[side])
-    extreme = sign * (eq.A @ box[side] + own_heat + loads[side] + eq.B[:, eq.B.shape[1] - na:] @ around[side])
-    nodes, faces = np.concatenate([box, around], axis=1), np.concatenate([face, around[side]])
-    for term in eq.terms:
-        count = len(term.a)
-        grid = np.linspace(limits[0], limits[1], 9) if limits.shape[1] == count and _is_module(term, eq) else None
-        currents = grid if grid is not None else np.zeros((1, 0))
-        for own, other, which in ((term.a, term.b, 0), (term.b, term.a, 1)):
-            best = np.full(count, -np.inf)
-            for current, far in product(currents, nodes[:, other]):
-                first, second = (faces[own], far) if which == 0 else (far, faces[own])
-                best = np.maximum(best, sign * term.heat(first, second, current)[which])
-            inside = own < n
-            np.add.at(extreme, own[inside], best[inside])
-    return np.asarray(extreme)
+def named_box(system: System, box: Array) -> dict[str, Interval]:
+    """{lump: (lower, upper)} [K] of an array (2, n)."""
+    return {name: (float(low), float(high)) for name, low, high in zip(system.lumps, *box, strict=True)}
 
 
-def _is_module(term: object, eq: Equations) -> bool:
-    return bool(eq.system.modules) and term is eq.terms[0]
+def no_box(system: System, current: Currents) -> Certificate:
+    """The refusal where no box was found."""
+    region = region_section(system, current, (COLDEST + 200, HOTTEST))
+    reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
+              "diverges. Narrow the currents, or improve the heat sink.")
+    return not_certified("invariance", system=system_section(system), region=region, evidence={}, reason=reason,
+                         made_by=made_by("Newton's method on the faces", "none"))
+
+
+def _limiting(ranges: Mapping[str, Any], better: Any) -> str | None:
+    """The parameter without whose range the claim comes out best, if that is better than with all of them."""
+    if not ranges:
+        return None
+    scores = {name: better({key: pair for key, pair in ranges.items() if key != name}) for name in ranges}
+    best = max(scores, key=lambda name: scores[name])
+    return best if scores[best] > better(ranges) else None
+
+
+def _size(box: Array | None) -> float:
+    return -np.inf if box is None else -float(np.ptp(box))
+
+
+def _rate(system: System, current: Mapping[str, Any], ranges: Mapping[str, Any], faces: Faces) -> float:
+    box = box_with_reserve(faces, current)
+    if box is None:
+        return -np.inf
+    temperature = {name: list(pair) for name, pair in named_box(system, box).items()}
+    return energy_rate(box_jacobian(system, {"temperature": temperature, "current": current, "parameters": ranges}))
 
 
 def _outcome(stays: Certificate, shrinks: Certificate, box: dict[str, Interval]) -> Outcome:

@@ -15,6 +15,7 @@ from ._sections import (
     region_section,
     system_section,
 )
+from ._surroundings import ambient_ranges
 
 
 def invariance(system: System, *, current: Currents, temperature: Temperatures,
@@ -57,9 +58,7 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     True
     """
     region = region_section(system, current, temperature, parameters)
-    nominal = {name: (part.temperature, part.temperature) for name, part in system.ambients.items()}
-    region["ambient"] = named_ranges({**nominal, **(ambient or {})}, system.ambient_names, "ambient", "ambient",
-                                     kelvin=True)
+    region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
     if heat:
         region["heat"] = named_ranges(heat, system.lump_names, "heat", "lump")
     return establish("invariance", system=system_section(system), region=region, evidence={},

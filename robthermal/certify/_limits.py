@@ -1,4 +1,4 @@
-"""The largest current that can be certified."""
+"""The largest current with which a box contracts: one of the four bounds of a usable current, not a limit for use."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from ._sections import Interval, Temperatures, region_section
 from ._weights import has_weights
 
 Direction = Literal["symmetric", "cooling", "heating"]
+DIRECTIONS = ("cooling", "heating", "symmetric")
 _SPAN = {"symmetric": (-1.0, 1.0), "cooling": (0.0, 1.0), "heating": (-1.0, 0.0)}
 _HIGHEST = 1e4  # A
 _LOWEST = 1e-6
@@ -30,12 +31,15 @@ _PRECISION_MATRIX = 4e-3  # every step may cost seconds
 
 @dataclass(frozen=True)
 class CurrentLimit:
-    """Largest certified current.
+    """Contraction limit inside a box; not a limit for use.
+
+    With these currents any two trajectories approach each other as long as both stay in the box. Whether the machine
+    stays in it is another question: `usable_current` answers it.
 
     Parameters
     ----------
     current : float
-        Every module may have any current in [-c, c], [0, c] or [-c, 0] [A]; 0 if not even zero current is certified.
+        The box contracts for all currents in [-c, c], [0, c] or [-c, 0] [A]; 0 if not even for zero current.
     direction : str
         "symmetric", "cooling" or "heating".
     method : str
@@ -59,7 +63,10 @@ class CurrentLimit:
 def largest_current(system: System, *, temperature: Temperatures, direction: Direction = "symmetric",
                     method: Method = "energy", parameters: Mapping[str, Interval] | None = None,
                     structure: Structure = "full", large: bool = False) -> CurrentLimit:
-    """Find the largest current range that can be certified, with its certificate.
+    """Find the contraction limit inside a box, with its certificate; not a limit for use.
+
+    The certificate says that trajectories *in* the box approach each other, not that they stay there: such currents may
+    overheat the machine. Which currents it can bear is the question of `usable_current`, of which this is one bound.
 
     Parameters
     ----------
@@ -103,7 +110,7 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
                          remedy="Without modules use rt.certify.contraction with current={}.")
 
     def box(c: float, hull: bool = False) -> BoxJacobian:
-        region = region_section(system, _range(system, direction, c), temperature, parameters)
+        region = region_section(system, current_range(system, direction, c), temperature, parameters)
         return box_jacobian(system, region, hull=hull)
 
     if method == "lyapunov":
@@ -114,20 +121,20 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
         low, _ = bisect(lambda c: has_weights(box(c), method))
     for back_off in (0.0, 1e-4, 1e-3, 1e-2, 0.05, 1.0):
         c = low * (1 - back_off)
-        certificate = contraction(system, current=_range(system, direction, c), temperature=temperature, method=method,
-                                  parameters=parameters, structure=structure, large=large)
+        certificate = contraction(system, current=current_range(system, direction, c), temperature=temperature,
+                                  method=method, parameters=parameters, structure=structure, large=large)
         if certificate.holds:
             return CurrentLimit(c, direction, method, certificate, _outcome(c, direction, method, back_off))
     return CurrentLimit(0.0, direction, method, certificate, Outcome(
         False, "not_certified", f"Not certified, not even without current: {certificate.reason}"))
 
 
-def bisect(holds: Callable[[float], bool]) -> tuple[float, float]:
+def bisect(holds: Callable[[float], bool], precision: float = _PRECISION) -> tuple[float, float]:
     """Largest current that holds and smallest that does not, close together."""
     low, high = 0.0, 1.0
     while holds(high) and high < _HIGHEST:
         low, high = high, 2 * high
-    while high - low > _PRECISION * high and _LOWEST < high < _HIGHEST:
+    while high - low > precision * high and _LOWEST < high < _HIGHEST:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low, high
@@ -147,7 +154,8 @@ def _matrix_limit(box: Callable[[float, bool], BoxJacobian], pattern: NDArray[np
     return low
 
 
-def _range(system: System, direction: str, c: float) -> dict[str, tuple[float, float]]:
+def current_range(system: System, direction: str, c: float) -> dict[str, tuple[float, float]]:
+    """{module: (lower, upper)} [A] of currents up to c in one direction."""
     low, high = _SPAN[direction]
     return {name: (low * c + 0.0, high * c) for name in system.modules}
 
@@ -155,4 +163,5 @@ def _range(system: System, direction: str, c: float) -> dict[str, tuple[float, f
 def _outcome(c: float, direction: str, method: str, back_off: float) -> Outcome:
     given_up = f", {100 * back_off:g} % given up for the proof" if back_off else ""
     return Outcome(True, "certified",
-                   f"Certified for {direction} currents up to {c:.4g} A (method {method}{given_up}).")
+                   f"{c:.4g} A, {direction}: contraction limit inside the box; not a limit for use (method {method}"
+                   f"{given_up}). rt.certify.usable_current tells which currents the machine can bear.")

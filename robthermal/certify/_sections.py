@@ -18,6 +18,7 @@ Temperatures = Interval | Mapping[str, Interval]
 _UNCERTAIN = (".capacity", ".conductance", *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance")
                                              for part in ("value", "slope")))
 
+_NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
@@ -79,22 +80,35 @@ def region_section(system: System, current: Currents, temperature: Temperatures,
                    parameters: Mapping[str, Interval] | None = None) -> dict[str, Any]:
     """Temperature and current box, and the ranges of uncertain parameters, checked against the system."""
     region = {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
-    if parameters:
-        region["parameters"] = parameter_box(system, parameters)
+    if ranges := parameter_box(system, parameters or {}):
+        region["parameters"] = ranges
     return region
 
 
 def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
-    """{parameter name: [lo, hi]} around the values of the system."""
-    names = tuple(name for name in system.parameter_names if name.endswith(_UNCERTAIN))
-    ranges = named_ranges(parameters, names, "parameters", "parameter that can be uncertain")
-    for name, (low, high) in ranges.items():
-        value = system.parameter(name)
+    """{parameter name: [lo, hi]} around the values of the system, of those that the claim depends on.
+
+    What only sensors, heaters or a start know is left out: no claim about the network in given ranges of currents,
+    heats and ambients depends on it. A conductance cannot be negative: its range is cut at 0.
+    """
+    every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
+    ranges = {}
+    for name, (low, high) in every.items():
+        where, value = f"argument parameters[{name!r}]", system.parameter(name)
+        if name.startswith(_NOT_OF_THE_NETWORK) or name.endswith((".disturbance", ".initial")):
+            continue
+        if not name.endswith(_UNCERTAIN):
+            raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
+                             expected="ranges of capacities, conductances, and values and slopes of modules",
+                             remedy="Leave it out of `parameters`, and hold it at its value in the calibration too.")
         if not low <= value <= high:
-            raise InputError(f"({low}, {high}) excludes the system's own value {value}",
-                             where=f"argument parameters[{name!r}]", expected="lower <= value <= upper")
-        if low <= 0 and not name.endswith(".slope"):
-            raise InputError(f"({low}, {high})", where=f"argument parameters[{name!r}]", expected="positive numbers")
+            raise InputError(f"({low}, {high}) excludes the system's own value {value}", where=where,
+                             expected="lower <= value <= upper")
+        if name.startswith("links."):
+            low = max(low, 0.0)
+        elif low <= 0 and not name.endswith(".slope"):
+            raise InputError(f"({low}, {high})", where=where, expected="positive numbers")
+        ranges[name] = [low, high]
     return ranges
 
 

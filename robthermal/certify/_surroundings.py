@@ -1,0 +1,62 @@
+"""Ranges of what acts on a machine from outside: ambients and heaters, with what their parameters add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ..errors import InputError
+from ..thermal import System
+from ._sections import Interval, named_ranges
+
+
+def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
+    """Heat range of every heated lump from the declared limits of the heaters.
+
+    Parameters
+    ----------
+    system : System
+        Whose heaters.
+    parameters : mapping, optional
+        {parameter name: (lower, upper)}; ranges of `inputs.NAME.gain` widen the heat, others change nothing.
+
+    Returns
+    -------
+    dict
+        {lump: (lower, upper)} [W]; heaters on one lump add up.
+
+    Raises
+    ------
+    InputError
+        A heater without limits.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}],
+    ...                 inputs={"foil": {"lump": "bar", "gain": 2.0, "limits": (0.0, 10.0)}})
+    >>> rt.certify.heater_heat(bar)
+    {'bar': (0.0, 20.0)}
+    >>> rt.certify.heater_heat(bar, {"inputs.foil.gain": (1.9, 2.1)})
+    {'bar': (0.0, 21.0)}
+    """
+    heat: dict[str, Interval] = {}
+    for name, heater in system.inputs.items():
+        if heater.limits is None:
+            raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
+                             remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
+        gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
+        ends = sorted(gain * limit for gain in gains for limit in heater.limits)
+        low, high = heat.get(heater.lump, (0.0, 0.0))
+        heat[heater.lump] = (low + ends[0], high + ends[-1])
+    return heat
+
+
+def ambient_ranges(system: System, ambient: Mapping[str, Interval] | None,
+                   parameters: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
+    """Range of every ambient [K]: as given, else that of its parameter, else its nominal temperature."""
+    ranges = {name: (part.temperature, part.temperature) for name, part in system.ambients.items()}
+    named = {name: f"ambients.{name}.temperature" for name in ranges}
+    ranges |= {name: (parameters or {})[key] for name, key in named.items() if key in (parameters or {})}
+    found = named_ranges({**ranges, **(ambient or {})}, system.ambient_names, "ambient", "ambient", kelvin=True)
+    return {name: (low, high) for name, (low, high) in found.items()}

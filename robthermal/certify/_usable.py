@@ -1,0 +1,163 @@
+"""The usable current: the smallest of the bounds by contraction, an invariant box, thermal runaway and the rating."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, Outcome
+from ..thermal import System
+from ..verification import Certificate
+from ._contraction import METHODS, Method, contraction
+from ._enclosure import named_box, no_box
+from ._invariance import invariance
+from ._limits import DIRECTIONS, Direction, current_range
+from ._regulated import SetPoints
+from ._sections import Interval, Temperatures, parameter_box, system_section
+from ._surroundings import ambient_ranges, heater_heat
+from ._usable_bounds import Lower, Question, contraction_bound, largest_box_current, rating_bound
+from ._usable_result import BOUNDS, CurrentBound, UsableCurrent
+from ._usable_runaway import runaway_bound
+
+_BACK_OFF = (0.0, 1e-3, 1e-2, 0.05, 0.2)
+_ABOVE = 1.02  # of the limit, where the parameter that binds is looked for
+_MEANING = {"contraction": "Contraction limit inside the stated box; not a limit for use.",
+            "box": "Up to it a box inside the stated one is never left, for all ambients and heats, and contracts."}
+
+
+def usable_current(system: System, *, direction: Direction = "cooling", temperature: Temperatures,
+                   ambient: Mapping[str, Interval] | None = None, heat: Mapping[str, Interval] | None = None,
+                   setpoint: SetPoints | None = None, parameters: Mapping[str, Interval] | None = None,
+                   lower: Lower = "inside", method: Method = "energy") -> UsableCurrent:
+    """Find the current that every module may have: the smallest of four bounds.
+
+    - *contraction*: up to it the stated box contracts (proven, `largest_current`).
+    - *box*: up to it a box inside the stated one is never left and contracts (proven).
+    - *runaway*: 0.98 I* of the network at the set-points; for modules without set-point, the current at which the cold
+      face is coldest in steady state. Computed, not proven.
+    - *rating*: the least of the declared `current_limits`.
+
+    At the smallest one the box is certified: a machine that starts in it stays in it, and forgets where it started,
+    whatever the currents do within the range, and ambients and heats in theirs.
+
+    Parameters
+    ----------
+    system : System
+        Network with at least one module.
+    direction : {"cooling", "heating", "symmetric"}
+        Range [0, c], [-c, 0] or [-c, c], for every module.
+    temperature : tuple or mapping
+        The stated box, which the machine must not leave: (lower, upper) of every lump, or {lump: (lower, upper)} [K].
+    ambient : mapping, optional
+        {ambient: (lower, upper)} [K]; default nominal.
+    heat : mapping, optional
+        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters.
+    setpoint : mapping, optional
+        {module: temperature, or (lower, upper), at which its cold face is held} [K].
+    parameters : mapping, optional
+        Ranges of uncertain numbers of the system {parameter name: (lower, upper)}: all four bounds and the certificates
+        then hold for all of them. What sensors alone know is ignored; gains of heaters widen `heat` where it is not
+        given.
+    lower : {"inside", "reported"}
+        Whether the lower ends must lie inside the stated box too, or are only reported.
+    method : {"energy", "sum", "max", "lyapunov"}
+        Norm of the contraction.
+
+    Returns
+    -------
+    UsableCurrent
+
+    Raises
+    ------
+    InputError
+        A system without modules, a stated box that excludes the ambients, a heater without limits when `heat` is not
+        given, ranges of parameters that no checker covers, unknown names.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> found = rt.certify.usable_current(rt.systems.two_module(), temperature=(278.15, 358.15), lower="reported")
+    >>> round(found.current, 2), found.limited_by, found.invariance.holds, found.contraction.holds
+    (1.48, 'runaway', True, True)
+    """
+    _check(system, direction, method, lower)
+    question = Question(system, direction, temperature, ambient_ranges(system, ambient, parameters),
+                        heater_heat(system, parameters) if heat is None else heat,
+                        parameter_box(system, parameters or {}), lower, method)
+    question.check_box()
+    runaway, costly = runaway_bound(question, setpoint)
+    inside = largest_box_current(question)
+    limits = {"contraction": contraction_bound(question), "box": _box_bound(question, inside), "runaway": runaway,
+              "rating": rating_bound(question)}
+    limits = {name: limits[name] for name in BOUNDS}
+    limited_by = min(BOUNDS, key=lambda name: limits[name].current)
+    for back_off in _BACK_OFF:
+        c = limits[limited_by].current * (1 - back_off)
+        box, stays, shrinks = _certified(question, c)
+        if stays.holds and shrinks.holds:
+            break
+    proven = stays.holds and shrinks.holds
+    current = c if proven else 0.0
+    if limited_by in ("contraction", "box"):
+        costly = _limiting_parameter(question, limited_by, limits[limited_by].current)
+    return UsableCurrent(current, direction, limited_by, limits, current_range(system, direction, current), box, stays,
+                         shrinks, _outcome(current, proven, limited_by, limits, stays, shrinks), costly)
+
+
+def _certified(question: Question, c: float) -> tuple[dict[str, Interval], Certificate, Certificate]:
+    """Smallest box at a current with its two certificates."""
+    q, current = question, current_range(question.system, question.direction, c)
+    box = q.box(c)
+    if box is None:
+        refused = no_box(q.system, current)
+        return {}, refused, refused
+    named = named_box(q.system, box)
+    stays = invariance(q.system, current=current, temperature=named, ambient=q.ambient, heat=q.heat or None,
+                       parameters=q.parameters)
+    return named, stays, contraction(q.system, current=current, temperature=named, method=q.method,
+                                     parameters=q.parameters)
+
+
+def _box_bound(question: Question, current: float) -> CurrentBound:
+    for back_off in _BACK_OFF:
+        c = current * (1 - back_off)
+        box, stays, shrinks = _certified(question, c)
+        if stays.holds and shrinks.holds:
+            return CurrentBound(c, stays, "proven", _MEANING["box"])
+    return CurrentBound(0.0, stays, "proven", "Not even without current is a box inside the stated one proven.")
+
+
+def _limiting_parameter(question: Question, limited_by: str, current: float) -> str | None:
+    """The parameter without whose range the binding bound would be largest."""
+    if not question.parameters:
+        return None
+    find: Any = largest_box_current if limited_by == "box" else lambda q: contraction_bound(q).current
+    found = {name: find(question.without(name)) for name in question.parameters}
+    best = max(found, key=lambda name: found[name])
+    return best if found[best] > current * 1.0001 else None
+
+
+def _check(system: System, direction: str, method: str, lower: str) -> None:
+    system_section(system)  # refuses effects that no certificate covers
+    for argument, value, choices in (("direction", direction, DIRECTIONS), ("method", method, METHODS),
+                                     ("lower", lower, ("inside", "reported"))):
+        if value not in choices:
+            raise InputError(f"{argument} = {value!r}", where=f"argument {argument}",
+                             expected="one of " + ", ".join(f'"{choice}"' for choice in choices))
+    if not system.modules:
+        raise InputError("the system has no thermoelectric module", where="argument system",
+                         remedy="Without modules use rt.certify.runaway_free with current={}.")
+
+
+def _outcome(current: float, proven: bool, limited_by: str, limits: Mapping[str, CurrentBound], stays: Certificate,
+             shrinks: Certificate) -> Outcome:
+    bound = limits[limited_by]
+    if current > 0:
+        return Outcome(True, "usable", f"Usable current {current:.4g} A in every module, limited by {limited_by}: "
+                       f"{bound.text}")
+    missing = stays if not stays.holds else shrinks
+    why = bound.text if proven or not np.isfinite(bound.current) or bound.current == 0 else missing.reason
+    return Outcome(False, "none", f"No current is usable, limited by {limited_by}: {why} Widen the stated box, narrow "
+                   "ambients and heats, or improve the heat sink.")
