@@ -82,7 +82,7 @@ SURFACE = {
         write_system
     """,
     "verification": """
-        Certificate Verdict claim_sentence establish not_certified verify
+        Certificate Verdict claim_sentence establish machine_hash not_certified same_system verify
     """,
 }
 

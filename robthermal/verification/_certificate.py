@@ -146,8 +146,9 @@ class Certificate:
         return KINDS[self.kind].read(self.system, self.region, self.evidence, self.margin)
 
     def __str__(self) -> str:
-        verdict = "holds" if self.holds else f"does not hold: {self.reason}"
-        return f"{self.kind} certificate, {verdict}\n{self.claim}"
+        if not self.holds:
+            return f"{self.kind} certificate, does not hold: {self.reason}\n{self.claim}"
+        return f"{self.kind} certificate, claims (not verified here; rt.verify does): {self.claim}"
 
     def _document(self) -> dict[str, Any]:
         return {"format": self.format, "kind": self.kind, "claim": self.claim, "holds": self.holds,

@@ -13,8 +13,8 @@ from ._fields import margin_of
 from ._kind import Kind, Proof, working_precision
 from ._norm import NORMS, read_norm, say_rate
 from ._numbers import round_down, show
-from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._system import Region, ThermalSystem, read_region, read_system, say_region
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
                        parameters)
 
 
-def claim(problem: Contraction) -> str:
+def claim(problem: Contraction, machine: str) -> str:
     """Return the one sentence the data give."""
-    return (f"The {say_system(problem.system)} contracts for all {say_region(problem.system, problem.region)}"
-            f"{say_parameters(problem.parameters)}: "
-            f"between any two trajectories in this box under the same inputs, {NORMS[problem.method]} "
+    return (f"The {say_subject(problem.system, problem.parameters, machine)}, contracts for all "
+            f"{say_region(problem.system, problem.region)}: between any two trajectories under the same inputs, as "
+            f"long as both stay in this box (that they do is not part of this claim), {NORMS[problem.method]} "
             f"(method {problem.method}) {say_rate(problem.rate)}.")
 
 

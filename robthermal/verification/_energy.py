@@ -15,7 +15,7 @@ from flint import arb, fmpq
 
 from ._definite import eliminate, is_positive, is_semidefinite
 from ._kind import Proof
-from ._numbers import as_float, name_of, show
+from ._numbers import as_float, decimal, name_of, show
 from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
 from ._vertices import Cluster, Point, Vertex, clusters, count, describe, endpoints, hull, vertices
 
@@ -125,7 +125,7 @@ def _check(problem: Contraction, rate: fmpq, rest: list[list[arb]], ports: list[
                               for group, (_, vertex) in zip(groups, chosen, strict=True))
             return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven at {where} "
                                 f"(least eigenvalue left on the module lumps {_least(matrix):.3g} W/K)")
-    return Proof(True, f"-(sym J + {show(rate)} E) is positive definite at every vertex of the box that is not "
+    return Proof(True, f"-(sym J + {decimal(rate)} E) is positive definite at every vertex of the box that is not "
                        "implied by another")
 
 
@@ -141,7 +141,7 @@ def _check_common_bound(rate: fmpq, rest: list[list[arb]], ports: list[int], gro
             return Proof(False, "method energy: too many vertices to check one by one, and no common bound was proven")
         _subtract(matrix, [place[lump] for lump in group.lumps], [[arb(entry) for entry in row] for row in above])
     if is_positive(matrix):
-        return Proof(True, f"-(sym J + {show(rate)} E) is positive definite for a common bound of all vertices")
+        return Proof(True, f"-(sym J + {decimal(rate)} E) is positive definite for a common bound of all vertices")
     return Proof(False, f"method energy: too many vertices to check one by one, and sym J < -{show(rate)} E is not "
                         f"proven for their common bound (least eigenvalue {_least(matrix):.3g} W/K)")
 

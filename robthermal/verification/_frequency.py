@@ -19,9 +19,10 @@ from . import _frequency_norm, _frequency_radius
 from ._blocks import Block, broken_structure, read_blocks, say_blocks
 from ._fields import get, mapping, no_other, positive, sequence
 from ._frequency_norm import Bound, Failed, Scaling
+from ._hash import short_hash
 from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, expect_shape, read_linear, read_matrix, say_linear
-from ._numbers import exact, name_of, show
+from ._numbers import decimal, exact, name_of, show
 from ._transfer import place, too_large, transfer, unstable
 
 _COMMON = ["form", "edges"]
@@ -31,7 +32,7 @@ _FORMS = {"norm": [*_COMMON, "bounds", "left", "right", "blocks"], "radius": [*_
 
 @dataclass(frozen=True)
 class Frequency:
-    """The exact problem of one frequency certificate; ``bounds`` of form norm, ``envelopes`` of form radius."""
+    """The exact problem of one frequency certificate: bounds or envelopes, and the hash of the region."""
 
     system: LinearSystem
     edges: tuple[fmpq, ...]
@@ -39,6 +40,7 @@ class Frequency:
     blocks: tuple[Block, ...]
     envelopes: tuple[Rows, ...]
     bound: fmpq
+    region: str
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Frequency:
@@ -53,33 +55,36 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Frequency:
     edges = _edges(get(table, "edges", "region"))
     if form == "radius":
         envelopes = _envelopes(get(table, "envelopes", "region"), len(edges) + 1, linear)
-        return Frequency(linear, edges, (), (), envelopes, positive(get(table, "bound", "region"), "region.bound"))
+        return Frequency(linear, edges, (), (), envelopes, positive(get(table, "bound", "region"), "region.bound"),
+                         short_hash(table))
     values = sequence(get(table, "bounds", "region"), "region.bounds")
     _expect_count(values, len(edges) + 1, "region.bounds")
     left = _scalings(table.get("left"), len(values), linear.outputs, "region.left")
     right = _scalings(table.get("right"), len(values), linear.inputs, "region.right")
     bounds = tuple(Bound(positive(value, f"region.bounds[{k}]"), left[k], right[k]) for k, value in enumerate(values))
     blocks = read_blocks(table["blocks"], linear.inputs, linear.outputs) if "blocks" in table else ()
-    return Frequency(linear, edges, bounds, blocks, (), fmpq(0))
+    return Frequency(linear, edges, bounds, blocks, (), fmpq(0), short_hash(table))
 
 
-def claim(problem: Frequency) -> str:
+def claim(problem: Frequency, machine: str) -> str:
     """Return the one sentence the data give."""
     system, edges = problem.system, problem.edges
     end = "the Nyquist frequency" if system.discrete else "infinity"
     cover = f"from 0 to {end}" if not edges else f"of {len(edges) + 1} intervals from 0 to {end}"
-    start = f"The {say_linear(system)} is stable, and at every frequency {cover}"
+    start = f"The {say_linear(system, machine)} is stable, and at every frequency {cover}"
     if problem.envelopes:
-        return (f"{start} the spectral radius of |M| R stays below {show(problem.bound)}: M is its frequency response, "
-                "|.| its entries' absolute values, R the envelope of the interval.")
+        return (f"{start} the spectral radius of |M| R stays below {decimal(problem.bound)}: M is its frequency "
+                f"response, |.| its entries' absolute values, R the interval's envelope in region {problem.region}.")
     largest = max(range(len(problem.bounds)), key=lambda k: problem.bounds[k].bound)
-    top = show(problem.bounds[largest].bound)
-    low = "0" if largest == 0 else show(edges[largest - 1])
-    high = end if largest == len(edges) else f"{show(edges[largest])} rad/s"
+    top = decimal(problem.bounds[largest].bound)
+    low = "0" if largest == 0 else decimal(edges[largest - 1])
+    high = end if largest == len(edges) else f"{decimal(edges[largest])} rad/s"
     words = "the largest singular value of its frequency response M"
     if any(item.left or item.right for item in problem.bounds):
-        words = "the largest singular value of L M R^-1, M its frequency response, L and R the interval's scalings,"
-    limit = f"{top}" if not edges else f"the interval's bound, the largest of which is {top}, from {low} to {high}"
+        words = ("the largest singular value of L M R^-1, M its frequency response, L and R the scalings of the "
+                 f"interval in region {problem.region},")
+    limit = f"{top}" if not edges else (f"the bound of the interval in region {problem.region}, the largest of "
+                                              f"which is {top}, from {low} to {high}")
     structure = (f"; so does the structured singular value of M for the blocks {say_blocks(problem.blocks)}"
                  if problem.blocks else "")
     return f"{start} {words} stays below {limit}{structure}."

@@ -17,11 +17,12 @@ from robthermal.errors import InputError
 from . import _weighted
 from ._contraction import Contraction
 from ._fields import Interval, get, intervals, kelvin_interval, mapping, no_other, not_negative, numbers
+from ._hash import short_hash
 from ._kind import Kind, Proof, working_precision
-from ._numbers import name_of, round_down, show
+from ._numbers import decimal, name_of, round_down, show
 from ._slopes import exchange_slope, radiation_slope
-from ._system import Link, Region, ThermalSystem, read_region, read_system, say_interval, say_region, say_system
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._system import Link, Region, ThermalSystem, read_region, read_system, say_interval, say_region
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 _SOURCES = ("ambients", "heat")
 _MOST_WORK = 10_000_000  # disturbances times links, modules and lumps
@@ -39,7 +40,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Gain:
-    """The exact problem of one gain certificate."""
+    """The exact problem of one gain certificate; ``table``: hash of all gains."""
 
     system: ThermalSystem
     region: Region
@@ -47,6 +48,7 @@ class Gain:
     parameters: Parameters
     rate: fmpq
     channels: tuple[Channel, ...]
+    table: str
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Gain:
@@ -64,21 +66,23 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Gain:
     if not channels:
         raise InputError("no disturbance", where="evidence.gains", expected="at least one ambient or heat load")
     rate = not_negative(get(found, "rate", "evidence"), "evidence.rate")
-    return Gain(network, box, tuple(ambient.items()), parameters, rate, tuple(channels))
+    return Gain(network, box, tuple(ambient.items()), parameters, rate, tuple(channels), short_hash(found["gains"]))
 
 
-def claim(problem: Gain) -> str:
+def claim(problem: Gain, machine: str) -> str:
     """Return the one sentence the data give."""
-    peaks = ", ".join(f"{show(max(channel.gains))} {'K/K' if channel.ambient else 'K/W'} from "
+    peaks = ", ".join(f"{decimal(max(channel.gains))} {'K/K' if channel.ambient else 'K/W'} from "
                       f"{'ambient' if channel.ambient else 'heat on'} {name_of(channel.name)}"
                       for channel in problem.channels)
     ambients = "".join(f", ambient {name_of(name)} in {say_interval(box)} K" for name, box in problem.ambient)
-    fades = (f"what is left of their start fades as exp(-rate t), rate = {show(problem.rate)} 1/s" if problem.rate > 0
-             else "if they start together")
-    return (f"In the {say_system(problem.system)}, for all {say_region(problem.system, problem.region)}{ambients}"
-            f"{say_parameters(problem.parameters)}: two trajectories in this box under the same currents that differ "
-            f"in one disturbance never part by more than the peak gain times its largest difference, {fades}; the "
-            f"largest gains are {peaks}.")
+    fades = (f"what is left of their start fades as exp(-rate t), rate = {decimal(problem.rate)} 1/s"
+             if problem.rate > 0 else "if they start together")
+    return (f"In the {say_subject(problem.system, problem.parameters, machine)}, for all "
+            f"{say_region(problem.system, problem.region)}{ambients}: two trajectories under the same currents that "
+            f"differ in one disturbance, as long as both stay in this box (that they do is not part of "
+            f"this claim), never part in any lump by more than that lump's peak gain times the largest difference of "
+            f"the disturbance, {fades}; the largest gains are {peaks}, those of every lump are in table "
+            f"{problem.table}.")
 
 
 def prove(problem: Gain) -> Proof:

@@ -17,10 +17,11 @@ from ._fields import get, mapping, no_other, positive
 from ._frequency import Frequency, read_scaling
 from ._frequency import prove as prove_frequency
 from ._frequency_norm import Bound, Scaling
+from ._hash import short_hash
 from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, balls, expect_shape, read_linear, read_matrix, say_linear
 from ._lyapunov import asymmetry
-from ._numbers import name_of, show
+from ._numbers import decimal, name_of
 from ._stability import positive as proven_positive
 
 _METHODS = ("bounded_real", "polynomial")
@@ -28,7 +29,7 @@ _METHODS = ("bounded_real", "polynomial")
 
 @dataclass(frozen=True)
 class Hinf:
-    """The exact problem of one H-infinity certificate."""
+    """The exact problem of one H-infinity certificate; ``region``: hash of bound and scalings."""
 
     system: LinearSystem
     bound: fmpq
@@ -36,6 +37,7 @@ class Hinf:
     right: Scaling | None
     method: str
     matrix: Rows
+    region: str
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Hinf:
@@ -51,21 +53,23 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Hinf:
         matrix = read_matrix(get(found, "matrix", "evidence"), "evidence.matrix")
         expect_shape(matrix, linear.states, linear.states, "evidence.matrix")
     return Hinf(linear, positive(get(table, "bound", "region"), "region.bound"),
-                _scaling(table, "left", linear.outputs), _scaling(table, "right", linear.inputs), method, matrix)
+                _scaling(table, "left", linear.outputs), _scaling(table, "right", linear.inputs), method, matrix,
+                short_hash(table))
 
 
-def claim(problem: Hinf) -> str:
+def claim(problem: Hinf, machine: str) -> str:
     """Return the one sentence the data give."""
-    scaled = "L G R^-1, scaled from the left and right," if problem.left or problem.right else "its transfer matrix"
-    return (f"The {say_linear(problem.system)} is stable, and the H-infinity norm of {scaled} is below "
-            f"{show(problem.bound)}.")
+    scaled = (f"L G R^-1, with the scalings of region {problem.region}," if problem.left or problem.right
+              else "its transfer matrix")
+    return (f"The {say_linear(problem.system, machine)} is stable, and the H-infinity norm of {scaled} is below "
+            f"{decimal(problem.bound)}.")
 
 
 def prove(problem: Hinf) -> Proof:
     """Prove it by the method of the evidence."""
     if problem.method == "polynomial":
         bounds = (Bound(problem.bound, problem.left, problem.right),)
-        return prove_frequency(Frequency(problem.system, (), bounds, (), (), fmpq(0)))
+        return prove_frequency(Frequency(problem.system, (), bounds, (), (), fmpq(0), ""))
     why = asymmetry(problem.matrix)
     if why:
         return Proof(False, why)

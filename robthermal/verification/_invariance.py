@@ -26,9 +26,8 @@ from ._system import (
     read_system,
     say_interval,
     say_region,
-    say_system,
 )
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 _PIECES = 16
 
@@ -62,14 +61,15 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     return Invariance(network, read_region(table, network), ambient, heat, margin_of(margin, "heat"), parameters)
 
 
-def claim(problem: Invariance) -> str:
+def claim(problem: Invariance, machine: str) -> str:
     """Return the one sentence the data give."""
     lumps = problem.system.lumps
     inputs = [f"ambient {name_of(name)} in {say_interval(value)} K" for name, value in problem.ambient.items()]
     inputs += [f"heat load on {name_of(lumps[k])} in {say_interval(value)} W" for k, value in problem.heat.items()]
-    words = (f", for all {', '.join(inputs)}" if inputs else "") + say_parameters(problem.parameters)
-    return (f"The {say_system(problem.system)} never leaves the box of {say_region(problem.system, problem.region)}, "
-            f"once its temperatures are in it{words}, with no other heat.")
+    words = f", for all {', '.join(inputs)}" if inputs else ""
+    return (f"The {say_subject(problem.system, problem.parameters, machine)}, never leaves the box of "
+            f"{say_region(problem.system, problem.region)}, once its temperatures are in it{words}, "
+            "with no other heat.")
 
 
 def prove(problem: Invariance) -> Proof:
@@ -84,7 +84,7 @@ def prove(problem: Invariance) -> Proof:
     if problem.margin > flow:
         return Proof(False, f"stored margin {show(problem.margin)} W is larger than the recomputed {show(flow)} W: "
                             f"{words}", margins)
-    return Proof(True, f"least {words} is {show(flow)} W", margins)
+    return Proof(True, f"least {words} is at least {round_down(flow)!r} W", margins)
 
 
 def find_margin(problem: Invariance) -> dict[str, float]:

@@ -32,7 +32,7 @@ class Kind:
     read : callable
         (system, region, evidence, margin) to the exact problem; InputError for malformed content.
     claim : callable
-        Problem to the one sentence its data give.
+        Problem and the short hash of its machine to the one sentence its data give.
     prove : callable
         Problem to Proof, from the data alone.
     find_margin : callable
@@ -41,7 +41,7 @@ class Kind:
 
     name: str
     read: Callable[[Any, Any, Any, Any], Any]
-    claim: Callable[[Any], str]
+    claim: Callable[[Any, str], str]
     prove: Callable[[Any], Proof]
     find_margin: Callable[[Any], dict[str, float]]
 

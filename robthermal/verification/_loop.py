@@ -20,13 +20,13 @@ from ._fields import get, mapping, margin_of, no_other, not_negative, numbers, p
 from ._kind import Kind, Proof, working_precision
 from ._loop_growth import Growth, growth
 from ._lyapunov import asymmetry
-from ._numbers import exact, name_of, round_down, show
-from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._numbers import decimal, exact, name_of, round_down, show
+from ._system import Region, ThermalSystem, read_region, read_system, say_region
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 Rows = tuple[tuple[fmpq, ...], ...]
-_PLANTS = {"continuous": "currents held and temperatures moving continuously in between",
-           "held": "as a sampled model x+ = A_d x + Γ f(x, I), the heat f of the modules held in between"}
+_PLANTS = {"continuous": "continuous plant (currents held and temperatures moving continuously in between)",
+           "held": "sampled model with held heat (x+ = A_d x + Γ f(x, I), the heat f of the modules held in between)"}
 _PIECES = 16
 
 
@@ -101,20 +101,21 @@ def _links_only(parameters: Parameters, plant: Any) -> Parameters:
     return parameters
 
 
-def claim(problem: Loop) -> str:
+def claim(problem: Loop, machine: str) -> str:
     """Return the one sentence the data give."""
     states = len(problem.controller.A)
-    speed = (f"shrinks at least by {show(problem.contraction)}² per sample" if problem.contraction < 1
+    speed = (f"shrinks at least by the factor {decimal(problem.contraction)}² per sample" if problem.contraction < 1
              else "shrinks strictly with every sample")
     moves = ("" if problem.drift is None else
-             f" or moves a face of a module by more than {show(problem.drift)} K within a sample")
-    return (f"The closed loop of the {say_system(problem.system)}, {_PLANTS[problem.plant]}, with its controller "
-            f"({states} state{'' if states == 1 else 's'}) sampled every {show(problem.sample_time)} s, heats turned "
-            f"into currents by feedback linearisation at the true temperatures, contracts for all "
-            f"{say_region(problem.system, problem.region)}{say_parameters(problem.parameters)}, the current ranges "
-            f"being its limits: provided that no trajectory from this box leaves it{moves}, e'Pe of the differences in "
-            f"temperatures and controller states between any two trajectories under the same set-points, ambients and "
-            f"heat loads {speed}.")
+             f" or moves a face of a module by more than {decimal(problem.drift)} K within a sample")
+    subject = say_subject(problem.system, problem.parameters, machine, _PLANTS[problem.plant])
+    return (f"The closed loop of the {subject}, with its controller ({states} state{'' if states == 1 else 's'}) "
+            f"sampled every {decimal(problem.sample_time)} s, heats turned into currents by feedback "
+            f"linearisation at the true temperatures, contracts for all "
+            f"{say_region(problem.system, problem.region)}, the current ranges being its limits: provided that no "
+            f"trajectory from this box leaves it{moves}, e'Pe of the differences in temperatures "
+            f"and controller states between any two trajectories under the same set-points, ambients and heat loads "
+            f"{speed}.")
 
 
 def prove(problem: Loop) -> Proof:
@@ -126,8 +127,8 @@ def prove(problem: Loop) -> Proof:
         extra = max(problem.margin, fmpq(0))
         failed = _failure(problem, found, problem.contraction - extra)
         if failed is None:
-            return Proof(True, f"e+'Pe+ < {show(problem.contraction - extra)}² e'Pe at all {found.count} combinations "
-                               "of slopes", {"contraction": round_down(extra)})
+            return Proof(True, f"e+'Pe+ < {decimal(problem.contraction - extra)}² e'Pe at all {found.count} "
+                               "combinations of slopes", {"contraction": round_down(extra)})
         if extra > 0 and _failure(problem, found, problem.contraction) is None:
             return Proof(False, f"stored margin {show(extra)} is larger than what can be proven: {failed}")
     return Proof(False, failed)

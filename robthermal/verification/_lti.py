@@ -11,7 +11,7 @@ from flint import arb, arb_mat, fmpq
 from robthermal.errors import InputError
 
 from ._fields import get, mapping, no_other, not_negative, sequence
-from ._numbers import exact, show
+from ._numbers import decimal, exact
 
 Rows = tuple[tuple[fmpq, ...], ...]
 MOST_STATES = 400  # every method needs at least n³ exact operations
@@ -78,10 +78,12 @@ def expect_shape(matrix: Sequence[Sequence[Any]], rows: int, columns: int, where
             raise InputError(f"{len(row)} numbers", where=f"{where}[{i}]", expected=f"{columns}")
 
 
-def say_linear(system: LinearSystem) -> str:
-    """Return the words for a system in a claim."""
-    time = f"sampled every {show(system.sample_time)} s" if system.discrete else "in continuous time"
-    return (f"linear system {time} with {system.states} states, {system.inputs} inputs and {system.outputs} outputs")
+def say_linear(system: LinearSystem, machine: str) -> str:
+    """Return the subject of a claim: the system as given, its size and hash."""
+    time = f"sampled at {decimal(system.sample_time)} s" if system.discrete else "continuous"
+    sizes = ((system.states, "state"), (system.inputs, "input"), (system.outputs, "output"))
+    words = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in sizes)
+    return f"linear system as given, {time} ({words}, machine {machine}), nominal parameters,"
 
 
 def balls(matrix: Rows, rows: int, columns: int) -> arb_mat:

@@ -15,7 +15,7 @@ from flint import arb, arb_mat, fmpq
 from ._corners import Part, first_failure, is_positive, make_part
 from ._fields import Interval
 from ._kind import Proof
-from ._numbers import name_of, show
+from ._numbers import decimal, name_of, show
 from ._slopes import exchange_slope, radiation_slope
 from ._system import Region, ThermalSystem
 from ._vertices import Entries, clusters, count, describe, hull, vertices
@@ -63,7 +63,7 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
         return Proof(False, f"method lyapunov: {missing}")
     start = make_part(form.matrix(base) - form.P * arb(2 * rate), "", True)
     links = [[form.part(item) for item in items] for items in bent]
-    words = f"P E^-1 J + J' E^-1 P < -2 ({show(rate)}) P"
+    words = f"P E^-1 J + J' E^-1 P < -2 ({decimal(rate)}) P"
     proof = Proof(False, "method lyapunov: too many vertices to check any")
     for pieces in PIECES:
         total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)

@@ -19,7 +19,7 @@ from robthermal.errors import InputError
 from ._fields import get, mapping, margin_of, not_negative, text
 from ._kind import Kind, Proof
 from ._norm import say_rate
-from ._numbers import as_float, exact, name_of, round_down, show
+from ._numbers import as_float, decimal, exact, name_of, round_down, show
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -83,14 +83,14 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     return Network(capacity, rows, cols, values, method, rate, weights, margin_of(margin, "rate"), uncertainty)
 
 
-def claim(problem: Network) -> str:
+def claim(problem: Network, machine: str) -> str:
     """Return the one sentence the data give."""
     norm = "largest" if problem.method == "max" else "summed"
-    spread = (f" for all conductances within {show(100 * problem.uncertainty)} % of the given ones, those between two "
-              "lumps and the row sums each on their own" if problem.uncertainty > 0 else "")
-    return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries is stable"
-            f"{spread}: "
-            f"the weighted {norm} absolute temperature difference (method {problem.method}) between any two of its "
+    spread = (f"for all conductances within {decimal(100 * problem.uncertainty)} % of the given ones, those between "
+              "two lumps and the row sums each on their own" if problem.uncertainty > 0 else "nominal parameters")
+    return (f"The thermal network of {len(problem.capacity.nearest)} lumps and {len(problem.rows)} entries (machine "
+            f"{machine}), continuous plant, {spread}, is stable: the weighted "
+            f"{norm} absolute temperature difference (method {problem.method}) between any two of its "
             f"trajectories under the same inputs {say_rate(problem.rate)}.")
 
 

@@ -10,7 +10,7 @@ from flint import fmpq
 from robthermal.errors import InputError
 
 from ._fields import get, mapping, not_negative, numbers, sequence, text
-from ._numbers import name_of, show
+from ._numbers import decimal, name_of
 
 NORMS = {
     "sum": "the weighted sum of absolute differences",
@@ -51,4 +51,4 @@ def read_norm(evidence: Any, count: int) -> Norm:
 
 def say_rate(rate: fmpq) -> str:
     """Return how fast a norm decays, for a claim."""
-    return f"decays at least as exp(-rate t), rate = {show(rate)} 1/s" if rate > 0 else "decays strictly"
+    return f"decays at least as exp(-rate t), rate = {decimal(rate)} 1/s" if rate > 0 else "decays strictly"

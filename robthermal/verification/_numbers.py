@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from flint import fmpq
+from flint import fmpq, fmpz
 
 from robthermal.errors import InputError
 
@@ -83,10 +83,53 @@ def round_down(value: fmpq) -> float:
     return number if Fraction(number) <= Fraction(int(value.p), int(value.q)) else math.nextafter(number, -math.inf)
 
 
+def round_up(value: fmpq) -> float:
+    """Return the smallest double that is not below a rational number."""
+    return -round_down(-value)
+
+
 def show(value: fmpq) -> str:
-    """Return a number for a sentence: the shortest decimal of the nearest double, without a trailing ``.0``."""
+    """Return a number for a message, to nearest: the shortest decimal of a double. Claims use `decimal`."""
     text = float.__repr__(as_float(value))
     return text[:-2] if text.endswith(".0") else text
+
+
+def decimal(value: fmpq) -> str:
+    """Return a number for a claim: its exact decimal, all digits, written as Python writes a double.
+
+    Every number of a certificate has one, because it is a decimal or a binary number. With digits d1 d2 ... dn and
+    value = d1.d2...dn times ten to the x: plain for -4 <= x < 16, else d1.d2...dn, "e", sign and at least two digits.
+
+    Examples
+    --------
+    >>> decimal(exact("1.00000000000000000001", "bound")), decimal(exact("0x1p-3", "rate")), decimal(fmpq(-7))
+    ('1.00000000000000000001', '0.125', '-7')
+    """
+    if value == 0:
+        return "0"
+    places = _places(value.q)
+    mantissa = (abs(value.p) * fmpz(10) ** places // value.q).str()
+    x = len(mantissa) - 1 - places
+    digits = mantissa.rstrip("0")
+    if x < -4 or x >= 16:
+        text = digits[0] + ("." + digits[1:] if len(digits) > 1 else "") + f"e{'-' if x < 0 else '+'}{abs(x):02d}"
+    elif x < 0:
+        text = "0." + "0" * (-x - 1) + digits
+    else:
+        text = (digits[:x + 1].ljust(x + 1, "0") + "." + digits[x + 1:]).rstrip(".")
+    return "-" + text if value < 0 else text
+
+
+def _places(denominator: fmpz) -> int:
+    """Return how many decimal places a number with this denominator has."""
+    q = int(denominator)
+    twos = (q & -q).bit_length() - 1
+    rest, fives = q >> twos, 0
+    while rest % 5 == 0:
+        rest, fives = rest // 5, fives + 1
+    if rest != 1:
+        raise ValueError("the number has no exact decimal")
+    return max(twos, fives)
 
 
 def name_of(value: Any) -> str:

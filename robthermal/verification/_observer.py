@@ -28,9 +28,9 @@ from ._lyapunov import (
     too_much,
     vertex_count,
 )
-from ._numbers import exact, name_of, round_down, show
-from ._system import Region, ThermalSystem, read_region, read_system, say_region, say_system
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._numbers import decimal, exact, name_of, round_down, show
+from ._system import Region, ThermalSystem, read_region, read_system, say_region
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 from ._vertices import Entries
 
 _LONGEST = 100_000  # |E^-1 A| T_s beyond which the exponential is not enclosed
@@ -84,18 +84,19 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Observer:
                     _matrix(get(found, "matrix", "evidence"), n, n, "evidence.matrix"))
 
 
-def claim(problem: Observer) -> str:
+def claim(problem: Observer, machine: str) -> str:
     """Return the one sentence the data give."""
     lumps = problem.system.lumps
-    reads = ", ".join(f"{name_of(s.name)} ({show(s.gain)} times {name_of(lumps[s.lump])})" for s in problem.sensors)
-    speed = (f"shrinks at least by {show(problem.contraction)}² per sample" if problem.contraction < 1
+    reads = ", ".join(f"{name_of(s.name)} ({decimal(s.gain)} times {name_of(lumps[s.lump])})" for s in problem.sensors)
+    speed = (f"shrinks at least by the factor {decimal(problem.contraction)}² per sample" if problem.contraction < 1
              else "shrinks strictly with every sample")
-    known = (f"{say_parameters(problem.parameters)}, the same in plant and observer, A_d and Γ those of the nominal "
-             "numbers and f all other heat" if problem.parameters else "")
-    return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the {say_system(problem.system)} with sensors "
-            f"{reads or 'none'}, sampled every {show(problem.sample_time)} s, f held in between, converges for all "
-            f"{say_region(problem.system, problem.region)}, temperatures and estimates both in this box{known}: "
-            f"e'Pe of the error {speed}.")
+    known = (", the same in plant and observer, A_d and Γ those of the nominal numbers and f all other heat"
+             if problem.parameters else "")
+    subject = say_subject(problem.system, problem.parameters, machine, "sampled model with held heat")
+    return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the {subject}{known}, with sensors "
+            f"{reads or 'none'}, sampled every {decimal(problem.sample_time)} s, f held in between, converges for all "
+            f"{say_region(problem.system, problem.region)}, as long as temperatures and estimates both stay in this "
+            f"box (that they do is not part of this claim): e'Pe of the error {speed}.")
 
 
 def prove(problem: Observer) -> Proof:
@@ -147,7 +148,7 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     passive = P * (A_d - _injection(problem)) + left * dense(_beyond_passive(problem, base), n)
     start = make_part(_schur(passive, P * arb(contraction)), "", True)
     links = [[_part(left, item, n) for item in items] for items in bent]
-    words = f"M'PM < {show(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
+    words = f"M'PM < {decimal(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
     proof = Proof(False, "too many vertices to check any")
     for pieces in refinements:
         total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)

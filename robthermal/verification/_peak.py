@@ -17,7 +17,7 @@ from ._fields import get, mapping, no_other, positive
 from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, balls, expect_shape, read_linear, read_matrix, say_linear
 from ._lyapunov import asymmetry
-from ._numbers import exact, name_of, show
+from ._numbers import decimal, exact, name_of, show
 from ._stability import positive as proven_positive
 from ._transfer import characteristic, too_large, unstable
 
@@ -53,10 +53,10 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Peak:
     return Peak(linear, bound, method, matrix, decay, share)
 
 
-def claim(problem: Peak) -> str:
+def claim(problem: Peak, machine: str) -> str:
     """Return the one sentence the data give."""
-    return (f"The {say_linear(problem.system)} is stable, and from zero state the Euclidean norm of its output never "
-            f"exceeds {show(problem.bound)} times the largest Euclidean norm of its input.")
+    return (f"The {say_linear(problem.system, machine)} is stable, and from zero state the Euclidean norm of its "
+            f"output never exceeds {decimal(problem.bound)} times the largest Euclidean norm of its input.")
 
 
 def prove(problem: Peak) -> Proof:

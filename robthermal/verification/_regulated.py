@@ -24,9 +24,9 @@ from ._held import Alternative, Groups, HeldNetwork, lost_grip, shares
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import asymmetry
 from ._norm import NORMS, read_norm, say_rate
-from ._numbers import name_of, round_down, show
-from ._system import ThermalSystem, read_region, read_system, say_interval, say_system
-from ._uncertain import Parameters, read_parameters, say_parameters, worst_system
+from ._numbers import decimal, name_of, round_down, show
+from ._system import ThermalSystem, read_region, read_system, say_interval
+from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 from ._vertices import Entries
 
 _PIECES = (1, 4, 16)  # per current, refined in turn
@@ -56,7 +56,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Regulated:
     return Regulated(network, norm.method, norm.rate, margin_of(margin, "rate"), norm.weights, norm.matrix, parameters)
 
 
-def claim(problem: Regulated) -> str:
+def claim(problem: Regulated, machine: str) -> str:
     """Return the one sentence the data give."""
     network, system = problem.network, problem.network.system
     held = ", ".join(f"lump {name_of(system.lumps[lump])} held exactly at one set-point in "
@@ -66,11 +66,11 @@ def claim(problem: Regulated) -> str:
     others = "".join(f" and current of {name_of(module.name)} in {say_interval(current)} A"
                      for k, (module, current) in enumerate(zip(system.modules, network.region.current, strict=True))
                      if k not in network.holder.values())
-    return (f"The {say_system(system)} with {held}, contracts for all {_say_temperatures(network)}{others}"
-            f"{say_parameters(problem.parameters)}: between any two trajectories that stay in these ranges under the "
-            f"same set-points, ambients, heat loads and other currents, {NORMS[problem.method]} of the lumps that are "
-            f"not held (method {problem.method}) {say_rate(problem.rate)}; more current takes more heat from every "
-            "held lump.")
+    return (f"The {say_subject(system, problem.parameters, machine)}, with {held}, contracts for all "
+            f"{_say_temperatures(network)}{others}: between any two trajectories under the same set-points, ambients, "
+            f"heat loads and other currents, as long as both stay in these ranges (that they do is not part "
+            f"of this claim), {NORMS[problem.method]} of the lumps that are not held (method {problem.method}) "
+            f"{say_rate(problem.rate)}; more current takes more heat from every held lump.")
 
 
 def prove(problem: Regulated) -> Proof:
@@ -169,7 +169,7 @@ def _line_sums(method: str, weight: Mapping[int, fmpq], item: Alternative) -> di
 def _prove_form(problem: Regulated, rate: fmpq, base: Entries, groups: Groups) -> Proof:
     """-(P E^-1 J + J'E^-1 P) - 2 rate P > 0 (P = E for method energy), in balls, at every combination."""
     names = problem.network.system.lumps
-    words = f"method {problem.method}: V decays at {show(rate)} 1/s"
+    words = f"method {problem.method}: V decays at {decimal(rate)} 1/s"
     P = _own(problem)
     rows = _form(problem, P, base)
     for i, row in P.items():

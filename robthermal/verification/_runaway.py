@@ -17,9 +17,9 @@ from robthermal.errors import InputError
 from ._box_sign import Terms, positive_on
 from ._fields import Interval, get, interval, mapping, no_other, positive, text
 from ._kind import Kind, Proof
-from ._numbers import as_float, name_of, show
+from ._numbers import decimal, name_of, round_up, show
 from ._system import say_interval
-from ._uncertain import Parameters, read_parameters, say_parameters
+from ._uncertain import Parameters, must_contain, read_parameters, say_parameters
 
 _CONSTANTS = {"seebeck": "S", "resistance": "R", "conductance": "K", "sink_conductance": "g", "sink_temperature": "w",
               "setpoint": "x_c"}
@@ -28,10 +28,9 @@ Polynomial = Any  # in (S, R, K, g, w, x_c, I), flint's
 
 @dataclass(frozen=True)
 class Runaway:
-    """The exact problem of one runaway certificate: constants, their ranges, and where the fold is claimed to be."""
+    """The exact problem of one runaway certificate: ranges of its constants, and where the fold is claimed to be."""
 
     name: str
-    constants: tuple[fmpq, ...]
     ranges: tuple[Interval, ...]
     parameters: Parameters
     current: Interval
@@ -46,26 +45,28 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Runaway:
     parameters = read_parameters(mapping(region, "region"))
     given = dict(parameters)
     no_other(given, list(_CONSTANTS), "region.parameters")
-    for key, (low, _) in parameters:
+    for key, (low, high) in parameters:
+        where = f"region.parameters[{name_of(key)}]"
         if low <= 0:
-            raise InputError(f"{key} may be {show(low)}", where=f"region.parameters[{name_of(key)}]",
-                             expected="numbers above zero")
+            raise InputError(f"{key} may be {show(low)}", where=where, expected="numbers above zero")
+        must_contain((low, high), constants[key], where)
     ranges = tuple(given.get(key, (value, value)) for key, value in constants.items())
     name = text(table["name"], "system.name") if "name" in table else ""
-    return Runaway(name, tuple(constants.values()), ranges, parameters,
+    return Runaway(name, ranges, parameters,
                    interval(get(found, "current", "evidence"), "evidence.current"),
                    interval(get(found, "load", "evidence"), "evidence.load"))
 
 
-def claim(problem: Runaway) -> str:
+def claim(problem: Runaway, machine: str) -> str:
     """Return the one sentence the data give."""
     title = f" {name_of(problem.name)}" if problem.name else ""
-    S, R, K, g, w, cold = problem.constants
-    return (f"The module{title} (S = {show(S)} V/K, R = {show(R)} Ohm, K = {show(K)} W/K), hot "
-            f"side at {show(g)} W/K to a sink of {show(w)} K, cold face at {show(cold)} K"
-            f"{',' + say_parameters(problem.parameters) + ' instead' if problem.parameters else ''}, "
-            f"carries more load with more current up to a current in {say_interval(problem.current)} A, where the load "
-            f"is in {say_interval(problem.load)} W and stops growing.")
+    S, R, K, g, w, cold = (f"= {decimal(low)}" if low == high else f"in {say_interval((low, high))}"
+                           for low, high in problem.ranges)
+    return (f"The single module{title} (machine {machine}), steady states of the continuous plant, "
+            f"{say_parameters(problem.parameters)}, with constant S {S} V/K, R {R} Ohm, K {K} W/K, the hot "
+            f"side at g {g} W/K to a sink of w {w} K, the cold face at x_c {cold} K, carries more load with more "
+            f"current up to a current in {say_interval(problem.current)} A, where the load is in "
+            f"{say_interval(problem.load)} W and stops growing.")
 
 
 def prove(problem: Runaway) -> Proof:
@@ -85,7 +86,7 @@ def prove(problem: Runaway) -> Proof:
         return Proof(False, f"the load at {show(low)} A is below {show(least)} W, or not proven to be above")
     if not _holds(problem, most * denominator - numerator, (low, high)):
         return Proof(False, f"q(I) < {show(most)} W fails or cannot be proven over {say_interval(problem.current)} A")
-    margins = {"current_width": as_float(high - low), "load_width": as_float(most - least)}
+    margins = {"current_width": round_up(high - low), "load_width": round_up(most - least)}
     return Proof(True, "dq/dI > 0 below the interval and < 0 at its end, exactly", margins)
 
 

@@ -19,7 +19,7 @@ from ._fields import get, mapping, no_other, not_negative
 from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, balls, expect_shape, read_linear, read_matrix, say_linear
 from ._lyapunov import asymmetry
-from ._numbers import name_of, show
+from ._numbers import decimal, name_of, show
 from ._transfer import characteristic, too_large, unstable
 
 _METHODS = ("lyapunov", "polynomial")
@@ -53,13 +53,13 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Stability:
     return Stability(linear, rate, method, matrix)
 
 
-def claim(problem: Stability) -> str:
+def claim(problem: Stability, machine: str) -> str:
     """Return the one sentence the data give."""
     if problem.system.discrete:
-        modes = f"have absolute values below {show(1 - problem.rate)}"
+        modes = f"have absolute values below {decimal(1 - problem.rate)}"
     else:
-        modes = f"have real parts below {show(-problem.rate) if problem.rate else 0}{' 1/s' if problem.rate else ''}"
-    return f"The {say_linear(problem.system)} is asymptotically stable: all eigenvalues of A {modes}."
+        modes = f"have real parts below {decimal(-problem.rate)}{' 1/s' if problem.rate else ''}"
+    return f"The {say_linear(problem.system, machine)} is asymptotically stable: all eigenvalues of A {modes}."
 
 
 def prove(problem: Stability) -> Proof:

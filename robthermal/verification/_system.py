@@ -22,7 +22,7 @@ from ._fields import (
     sequence,
     text,
 )
-from ._numbers import exact, name_of, show
+from ._numbers import decimal, exact, name_of, show
 
 Quadratic = tuple[fmpq, fmpq, fmpq]  # a + b I + c I²
 _EXPONENT_LIMIT = 10
@@ -125,6 +125,12 @@ def read_region(value: Any, system: ThermalSystem) -> Region:
     return Region(temperature=_temperatures(temperature, system.lumps), current=tuple(current))
 
 
+def link_names(section: Mapping[str, Any]) -> list[str]:
+    """Return the names of the links of a section that was read: "a-b" where none is given."""
+    given = [(link.get("name"), link["between"]) for link in section["links"]]
+    return [name if isinstance(name, str) and name else "-".join(ends) for name, ends in given]
+
+
 def peak(quadratic: Quadratic, currents: Interval) -> tuple[fmpq, fmpq]:
     """Return the exact maximum of a + b I + c I² over an interval and the current at which it is reached."""
     a, b, c = quadratic
@@ -134,12 +140,12 @@ def peak(quadratic: Quadratic, currents: Interval) -> tuple[fmpq, fmpq]:
     return max(((a + b * x + c * x * x, x) for x in points), key=lambda pair: pair[0])
 
 
-def say_system(system: ThermalSystem) -> str:
-    """Return the subject of a claim: name and size of the network."""
+def say_system(system: ThermalSystem, machine: str) -> str:
+    """Return the subject of a claim: name, size and hash of the network."""
     title = f" {name_of(system.name)}" if system.name else ""
     modules = f"{len(system.modules)} module" + ("" if len(system.modules) == 1 else "s")
     lumps = f"{len(system.lumps)} lump" + ("" if len(system.lumps) == 1 else "s")
-    return f"thermal network{title} ({lumps}, {modules})"
+    return f"thermal network{title} ({lumps}, {modules}, machine {machine})"
 
 
 def say_region(system: ThermalSystem, region: Region) -> str:
@@ -151,8 +157,8 @@ def say_region(system: ThermalSystem, region: Region) -> str:
 
 
 def say_interval(value: Interval) -> str:
-    """Return an interval for a sentence."""
-    return f"[{show(value[0])}, {show(value[1])}]"
+    """Return an interval for a claim, exactly."""
+    return f"[{decimal(value[0])}, {decimal(value[1])}]"
 
 
 def _say_temperatures(system: ThermalSystem, region: Region) -> str:

@@ -17,12 +17,14 @@ from flint import fmpq
 from robthermal.errors import InputError
 
 from ._fields import Interval, interval, mapping
-from ._numbers import name_of
-from ._system import Module, ThermalSystem, say_interval
+from ._hash import short_hash
+from ._numbers import name_of, show
+from ._system import Module, ThermalSystem, link_names, say_interval, say_system
 
 Parameters = tuple[tuple[str, Interval], ...]
 _PROPERTIES = ("seebeck", "resistance", "conductance")
 _WHERE = "region.parameters"
+_LISTED = 12  # ranges in a sentence; more are counted, with the hash of their table
 
 
 def read_parameters(region: Mapping[str, Any]) -> Parameters:
@@ -32,37 +34,57 @@ def read_parameters(region: Mapping[str, Any]) -> Parameters:
 
 
 def say_parameters(parameters: Parameters) -> str:
-    """Return the ranges for a claim, empty where nothing is uncertain."""
-    words = ", ".join(f"{name_of(name)} in {say_interval(box)}" for name, box in parameters)
-    return f" and for all parameters {words}" if words else ""
+    """Return for which parameters a claim holds: the nominal ones, or all of the ranges, listed where they are few."""
+    if not parameters:
+        return "nominal parameters"
+    count = len(parameters)
+    words = (", ".join(f"{name_of(name)} in {say_interval(box)}" for name, box in parameters) if count <= _LISTED
+             else f"of table {short_hash(dict(parameters))}")
+    return f"for all {count} parameter range{'' if count == 1 else 's'} {words}"
+
+
+def say_subject(system: ThermalSystem, parameters: Parameters, machine: str, plant: str = "continuous plant") -> str:
+    """Return the subject of a claim: which machine, which plant, for which parameters."""
+    return f"{say_system(system, machine)}, {plant}, {say_parameters(parameters)}"
 
 
 def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: Parameters) -> ThermalSystem:
     """Return the network whose inequalities imply those of every network in the ranges."""
     ends: list[dict[tuple[str, int], Interval]] = [{} for _ in system.modules]
     modules = {module.name: k for k, module in enumerate(system.modules)}
-    links = _link_names(section, system)
+    links = link_names(section)
     capacity, changed = list(system.capacity), list(system.links)
     for name, (low, high) in parameters:
         where = f"{_WHERE}[{name_of(name)}]"
         table, _, rest = name.partition(".")
         part, _, key = rest.rpartition(".")
         if table == "lumps" and key == "capacity" and part in system.lumps:
+            k = system.lumps.index(part)
             _at_least(low, fmpq(0), where, strict=True)
-            capacity[system.lumps.index(part)] = high
+            must_contain((low, high), system.capacity[k], where)
+            capacity[k] = high
         elif table == "links" and key == "conductance" and links.count(part) == 1:
             _at_least(low, fmpq(0), where, strict=False)
             k = links.index(part)
+            must_contain((low, high), system.links[k].conductance, where)
             changed[k] = replace(changed[k], conductance=low, spread=high - low)
         elif table == "modules" and (found := _property(part, key, modules)) is not None:
-            k, place = found
-            ends[k][place] = (low, high)
+            k, (prop, index) = found
+            must_contain((low, high), getattr(system.modules[k], prop)[index], where)
+            ends[k][prop, index] = (low, high)
         else:
             raise InputError("no such number can be uncertain", where=where,
                              expected="lumps.NAME.capacity, links.NAME.conductance (of one link), or "
                                       "modules.NAME.{seebeck,resistance,conductance}.{value,slope}")
     variants = tuple(_variants(module, own) for module, own in zip(system.modules, ends, strict=True))
     return replace(system, capacity=tuple(capacity), links=tuple(changed), variants=variants)
+
+
+def must_contain(box: Interval, value: fmpq, where: str) -> None:
+    """Refuse a range without the machine's own number: the claim names this machine."""
+    if not box[0] <= value <= box[1]:
+        raise InputError(f"the range {say_interval(box)} excludes the number of the system, {show(value)}", where=where,
+                         expected="a range around it")
 
 
 def _property(part: str, key: str, modules: Mapping[str, int]) -> tuple[int, tuple[str, int]] | None:
@@ -80,12 +102,6 @@ def _variants(module: Module, ends: Mapping[tuple[str, int], Interval]) -> tuple
                    zip(_PROPERTIES, (module.seebeck, module.resistance, module.conductance), strict=True))
         found.append(replace(module, seebeck=S, resistance=R, conductance=K))
     return tuple(found)
-
-
-def _link_names(section: Mapping[str, Any], system: ThermalSystem) -> list[Any]:
-    if len(section["links"]) != len(system.links):
-        raise ValueError("a section and the system read from it have the same links")
-    return [link.get("name", "-".join(link["between"])) for link in section["links"]]
 
 
 def _at_least(low: fmpq, least: fmpq, where: str, *, strict: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,11 +13,13 @@ import numpy as np
 from robthermal.errors import InputError
 
 from ._certificate import Certificate
-from ._kind import Kind, Proof
+from ._kind import Proof
 from ._kinds import KINDS
+from ._machine import machine_hash
 from ._numbers import name_of
 
 _NOT_CERTIFIED = "Not certified: "
+_MACHINE = re.compile(r"machine [0-9a-f]{12}\b")
 
 
 @dataclass(frozen=True)
@@ -33,18 +36,21 @@ class Verdict:
         The inequality that fails, or how it was proven; never empty when not valid.
     seconds : float
         Time the check took [s].
+    claim : str
+        The sentence that was proven; empty when not valid.
     """
 
     valid: bool
     margins: dict[str, float]
     reason: str
     seconds: float
+    claim: str = ""
 
     def __bool__(self) -> bool:
         return self.valid
 
     def __str__(self) -> str:
-        return f"{'valid' if self.valid else 'not valid'}: {self.reason}"
+        return f"valid: {self.claim}\nProof: {self.reason}" if self.valid else f"not valid: {self.reason}"
 
 
 def verify(certificate: Certificate) -> Verdict:
@@ -80,10 +86,11 @@ def verify(certificate: Certificate) -> Verdict:
                          expected="a Certificate", remedy="Read the file with Certificate.load.")
     problem = certificate.check_form()
     if certificate.holds:
-        proof = _check(KINDS[certificate.kind], problem, certificate.claim)
+        proof = _check(certificate, problem)
     else:
         proof = Proof(False, certificate.reason or "the certificate itself says that its claim does not hold")
-    return Verdict(proof.valid, dict(proof.margins), proof.reason, time.perf_counter() - start)
+    return Verdict(proof.valid, dict(proof.margins), proof.reason, time.perf_counter() - start,
+                   certificate.claim if proof.valid else "")
 
 
 def establish(kind: str, *, system: Mapping[str, Any], region: Mapping[str, Any], evidence: Mapping[str, Any],
@@ -193,18 +200,22 @@ def claim_sentence(kind: str, system: Mapping[str, Any], region: Mapping[str, An
     --------
     >>> system = {"capacity": [10.0], "rows": [0], "cols": [0], "values": [-0.5]}
     >>> claim_sentence("network", system, {}, {"rate": 0.04, "weights": [1.0]})
-    'The thermal network of 1 lumps and 1 entries is stable: ... decays at least as exp(-rate t), rate = 0.04 1/s.'
+    'The thermal network of 1 lumps and 1 entries (machine ...), continuous plant, nominal parameters, is stable: ...'
     """
     if kind not in KINDS:
         raise InputError(f"kind {name_of(kind)}", where="kind", expected=f"one of {sorted(KINDS)}")
-    return KINDS[kind].claim(KINDS[kind].read(system, region, evidence, {}))
+    return KINDS[kind].claim(KINDS[kind].read(system, region, evidence, {}), machine_hash(system))
 
 
-def _check(kind: Kind, problem: Any, claim: str) -> Proof:
-    sentence = kind.claim(problem)
-    if claim != sentence:
-        return Proof(False, f"the claim is not the one the data give, which is: {sentence}")
-    return kind.prove(problem)
+def _check(certificate: Certificate, problem: Any) -> Proof:
+    kind = KINDS[certificate.kind]
+    sentence = kind.claim(problem, machine_hash(certificate.system))
+    if certificate.claim == sentence:
+        return kind.prove(problem)
+    if not _MACHINE.search(certificate.claim):
+        return Proof(False, "the claim names no machine: an earlier version made this file. Make the certificate again "
+                            f"from the machine itself. Its data give the sentence: {sentence}")
+    return Proof(False, f"the claim is not the one the data give, which is: {sentence}")
 
 
 def plain(value: Any) -> Any:

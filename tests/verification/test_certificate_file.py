@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 import random
+from dataclasses import replace
+from decimal import Decimal
 
 import numpy as np
 import pytest
 
 from robthermal.errors import InputError
-from robthermal.verification import Certificate, Verdict, establish, verify
+from robthermal.verification import Certificate, Verdict, claim_sentence, establish, verify
 
 SYSTEM = {"lumps": {"a": {"capacity": 2.0}, "b": {"capacity": 1.5}}, "ambients": ["room"],
           "links": [{"between": ["a", "b"], "conductance": 1.0}, {"between": ["a", "room"], "conductance": 0.5}],
@@ -66,7 +68,7 @@ def test_round_trip(certificate, path):
 
 @pytest.mark.parametrize("certificate", ALL, ids=IDS)
 def test_numbers_in_any_allowed_form(certificate, path):
-    """Decimal text and hexadecimal floats in place of JSON numbers say the same and prove the same."""
+    """Decimal text in place of JSON numbers is the same claim; a double in full is another number, and says so."""
     certificate.save(path)
     document = json.loads(path.read_text())
 
@@ -77,10 +79,19 @@ def test_numbers_in_any_allowed_form(certificate, path):
             return [rewrite(part, form) for part in value]
         return form(value) if type(value) is float else value
 
-    for form in (repr, float.hex, lambda value: f"{value:.25e}", lambda value: f"{value:+.17E}"):
-        changed = {**document, **{key: rewrite(document[key], form) for key in ("system", "region", "evidence")}}
-        verdict = verify(read(path, json.dumps(changed)))
+    def rewritten(form):
+        return {key: rewrite(document[key], form) for key in ("system", "region", "evidence")}
+
+    for form in (repr, lambda value: f"{Decimal(repr(value)):.25e}", lambda value: f"{Decimal(repr(value)):+.60E}"):
+        verdict = verify(read(path, json.dumps({**document, **rewritten(form)})))
         assert verdict.valid, verdict.reason
+    for form in (float.hex, lambda value: f"{value:.25e}"):
+        sections = rewritten(form)
+        claim = claim_sentence(certificate.kind, **sections)
+        changed = read(path, json.dumps({**document, **sections, "margin": {}, "claim": claim}))
+        verdict = verify(changed)
+        assert verdict.valid, verdict.reason
+        assert verify(replace(changed, claim=certificate.claim)).valid == (claim == certificate.claim)
 
 
 @pytest.mark.parametrize("certificate", ALL, ids=IDS)
