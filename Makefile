@@ -29,6 +29,7 @@ test: lint
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file recheck/pyproject.toml recheck/recheck
 
 docs: $(VENV)/.test
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs build/docs
@@ -40,15 +41,15 @@ bench: $(VENV)/.installed
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 
-# The stamps say what the environment holds; a changed pyproject.toml renews them.
-$(VENV)/.installed: pyproject.toml | $(BIN)/pip
+# The stamps say what the environment holds; a changed pyproject.toml renews them. recheck is the second checker.
+$(VENV)/.installed: pyproject.toml recheck/pyproject.toml | $(BIN)/pip
 	@echo "Installing robthermal into $(VENV) (a minute or two the first time)"
-	$(PIP) --editable .
+	$(PIP) --editable . --editable ./recheck
 	@touch $@
 
-$(VENV)/.test: pyproject.toml | $(BIN)/pip
+$(VENV)/.test: pyproject.toml recheck/pyproject.toml | $(BIN)/pip
 	@echo "Installing robthermal and its test tools into $(VENV) (a few minutes the first time)"
-	$(PIP) --editable ".[test]"
+	$(PIP) --editable ".[test]" --editable ./recheck
 	@touch $(VENV)/.installed $@
 
 $(BIN)/pip:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -28,6 +28,7 @@ def report(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results f
 def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")],
            junit: Annotated[Path | None, typer.Option("--junit", help="JUnit file to write, for a pipeline.",
                                                       callback=place)] = None,
+           second: Annotated[bool, typer.Option("--second", help="Let the second checker derive them too.")] = False,
            as_json: Json = False) -> None:
     """Re-derive certificates from their files alone, in ball arithmetic. Exit 0 valid, 1 not valid, 2 unreadable.
 
@@ -35,10 +36,19 @@ def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json
     """
     files = rt.project.certificate_files(certificates)
     with progress_bar("certificates") as done:
-        checks = rt.project.verify_files(files, done)
+        checks = rt.project.verify_files(files, done, second=second)
     if junit is not None:
         rt.project.write_checks(checks, junit)
-    rows = [{"file": str(one.file), "valid": one.valid, "reason": one.reason, "claim": one.claim, "kind": one.kind,
-             "margins": one.margins, "seconds": one.seconds} for one in checks]
-    answer(rows, as_json, lambda: say(*(f"{_WORDS[one.valid]}  {one.file}: {one.reason}" for one in checks)))
+    rows: list[dict[str, Any]] = [{"file": str(one.file), "valid": one.valid, "reason": one.reason, "claim": one.claim,
+                                   "kind": one.kind, "margins": one.margins, "seconds": one.seconds} for one in checks]
+    for row, one in zip(rows, checks, strict=True):
+        if one.second is not None:
+            row["second"] = {"status": one.second.status, "reason": one.second.reason}
+    answer(rows, as_json, lambda: say(*(line for one in checks for line in _lines(one))))
     raise typer.Exit(max(one.status for one in checks))
+
+
+def _lines(one: rt.project.FileCheck) -> list[str]:
+    lines = [f"{_WORDS[one.valid]}  {one.file}: {one.reason}"]
+    return lines if one.second is None else [*lines, f"            second checker: {one.second.status}: "
+                                                     f"{one.second.reason}"]

@@ -46,16 +46,18 @@ from ._rebuild import rebuild_report as rebuild_report
 from ._schema import Boxes as Boxes
 from ._schema import Project as Project
 from ._schema import read_project as read_project
+from ._second import SecondVerdict as SecondVerdict
+from ._second import second_verdicts as second_verdicts
 from ._starter import new_project as new_project
 from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
            "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project",
-           "Residuals", "ResponseResiduals", "boxes_from_text", "calibrate_files", "certificate_files",
-           "certify_system", "check_free", "couple_subsystems", "demo_project",
-           "design_excitation", "design_from_text", "design_system",
-           "diagnose_records", "estimate_response", "explain", "explainable", "map_from_text", "map_system",
-           "new_project", "output_folder", "point_from_text", "read_coupling", "read_measured", "read_project",
-           "rebuild_report", "run_job", "verify_files", "write_certify", "write_checks", "write_coupling",
-           "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]
+           "Residuals", "ResponseResiduals", "SecondVerdict", "boxes_from_text", "calibrate_files",
+           "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
+           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response",
+           "explain", "explainable", "map_from_text", "map_system", "new_project", "output_folder", "point_from_text",
+           "read_coupling", "read_measured", "read_project", "rebuild_report", "run_job", "second_verdicts",
+           "verify_files", "write_certify", "write_checks", "write_coupling", "write_design", "write_diagnosis",
+           "write_excitation", "write_job", "write_map"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import InputError
 from ..report import Claim, Report, versions, write_junit
 from ..verification import Certificate, verify
 from ._now import now
+from ._second import INSTALL, SecondVerdict, second_verdicts
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class FileCheck:
         Found by the check.
     seconds : float
         Duration [s].
+    second : SecondVerdict or None
+        What the second checker said; None where it was not asked.
     """
 
     file: Path
@@ -39,15 +42,18 @@ class FileCheck:
     kind: str
     margins: dict[str, float]
     seconds: float
+    second: SecondVerdict | None = None
 
     @property
     def status(self) -> int:
-        """Exit status: 0 valid, 1 not valid, 2 unreadable."""
-        return 2 if self.valid is None else 0 if self.valid else 1
+        """Exit status: 0 valid, 1 not valid (for either checker), 2 unreadable."""
+        if self.valid is None:
+            return 2
+        return 0 if self.valid and (self.second is None or self.second.status != "not valid") else 1
 
 
-def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = lambda done, total: None
-                 ) -> tuple[FileCheck, ...]:
+def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = lambda done, total: None, *,
+                 second: bool = False) -> tuple[FileCheck, ...]:
     """Derive every certificate again from its file alone.
 
     Parameters
@@ -56,11 +62,18 @@ def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = l
         Certificates.
     progress : callable, optional
         Called with how many are done, and how many there are.
+    second : bool
+        Whether the second checker derives them too.
 
     Returns
     -------
     tuple of FileCheck
         One per file; a file that cannot be read is a result too.
+
+    Raises
+    ------
+    InputError
+        The second checker is asked for and not installed.
 
     Examples
     --------
@@ -72,8 +85,18 @@ def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = l
     checks = []
     for i, file in enumerate(files):
         progress(i, len(files))
-        checks.append(_checked(file))
+        one = _checked(file)
+        if second and one.valid is not None:
+            one = replace(one, second=_second(file))
+        checks.append(one)
     return tuple(checks)
+
+
+def _second(file: Path) -> SecondVerdict:
+    verdict = second_verdicts([file])[0]
+    if verdict.status == "absent":
+        raise InputError("the second checker is not installed", where="--second", remedy=INSTALL)
+    return verdict
 
 
 def _checked(file: Path) -> FileCheck:
