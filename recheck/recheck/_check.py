@@ -11,6 +11,7 @@ from . import _contraction, _gain, _invariance, _network, _observer, _runaway, _
 from ._document import Unreadable, load, sections
 from ._exact import Malformed, NotCovered, short
 from ._result import NOT_COVERED, NOT_VALID, VALID, Answer
+from ._sentences import sentence
 
 Kind = tuple[Callable[[Mapping[str, Mapping[str, Any]]], Any], Callable[[Any], Answer]]
 KINDS: dict[str, Kind] = {
@@ -74,7 +75,11 @@ def check(document: Mapping[str, Any] | str | os.PathLike[str]) -> Result:
                 raise Malformed(f"kind {short(kind)} is unknown")
             raise NotCovered(f"kind {kind!r}")
         read, decide = KINDS[kind]
-        answer = decide(read(parts))
+        problem = read(parts)
+        expected = sentence(kind, problem, parts)
+        if claim != expected:
+            raise Malformed(f"the claim is not the one the data give, which is: {expected}")
+        answer = decide(problem)
     except Malformed as error:
         answer = Answer(NOT_VALID, str(error))
     except NotCovered as error:

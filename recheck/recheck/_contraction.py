@@ -12,7 +12,8 @@ from ._document import get, margin, matrix, not_negative, numbers, text
 from ._exact import Malformed, short
 from ._lines import Lines
 from ._result import Answer, not_covered, not_valid, valid
-from ._thermal import Network, check_cost, read_network
+from ._thermal import Network, check_cost
+from ._uncertain import read_network
 
 METHODS = ("sum", "max", "energy", "lyapunov")
 

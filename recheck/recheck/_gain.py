@@ -12,7 +12,8 @@ from ._document import get, intervals, kelvin, mapping, not_negative, numbers, o
 from ._exact import ZERO, Interval, Malformed, short
 from ._lines import Lines
 from ._result import NOT_VALID, VALID, Answer, not_covered, valid
-from ._thermal import Link, Network, check_cost, read_network
+from ._thermal import Link, Network, check_cost
+from ._uncertain import read_network
 
 
 @dataclass(frozen=True)

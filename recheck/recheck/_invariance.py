@@ -10,7 +10,8 @@ from typing import Any
 from ._document import get, interval, intervals, kelvin, mapping, margin
 from ._exact import ZERO, Interval, Malformed, power, short
 from ._result import Answer, not_covered, not_valid, valid
-from ._thermal import Form, Link, Module, Network, check_cost, peak, read_network
+from ._thermal import Form, Link, Module, Network, check_cost, peak
+from ._uncertain import read_network
 
 _PIECES = 16  # of a partner's temperature where the heat bends the wrong way
 

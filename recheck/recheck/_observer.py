@@ -19,7 +19,8 @@ from ._document import get, margin, matrix, only, positive, sequence, text
 from ._exact import ZERO, Malformed, NotCovered, exact, short
 from ._lyapunov import Units, decide, link_shares, refine
 from ._result import Answer, not_covered, not_valid
-from ._thermal import Network, check_cost, read_network
+from ._thermal import Network, check_cost, read_nominal
+from ._uncertain import read_network
 from ._vertices import Entries, Vertex, add, jacobian
 
 _LONGEST = 20_000  # sum of |F_ij| times the sample time
@@ -54,7 +55,7 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     """Return the problem of the sections of a certificate."""
     system, region, evidence = parts["system"], parts["region"], parts["evidence"]
     network = read_network(system, region)
-    nominal = read_network(system, {key: value for key, value in region.items() if key != "parameters"})
+    nominal = read_nominal(system, region)
     if any(name.startswith("lumps.") for name in network.parameters):
         raise Malformed("region.parameters: an uncertain capacity")
     n = len(network.lumps)

@@ -38,9 +38,9 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     constants = {key: positive(get(system, key, "system"), f"system.{key}") for key in CONSTANTS}
     parameters = read_parameters(parts["region"])
     only(parameters, CONSTANTS, "region.parameters")
-    for key, (low, _) in parameters.items():
-        if low <= 0:
-            raise Malformed(f"region.parameters[{short(key)}]: may be zero or less")
+    for key, (low, high) in parameters.items():
+        if low <= 0 or not low <= constants[key] <= high:
+            raise Malformed(f"region.parameters[{short(key)}]: may be zero or less, or excludes the system's number")
     name = text(system["name"], "system.name") if "name" in system else ""
     return Problem(name, constants, parameters, interval(get(evidence, "current", "evidence"), "evidence.current"),
                    interval(get(evidence, "load", "evidence"), "evidence.load"))

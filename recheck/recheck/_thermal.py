@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
 from typing import Any
 
 from ._document import get, interval, intervals, kelvin, mapping, no_effects, not_negative, positive, sequence, text
@@ -101,8 +100,8 @@ class Network:
     parameters: Mapping[str, Interval]
 
 
-def read_network(system: Mapping[str, Any], region: Mapping[str, Any], *, gains: bool = False) -> Network:
-    """Return network and box of a certificate; ``gains``: also gain and radiation of links may be uncertain."""
+def read_nominal(system: Mapping[str, Any], region: Mapping[str, Any]) -> Network:
+    """Return network and box of a certificate, every number the one of the system."""
     no_effects(system, "system")
     if system.get("temperature_unit", "K") != "K":
         raise Malformed("system: temperatures are not in kelvin")
@@ -127,7 +126,7 @@ def read_network(system: Mapping[str, Any], region: Mapping[str, Any], *, gains:
     network = Network(title, lumps, ambients, tuple(capacity), tuple(links), tuple(modules),
                       _temperatures(get(region, "temperature", "region"), lumps), tuple(current.values()),
                       read_parameters(region))
-    return _uncertain(network, system, gains)
+    return network
 
 
 def read_parameters(region: Mapping[str, Any]) -> dict[str, Interval]:
@@ -215,42 +214,6 @@ def _module(name: str, value: Any, nodes: Mapping[str, int | str]) -> Module:
     return Module(name, hot, cold, reference, nominal, (nominal,))
 
 
-def _uncertain(network: Network, system: Mapping[str, Any], gains: bool) -> Network:
-    index: dict[Any, list[int]] = {}
-    for k, link in enumerate(system["links"]):
-        index.setdefault(_link_name(link), []).append(k)
-    named = {name: found[0] for name, found in index.items() if len(found) == 1}
-    lumps = {name: k for k, name in enumerate(network.lumps)}
-    capacity, links = list(network.capacity), list(network.links)
-    chosen: list[dict[tuple[int, int], Interval]] = [{} for _ in network.modules]
-    places = {module.name: k for k, module in enumerate(network.modules)}
-    for parameter, box in network.parameters.items():
-        table, _, rest = parameter.partition(".")
-        part, _, key = rest.rpartition(".")
-        owner, _, last = part.rpartition(".")
-        if table == "lumps" and key == "capacity" and part in lumps and box[0] > 0:
-            capacity[lumps[part]] = box
-        elif table == "links" and key == "conductance" and part in named and box[0] >= 0:
-            links[named[part]] = replace(links[named[part]], conductance=box)
-        elif gains and table == "links" and key == "radiation" and part in named and box[0] >= 0:
-            links[named[part]] = replace(links[named[part]], radiation=box)
-        elif gains and (table, key, last) == ("links", "gain", "natural") and owner in named and box[0] >= 0:
-            links[named[owner]] = replace(links[named[owner]], gain=box)
-        elif table == "modules" and key in ("value", "slope") and last in PROPERTIES and owner in places:
-            chosen[places[owner]][PROPERTIES.index(last), ("value", "slope").index(key)] = box
-        else:
-            raise Malformed(f"region.parameters[{short(parameter)}]: no such number can be uncertain, or not there")
-    modules = [replace(module, forms=_forms(module.nominal, own))
-               for module, own in zip(network.modules, chosen, strict=True)]
-    return replace(network, capacity=tuple(capacity), links=tuple(links), modules=tuple(modules))
-
-
-def _link_name(link: Mapping[str, Any]) -> str:
-    """Return what a parameter calls a link; a name that is no text is none."""
-    name = link.get("name", "-".join(link["between"]))
-    return name if isinstance(name, str) else ""
-
-
 def check_cost(network: Network, times: int = 1) -> None:
     """Refuse networks whose exact bounds would take more than about a minute."""
     numbers = [value for link in network.links for value in (*link.conductance, *link.gain, *link.radiation)]
@@ -262,18 +225,3 @@ def check_cost(network: Network, times: int = 1) -> None:
     if times * parts * (1 + bits / 500) ** 2 > _MOST_WORK:
         raise NotCovered(f"{len(network.links)} links and {len(network.modules)} modules with numbers of {bits} bits "
                          "are too many")
-
-
-def _forms(nominal: Form, own: Mapping[tuple[int, int], Interval]) -> tuple[Form, ...]:
-    found = []
-    for values in product(*(sorted(set(box)) for box in own.values())):
-        table: list[list[Fraction]] = [list(pair) for pair in nominal]
-        for (row, column), value in zip(own, values, strict=True):
-            table[row][column] = value
-        found.append(_form(table))
-    return tuple(found)
-
-
-def _form(table: Sequence[Sequence[Fraction]]) -> Form:
-    S, R, K = ((pair[0], pair[1]) for pair in table)
-    return S, R, K

@@ -1,0 +1,180 @@
+"""The one sentence of a certificate, built from its data: numbers in all their digits, names escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from . import _contraction, _gain, _invariance, _network, _observer, _runaway, _stability
+from ._exact import Interval, short
+from ._hash import machine_hash, short_hash
+from ._thermal import Network
+
+_LISTED = 12  # ranges of parameters that a sentence lists; more are a table
+_BOX = "(that they do is not part of this claim)"
+_NORMS = {"sum": "the weighted sum of absolute differences", "max": "the weighted largest difference",
+          "energy": "the capacity-weighted sum of squared differences",
+          "lyapunov": "the quadratic form e'Pe of the differences"}
+_CONSTANTS = {"seebeck": "S {} V/K", "resistance": "R {} Ohm", "conductance": "K {} W/K",
+              "sink_conductance": "the hot side at g {} W/K", "sink_temperature": "to a sink of w {} K",
+              "setpoint": "the cold face at x_c {} K"}
+Parts = Mapping[str, Mapping[str, Any]]
+
+
+def decimal(value: Fraction) -> str:
+    """Return the exact decimal of a number, written as Python writes a double.
+
+    Examples
+    --------
+    >>> decimal(Fraction("1.00000000000000000001")), decimal(Fraction("1e-7")), decimal(Fraction(-7))
+    ('1.00000000000000000001', '1e-07', '-7')
+    """
+    if value == 0:
+        return "0"
+    q = value.denominator
+    places = max((q & -q).bit_length() - 1, _fives(q))
+    mantissa = str(abs(value.numerator) * 10**places // q)
+    x, digits = len(mantissa) - 1 - places, mantissa.rstrip("0")
+    if not -4 <= x < 16:
+        text = digits[0] + ("." + digits[1:] if len(digits) > 1 else "") + f"e{'-' if x < 0 else '+'}{abs(x):02d}"
+    elif x < 0:
+        text = "0." + "0" * (-x - 1) + digits
+    else:
+        whole = digits.ljust(x + 1, "0")
+        text = whole[:x + 1] + ("." + whole[x + 1:] if len(whole) > x + 1 else "")
+    return "-" + text if value < 0 else text
+
+
+def sentence(kind: str, problem: Any, parts: Parts) -> str:
+    """Return the sentence that the data of a certificate give."""
+    return _KINDS[kind](problem, parts)
+
+
+def _fives(q: int) -> int:
+    count = 0
+    while q % 5 == 0:
+        q, count = q // 5, count + 1
+    return count
+
+
+def _span(box: Interval) -> str:
+    return f"[{decimal(box[0])}, {decimal(box[1])}]"
+
+
+def _plural(count: int, word: str) -> str:
+    return f"{count} {word}" + ("" if count == 1 else "s")
+
+
+def _parameters(parameters: Mapping[str, Interval], parts: Parts) -> str:
+    if not parameters:
+        return "nominal parameters"
+    title = f"for all {_plural(len(parameters), 'parameter range')} "
+    if len(parameters) > _LISTED:
+        return f"{title}of table {short_hash(parts['region']['parameters'])}"
+    return title + ", ".join(f"{short(name)} in {_span(box)}" for name, box in parameters.items())
+
+
+def _subject(network: Network, parts: Parts, plant: str = "continuous plant") -> str:
+    title = f" {short(network.name)}" if network.name else ""
+    sizes = f"{_plural(len(network.lumps), 'lump')}, {_plural(len(network.modules), 'module')}"
+    return (f"thermal network{title} ({sizes}, machine {machine_hash(parts['system'])}), {plant}, "
+            f"{_parameters(network.parameters, parts)}")
+
+
+def _region(network: Network) -> str:
+    boxes = network.temperature
+    if all(box == boxes[0] for box in boxes):
+        words = f"in {_span(boxes[0])} K"
+    else:
+        words = ", ".join(f"{short(name)} in {_span(box)} K" for name, box in zip(network.lumps, boxes, strict=True))
+    currents = ", ".join(f"{short(module.name)} in {_span(box)} A"
+                         for module, box in zip(network.modules, network.current, strict=True))
+    return f"lump temperatures {words}" + (f" and module currents {currents}, each independent of the others"
+                                           if currents else "")
+
+
+def _rate(rate: Fraction) -> str:
+    return f"decays at least as exp(-rate t), rate = {decimal(rate)} 1/s" if rate > 0 else "decays strictly"
+
+
+def _contraction_claim(problem: _contraction.Problem, parts: Parts) -> str:
+    network = problem.network
+    return (f"The {_subject(network, parts)}, contracts for all {_region(network)}: between any two trajectories under "
+            f"the same inputs, as long as both stay in this box {_BOX}, {_NORMS[problem.method]} (method "
+            f"{problem.method}) {_rate(problem.rate)}.")
+
+
+def _invariance_claim(problem: _invariance.Problem, parts: Parts) -> str:
+    network = problem.network
+    inputs = [f"ambient {short(name)} in {_span(box)} K" for name, box in problem.ambient.items()]
+    inputs += [f"heat load on {short(network.lumps[k])} in {_span(box)} W" for k, box in problem.heat.items()]
+    words = f", for all {', '.join(inputs)}" if inputs else ""
+    return (f"The {_subject(network, parts)}, never leaves the box of {_region(network)}, once its temperatures are in "
+            f"it{words}, with no other heat.")
+
+
+def _gain_claim(problem: _gain.Problem, parts: Parts) -> str:
+    network = problem.network
+    ambients = "".join(f", ambient {short(name)} in {_span(box)} K" for name, box in problem.ambient.items())
+    fades = (f"what is left of their start fades as exp(-rate t), rate = {decimal(problem.rate)} 1/s"
+             if problem.rate > 0 else "if they start together")
+    peaks = ", ".join(f"{decimal(max(channel.gains))} {'K/K from ambient' if channel.ambient else 'K/W from heat on'} "
+                      f"{short(channel.name)}" for channel in problem.channels)
+    return (f"In the {_subject(network, parts)}, for all {_region(network)}{ambients}: two trajectories under the same "
+            f"currents that differ in one disturbance, as long as both stay in this box {_BOX}, never part in any lump "
+            f"by more than that lump's peak gain times the largest difference of the disturbance, {fades}; the largest "
+            f"gains are {peaks}, those of every lump are in table {short_hash(parts['evidence']['gains'])}.")
+
+
+def _observer_claim(problem: _observer.Problem, parts: Parts) -> str:
+    network = problem.network
+    known = (", the same in plant and observer, A_d and Γ those of the nominal numbers and f all other heat"
+             if network.parameters else "")
+    sensors = ", ".join(f"{short(sensor.name)} ({decimal(sensor.gain)} times {short(network.lumps[sensor.lump])})"
+                        for sensor in problem.sensors)
+    speed = (f"shrinks at least by the factor {decimal(problem.contraction)}² per sample" if problem.contraction < 1
+             else "shrinks strictly with every sample")
+    return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the "
+            f"{_subject(network, parts, 'sampled model with held heat')}{known}, with sensors {sensors or 'none'}, "
+            f"sampled every {decimal(problem.sample_time)} s, f held in between, converges for all {_region(network)}, "
+            f"as long as temperatures and estimates both stay in this box {_BOX}: e'Pe of the error {speed}.")
+
+
+def _network_claim(problem: _network.Problem, parts: Parts) -> str:
+    spread = (f"for all conductances within {decimal(100 * problem.uncertainty)} % of the given ones, those between "
+              "two lumps and the row sums each on their own" if problem.uncertainty > 0 else "nominal parameters")
+    norm = "largest" if problem.method == "max" else "summed"
+    return (f"The thermal network of {len(problem.capacity)} lumps and {len(problem.rows)} entries (machine "
+            f"{machine_hash(parts['system'])}), continuous plant, {spread}, is stable: the weighted {norm} absolute "
+            f"temperature difference (method {problem.method}) between any two of its trajectories under the same "
+            f"inputs {_rate(problem.rate)}.")
+
+
+def _runaway_claim(problem: _runaway.Problem, parts: Parts) -> str:
+    words = {}
+    for key, value in problem.constants.items():
+        low, high = problem.parameters.get(key, (value, value))
+        words[key] = _CONSTANTS[key].format(f"= {decimal(low)}" if low == high else f"in {_span((low, high))}")
+    S, R, K, g, w, x = words.values()
+    title = f" {short(problem.name)}" if problem.name else ""
+    return (f"The single module{title} (machine {machine_hash(parts['system'])}), steady states of the continuous "
+            f"plant, {_parameters(problem.parameters, parts)}, with constant {S}, {R}, {K}, {g} {w}, {x}, carries more "
+            f"load with more current up to a current in {_span(problem.current)} A, where the load is in "
+            f"{_span(problem.load)} W and stops growing.")
+
+
+def _stability_claim(problem: _stability.Problem, parts: Parts) -> str:
+    sampled = problem.sample_time > 0
+    time = f"sampled at {decimal(problem.sample_time)} s" if sampled else "continuous"
+    modes = (f"absolute values below {decimal(1 - problem.rate)}" if sampled else
+             f"real parts below {decimal(-problem.rate)}{' 1/s' if problem.rate else ''}")
+    sizes = ", ".join((_plural(len(problem.A), "state"), _plural(problem.inputs, "input"),
+                       _plural(problem.outputs, "output")))
+    return (f"The linear system as given, {time} ({sizes}, machine {machine_hash(parts['system'])}), nominal "
+            f"parameters, is asymptotically stable: all eigenvalues of A have {modes}.")
+
+
+_KINDS: dict[str, Callable[[Any, Parts], str]] = {
+    "contraction": _contraction_claim, "invariance": _invariance_claim, "gain": _gain_claim,
+    "observer": _observer_claim, "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}
