@@ -53,12 +53,12 @@ SURFACE = {
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
-        Explanation FileCheck JobResult MapRequest Project Residuals ResponseResiduals boxes_from_text
+        Explanation FileCheck JobResult MapRequest Project Residuals ResponseResiduals SecondVerdict boxes_from_text
         calibrate_files certificate_files certify_system check_free couple_subsystems demo_project design_excitation
         design_from_text design_system diagnose_records estimate_response explain explainable map_from_text
-        map_system new_project output_folder point_from_text read_coupling read_measured read_project
-        rebuild_report run_job verify_files write_certify write_checks write_coupling write_design
-        write_diagnosis write_excitation write_job write_map
+        map_system new_project output_folder point_from_text read_coupling read_measured read_project rebuild_report
+        run_job second_verdicts verify_files write_certify write_checks write_coupling write_design write_diagnosis
+        write_excitation write_job write_map
     """,
     "report": """
         Claim Evidence Figure Printed Report Section Table box_ranges current_limits file_hash house_style
