@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..errors import Outcome
 from ..thermal import System
 from ._file import write_json
+from ._judge import Name, Verdict
 from .data import NoiseFloor
 from .effects import Candidate
 from .evidence import Adequacy, Gap, HoldOut, Location, Scores, UnknownHeat
 from .fit import Refit
 from .plan import NextExperiment
-from .search import Decision, JointCheck, ruled_out
-
-Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
-Name = tuple[str, tuple[str, ...]]
+from .search import Accepted, JointCheck, ruled_out
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ class Diagnosis:
     nominal: Refit
     fit: Refit
     scores: Scores
-    rounds: tuple[Decision, ...]
+    rounds: tuple[Accepted, ...]
     adequacy: Adequacy
     hold_out: HoldOut | None
     joint: JointCheck | None = None

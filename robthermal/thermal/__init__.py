@@ -61,9 +61,9 @@ from ._system import System as System
 
 __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
            "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
-           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
-           "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
-           "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
-           "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
-           "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
-           "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_modelica", "write_system"]
+           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural", "Periodic",
+           "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper", "System",
+           "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica", "format_system",
+           "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials",
+           "parse_system", "read_matrices", "read_system", "reduce", "simulate", "steady_state", "system_from_matrices",
+           "time_constants", "trajectory", "write_modelica", "write_system"]

@@ -17,7 +17,7 @@ from robthermal.diagnosis.fit._whitened import Whitened
 from robthermal.diagnosis.path._along import along
 from robthermal.diagnosis.path._whitening import whitener
 from robthermal.diagnosis.search import _revise
-from robthermal.diagnosis.search._decide import Decision
+from robthermal.diagnosis.search._decide import Accepted
 from robthermal.diagnosis.search._scan import scanned
 from robthermal.diagnosis.search._short_list import Entry, ShortList
 from robthermal.diagnosis.search._starts import Origin, held, started
@@ -336,7 +336,7 @@ def test_an_effect_that_another_stands_on_stays(plant: rt.System, hide: Hide, mo
     v = both.start(nominal.structure.ranges.values(nominal.v[:nominal.structure.n_parameters]),
                    [{"capacity": 1.0, **mass.shape}, {"heat": 0.01}])
     fit = extended(nominal, both, v, 3)
-    first, second = (Decision(True, nominal, Entry(c, fit, 100.0, 0.0), ()) for c in (mass, warm))
+    first, second = (Accepted(nominal, best=Entry(c, fit, 100.0, 0.0)) for c in (mass, warm))
     # the heat on the hidden mass is chosen again as it was; then it is the mass's turn
     monkeypatch.setattr(_revise, "refit_short_list", lambda *a, **k: ShortList(nominal, (second.best,), {}))
     monkeypatch.setattr(_revise, "settled", lambda *a: second)

@@ -10,7 +10,7 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis.evidence._score import Scores
-from robthermal.diagnosis.search._decide import Decision
+from robthermal.diagnosis.search._decide import Accepted
 from robthermal.diagnosis.search._joint_check import checked_jointly
 from robthermal.diagnosis.search._joint_program import Program
 from robthermal.diagnosis.search._joint_sets import EffectSet, refit_set
@@ -122,9 +122,9 @@ def scored(plant: rt.System, train: rt.Record, effects: list[str]) -> tuple[rt.d
     return fit, rt.diagnosis.score(fit, effects)
 
 
-def as_rounds(fit: rt.diagnosis.Refit, found: EffectSet) -> tuple[Decision, ...]:
+def as_rounds(fit: rt.diagnosis.Refit, found: EffectSet) -> tuple[Accepted, ...]:
     """A set as if a stepwise search had accepted it."""
-    return tuple(Decision(True, fit, Entry(candidate, found.fit, found.delta_bic, 0.0), ())
+    return tuple(Accepted(fit, best=Entry(candidate, found.fit, found.delta_bic, 0.0))
                  for candidate in found.candidates)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,13 +10,13 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.diagnose import _too_much_left
 from robthermal.diagnosis.effects._effect import Candidate
 from robthermal.diagnosis.evidence._score import Scores, columns, explains
 from robthermal.diagnosis.fit._descent import Point, descend
 from robthermal.diagnosis.fit._refit import Refit
 from robthermal.diagnosis.fit._refitting import extended
 from robthermal.diagnosis.search import _revise, _short_list
+from robthermal.diagnosis.search._stages import too_much_left
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 
@@ -135,9 +134,9 @@ def test_a_misfit_that_no_single_effect_could_remove_is_left_to_the_verdict(
     assert fit.variance > 3.0
     helpless, helpful = (rt.diagnosis.score(fit, [name]) for name in ("sensor_offset", "natural_convection"))
     assert explains(fit, helpless) < 0.3 < 0.8 < explains(fit, helpful)
-    assert _too_much_left(fit, helpless) and not _too_much_left(fit, helpful)
+    assert too_much_left(fit, helpless) and not too_much_left(fit, helpful)
     good = rt.diagnosis.refit(plant, hide()[0])
-    assert good.variance < 1.5 and not _too_much_left(good, rt.diagnosis.score(good, ["sensor_offset"]))
+    assert good.variance < 1.5 and not too_much_left(good, rt.diagnosis.score(good, ["sensor_offset"]))
 
 
 def test_where_the_search_gave_up_there_is_no_name(
@@ -148,8 +147,7 @@ def test_where_the_search_gave_up_there_is_no_name(
     train, unseen = hide(hidden)
     names = ["natural_convection"]
     assert rt.diagnose(plant, train, validation=unseen, effects=names).verdict == "named"
-    stages = sys.modules["robthermal.diagnosis.diagnose"]  # the function of the same name stands before the module
-    monkeypatch.setattr(stages, "flails", lambda *_: True)  # whatever the other gates say
+    monkeypatch.setattr("robthermal.diagnosis.search._stages.flails", lambda *_: True)  # whatever the other gates say
     found = rt.diagnose(plant, train, validation=unseen, effects=names)
     assert found.verdict == "unexplained" and not found.effects and "A large misfit stays" in found.outcome.text
     assert [effect.label for effect in found.provisional] == ["natural_convection(plate, room)"]

@@ -1,5 +1,6 @@
 """Which effects: short lists, decisions, joint selection, revision."""
 
+from ._decide import Accepted as Accepted
 from ._decide import Decision as Decision
 from ._decide import decide as decide
 from ._joint import JointSelection as JointSelection
@@ -15,11 +16,20 @@ from ._short_list import ShortList as ShortList
 from ._short_list import flails as flails
 from ._short_list import quantities_of as quantities_of
 from ._short_list import refit_short_list as refit_short_list
+from ._stages import accept as accept
+from ._stages import begin as begin
+from ._stages import compare as compare
+from ._stages import refit_candidates as refit_candidates
+from ._stages import revise as revise
+from ._stages import shortlist as shortlist
+from ._stages import validate as validate
+from ._state import SearchState as SearchState
 from ._told_apart import ruled_out as ruled_out
 from ._told_apart import told_apart as told_apart
 from ._unseen_doubts import supported as supported
 from ._wider_noise import with_wider_noise as with_wider_noise
 
-__all__ = ["Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "ShortList", "checked_jointly", "decide",
-           "flails", "needed", "quantities_of", "refit_set", "refit_short_list", "revised", "ruled_out",
-           "select_jointly", "supported", "told_apart", "with_wider_noise"]
+__all__ = ["Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState", "ShortList",
+           "accept", "begin", "checked_jointly", "compare", "decide", "flails", "needed", "quantities_of",
+           "refit_candidates", "refit_set", "refit_short_list", "revise", "revised", "ruled_out", "select_jointly",
+           "shortlist", "supported", "told_apart", "validate", "with_wider_noise"]

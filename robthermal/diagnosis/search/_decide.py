@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ..evidence import ALPHA, BIC_GAP
@@ -14,27 +14,29 @@ _CONTENDERS = 60.0  # ΔBIC behind the best within which a candidate is refitted
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """What one round found.
+    """What one round of the search found.
 
     Parameters
     ----------
-    alarm : bool
-        Whether any effect is beyond doubt: p < 0.01 for the family and ΔBIC > 10.
     before : Refit
-        Without the new effect.
+        Fit without the new effect.
     best : Entry or None
-        The best candidate, noise levels and filters renewed; None without an alarm.
+        Best candidate, noise levels and filters renewed; None if no effect is beyond doubt.
     contenders : tuple of Entry
         Others whose BIC is within 10 of the best: the records cannot exclude them.
     ruled_out : tuple of Entry
-        Those among them that the unseen records exclude.
+        Those among them that the validation records exclude.
     """
 
-    alarm: bool
     before: Refit
-    best: Entry | None
-    contenders: tuple[Entry, ...]
+    best: Entry | None = None
+    contenders: tuple[Entry, ...] = ()
     ruled_out: tuple[Entry, ...] = ()
+
+    @property
+    def alarm(self) -> bool:
+        """Whether any effect is beyond doubt: p < 0.01 for the family and ΔBIC > 10."""
+        return self.best is not None
 
     def __str__(self) -> str:
         if self.best is None:
@@ -49,17 +51,37 @@ class Decision:
         return ShortList(self.before, entries, {}).plot()
 
 
+@dataclass(frozen=True, eq=False)
+class Accepted(Decision):
+    """A round that found an effect beyond doubt.
+
+    Parameters
+    ----------
+    before : Refit
+        Fit without the new effect.
+    best : Entry
+        Accepted candidate, noise levels and filters renewed.
+    contenders : tuple of Entry
+        Others whose BIC is within 10 of the best: the records cannot exclude them.
+    ruled_out : tuple of Entry
+        Those among them that the validation records exclude.
+    """
+
+    best: Entry = field(kw_only=True)
+
+
 def decide(short: ShortList) -> Decision:
     """Decide on a short list.
 
     Parameters
     ----------
     short : ShortList
-        From `refit_short_list`.
+        Refitted candidates, from `refit_short_list`.
 
     Returns
     -------
     Decision
+        `Accepted` if an effect is beyond doubt.
 
     Examples
     --------
@@ -79,11 +101,11 @@ def decide(short: ShortList) -> Decision:
     """
     sure = [entry for entry in short.entries if entry.p_value < ALPHA and entry.delta_bic > BIC_GAP]
     if not sure:
-        return Decision(False, short.before, None, ())
+        return Decision(short.before)
     return settled(short.before, short.entries)
 
 
-def settled(before: Refit, entries: tuple[Entry, ...]) -> Decision:
+def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
     """Renew filters and noise levels at the best entry, refit those near it, and compare again."""
     best = entries[0]
     renewed = fitted(best.fit.structure, best.fit.v, best.fit.floor, best.fit.levels)
@@ -98,4 +120,4 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Decision:
         winner = Entry(winner.candidate, own, next(e.delta_bic for e in entries
                                                    if e.fit.structure is winner.fit.structure), winner.p_value,
                        winner.aliases)
-    return Decision(True, before, winner, others)
+    return Accepted(before, best=winner, contenders=others)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..effects import Candidate
 from ..evidence import BIC_GAP, Scores
 from ..fit import Refit, extended
-from ._decide import Decision
+from ._decide import Accepted
 from ._joint import JointSelection, select_jointly
 from ._joint_sets import EffectSet, Key, bic
 from ._revise import revised
@@ -44,13 +44,13 @@ class JointCheck:
         return f"{self.selection.compared(self.stepwise)}: {what} (ΔBIC of the other set {self.advantage:.1f})"
 
 
-def checked_jointly(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, scores: Scores,
-                    effects: Iterable[str] | None) -> tuple[tuple[Decision, ...], Refit, JointCheck]:
+def checked_jointly(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, scores: Scores,
+                    effects: Iterable[str] | None) -> tuple[tuple[Accepted, ...], Refit, JointCheck]:
     """Replace the accepted set where another explains clearly more, and list others that explain as much.
 
     Parameters
     ----------
-    rounds : tuple of Decision
+    rounds : tuple of Accepted
         Accepted effects, two or more.
     fit : Refit
         With all of them.
@@ -75,17 +75,16 @@ def checked_jointly(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, sc
     advantage, best = max(others, key=lambda item: item[0], default=(-float("inf"), None))
     check = JointCheck(selection, stepwise, advantage)
     if best is not None and advantage > BIC_GAP:
-        start = tuple(Decision(True, nominal, _entry(best, candidate, scores, advantage), ())
+        start = tuple(Accepted(nominal, best=_entry(best, candidate, scores, advantage))
                       for candidate in best.candidates)
         return *revised(start, nominal, effects), check
     rivals = [(gap, found) for gap, found in others if gap > -BIC_GAP]
     return tuple(_listed(round_, rivals, stepwise, scores) for round_ in rounds), fit, check
 
 
-def _listed(round_: Decision, rivals: list[tuple[float, EffectSet]], stepwise: tuple[Candidate, ...],
-            scores: Scores) -> Decision:
+def _listed(round_: Accepted, rivals: list[tuple[float, EffectSet]], stepwise: tuple[Candidate, ...],
+            scores: Scores) -> Accepted:
     """A round with the effects of equally good sets that do without its own."""
-    assert round_.best is not None
     own = _representative(round_.best.candidate.key, scores)
     accepted = {_representative(candidate.key, scores) for candidate in stepwise}
     more = []

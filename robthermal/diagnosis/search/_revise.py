@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import Diverged, InputError
 from ..evidence import BIC_GAP, score
 from ..fit import Refit, Whitened, extended, relinearised
-from ._decide import Decision, settled
+from ._decide import Accepted, settled
 from ._short_list import Entry, delta_bic, quantities_of, refit_short_list
 
 _SWEEPS = 2
@@ -19,13 +19,13 @@ _EVALUATIONS = 20  # without an effect: where it is strong the misfit is large, 
 _SURE = 8.0  # standard deviations of a size that is certainly worth a ΔBIC of 10
 
 
-def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
-            ) -> tuple[tuple[Decision, ...], Refit]:
+def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
+            ) -> tuple[tuple[Accepted, ...], Refit]:
     """Choose each effect again with the others in place, until none changes; drop what is not needed any more.
 
     Parameters
     ----------
-    rounds : tuple of Decision
+    rounds : tuple of Accepted
         In order of acceptance.
     nominal : Refit
         Without any effect.
@@ -35,8 +35,7 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
         Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
     """
     names = None if effects is None else list(effects)
-    chosen = [round_.best for round_ in rounds if round_.best is not None]
-    fit = chosen[-1].fit
+    fit = rounds[-1].best.fit
     decisions = list(rounds)
     for sweep in range(_SWEEPS):
         changed = False
@@ -45,7 +44,6 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
             if before is None:
                 continue
             old = decisions[place].best
-            assert old is not None
             short = refit_short_list(before, score(before, names), length=_LENGTH, tried=old.candidate.key)
             entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
             if entries[0].delta_bic < BIC_GAP:
@@ -53,7 +51,6 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
                 fit, changed = before, True
                 break
             decision = settled(before, entries)
-            assert decision.best is not None
             # the effect chosen again stands last in the new structure: keep the order of the decisions the same
             decisions.append(decision)
             decisions.pop(place)
@@ -65,12 +62,12 @@ def revised(rounds: tuple[Decision, ...], nominal: Refit, effects: Iterable[str]
     return revised(kept, nominal, names) if 0 < len(kept) < len(decisions) else (kept, less)
 
 
-def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Decision, ...], Refit]:
+def needed(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Accepted, ...], Refit]:
     """Without effects that are not worth ΔBIC 10 in the end: beside one chosen later, one may shrink to nothing.
 
     Parameters
     ----------
-    rounds : tuple of Decision
+    rounds : tuple of Accepted
         In the order of the effects of the fit.
     fit, nominal : Refit
         With them, without any.
@@ -82,8 +79,8 @@ def needed(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit) -> tuple[tu
         less = without(fit, place, nominal, rounds[place].before)
         if less is not None and delta_bic(less, fit) < BIC_GAP:
             kept = [round_ for at, round_ in enumerate(rounds) if at != place]
-            if kept and (last := kept[-1].best) is not None:
-                kept[-1] = replace(kept[-1], best=replace(last, fit=less))
+            if kept:
+                kept[-1] = replace(kept[-1], best=replace(kept[-1].best, fit=less))
             return needed(tuple(kept), less, nominal)
     return rounds, fit
 

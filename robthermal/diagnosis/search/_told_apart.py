@@ -10,12 +10,12 @@ from ..data import ResponseData
 from ..effects import Candidate
 from ..evidence import BIC_GAP, surprises
 from ..fit import Refit, fitted
-from ._decide import Decision
+from ._decide import Accepted, Decision
 from ._short_list import Entry, Key, delta_bic, refiltered
 
 
-def told_apart(rounds: tuple[Decision, ...], fit: Refit, data: Sequence[Data | ResponseData]
-               ) -> tuple[tuple[Decision, ...], Refit]:
+def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data | ResponseData]
+               ) -> tuple[tuple[Accepted, ...], Refit]:
     """Order the names of every ambiguous set by the evidence of all records, and drop those beyond doubt worse.
 
     BIC stands for -2 log p(training); -2 log p(unseen | training) is added. Nothing is fitted to the unseen records,
@@ -23,7 +23,7 @@ def told_apart(rounds: tuple[Decision, ...], fit: Refit, data: Sequence[Data | R
 
     Parameters
     ----------
-    rounds : tuple of Decision
+    rounds : tuple of Accepted
         In the order of the effects of the fit.
     fit : Refit
         With them.
@@ -36,7 +36,7 @@ def told_apart(rounds: tuple[Decision, ...], fit: Refit, data: Sequence[Data | R
             decision, fit = _weighed(round_, rivals, fit, data)
             rounds = tuple(decision if one is round_ else one for one in rounds)
     places = [candidate.key for candidate in fit.structure.effects]
-    return tuple(sorted(rounds, key=lambda one: places.index(_best(one).candidate.key))), fit
+    return tuple(sorted(rounds, key=lambda one: places.index(one.best.candidate.key))), fit
 
 
 def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
@@ -44,10 +44,10 @@ def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
     return tuple(entry.candidate for round_ in rounds for entry in round_.ruled_out)
 
 
-def _weighed(round_: Decision, rivals: Sequence[Entry], fit: Refit, data: Sequence[Data | ResponseData]
-             ) -> tuple[Decision, Refit]:
+def _weighed(round_: Accepted, rivals: Sequence[Entry], fit: Refit, data: Sequence[Data | ResponseData]
+             ) -> tuple[Accepted, Refit]:
     """One set with all records, and the fit with its best name."""
-    best = _best(round_)
+    best = round_.best
     own = replace(best, fit=fit, delta_bic=delta_bic(round_.before, fit))
     entries = [own, *refiltered(round_.before, fit, rivals)]
     unseen = surprises([entry.fit for entry in entries], fit, data)
@@ -64,14 +64,9 @@ def _weighed(round_: Decision, rivals: Sequence[Entry], fit: Refit, data: Sequen
     return replace(round_, best=first, contenders=(*alike[1:], *unweighed), ruled_out=worse), fit
 
 
-def _takes_the_place(entry: Entry, round_: Decision, fit: Refit) -> bool:
+def _takes_the_place(entry: Entry, round_: Accepted, fit: Refit) -> bool:
     """Whether the entry was fitted beside all the other accepted effects."""
     def others(one: Refit, name: Entry) -> set[Key]:
         return {candidate.key for candidate in one.structure.effects} - {name.candidate.key}
 
-    return others(entry.fit, entry) == others(fit, _best(round_))
-
-
-def _best(round_: Decision) -> Entry:
-    assert round_.best is not None
-    return round_.best
+    return others(entry.fit, entry) == others(fit, round_.best)

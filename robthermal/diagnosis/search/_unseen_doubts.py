@@ -8,17 +8,17 @@ from ..._fitting import Data
 from ..data import ResponseData
 from ..evidence import BIC_GAP, surprises
 from ..fit import Refit, fitted
-from ._decide import Decision
+from ._decide import Accepted
 from ._revise import without
 
 
-def supported(rounds: tuple[Decision, ...], fit: Refit, nominal: Refit, data: Sequence[Data | ResponseData]
-              ) -> tuple[tuple[Decision, ...], Refit]:
+def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Sequence[Data | ResponseData]
+              ) -> tuple[tuple[Accepted, ...], Refit]:
     """Drop effects, the worst first, without which the unseen records are predicted beyond doubt better.
 
     Parameters
     ----------
-    rounds : tuple of Decision
+    rounds : tuple of Accepted
         In the order of the effects of the fit.
     fit, nominal : Refit
         With them, without any.

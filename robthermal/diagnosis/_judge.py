@@ -1,0 +1,180 @@
+"""Last stages of a diagnosis: test what the search accepted, give a verdict, and ask whether the noise explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..errors import Outcome
+from .data import Measured
+from .evidence import Adequacy, HoldOut, adequacy, hold_out
+from .fit import Refit, Whitened
+from .search import Accepted, SearchState, ShortList, ruled_out, with_wider_noise
+
+Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
+Name = tuple[str, tuple[str, ...]]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Validation data of a diagnosis, if there are any.
+
+    Parameters
+    ----------
+    data : Record, FrequencyResponse, list of them, or None
+        Data that no fit sees.
+    operating_point : mapping, optional
+        Mean inputs of frequency responses, as in `refit`.
+    """
+
+    data: Measured | Sequence[Measured] | None
+    operating_point: Mapping[str, float] | None = None
+
+    def predicted(self, before: Refit, after: Refit) -> HoldOut | None:
+        """Prediction of the data with and without the effects; None without data.
+
+        Parameters
+        ----------
+        before, after : Refit
+            Fits without the effects, and with them.
+        """
+        return None if self.data is None else hold_out(before, after, self.data, operating_point=self.operating_point)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Judged:
+    """State of a search with the tests of it and the verdict.
+
+    Parameters
+    ----------
+    state : SearchState
+        What was accepted.
+    adequacy : Adequacy
+        Tests of what is left in the training data.
+    hold_out : HoldOut or None
+        Prediction of the validation data; None without any.
+    verdict : {"named", "ambiguous", "consistent", "unexplained"}
+        Answer of the diagnosis.
+    outcome : Outcome
+        Code as the verdict, and its reasons.
+    """
+
+    state: SearchState
+    adequacy: Adequacy
+    hold_out: HoldOut | None
+    verdict: Verdict
+    outcome: Outcome
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else
+                                                [self.adequacy]), f"{self.verdict}: {self.outcome}"])
+
+
+def judge(state: SearchState, validation: Validation, progress: Progress) -> Judged:
+    """Test whether anything is left, predict the validation data, and give a verdict.
+
+    Parameters
+    ----------
+    state : SearchState
+        Complete state of the search.
+    validation : Validation
+        Data that no fit has seen.
+    progress : callable
+        Called with a sentence before every test.
+    """
+    progress("testing whether anything is left")
+    checks = adequacy(state.fit)
+    if validation.data is not None:
+        progress("predicting the validation data")
+    held = validation.predicted(state.nominal, state.fit)
+    verdict, outcome = _verdict(state, _faults(state, checks, held))
+    return Judged(state=state, adequacy=checks, hold_out=held, verdict=verdict, outcome=outcome)
+
+
+def reconsider_noise(judged: Judged, validation: Validation) -> Judged:
+    """Where nothing known explains the records, or only with more noise than declared: does noise alone explain them?
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer with the declared noise; returned as it is unless noise alone explains all data.
+    validation : Validation
+        Data that no fit has seen.
+    """
+    state, unexplained = judged.state, judged.verdict == "unexplained"
+    if not unexplained and not (state.rounds and state.fit.levels.exhausted):
+        return judged
+    wider = with_wider_noise(state.nominal, state.names, unexplained)
+    if wider is None:
+        return judged
+    fit, scores, checks = wider
+    held = validation.predicted(fit, fit)
+    if held is not None and not held.outcome.ok:
+        return judged
+    text = f"Nothing but noise is missing: the records agree with the model if {fit.levels}."
+    return Judged(
+        state=SearchState(nominal=fit, names=state.names, scores=scores, fit=fit, current=scores,
+                          short=ShortList(fit, (), {}), complete=True),
+        adequacy=checks, hold_out=held, verdict="consistent",
+        outcome=Outcome(True, "consistent", text + ("" if fit.levels.share else " Declare it.")))
+
+
+def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[str]:
+    """Reasons, a sentence each, why nothing may be named and nothing called consistent."""
+    faults = [] if checks.outcome.ok else [checks.outcome.text]
+    if state.misfit_left:
+        faults.append(f"A large misfit stays (whitened variance {state.fit.variance:.3g}).")
+    if held is not None and not held.outcome.ok:
+        faults.append(held.outcome.text)
+    if state.rounds:
+        if not _independent_of_step(state.fit):
+            faults.append("An effect moves when the integration is refined: it may be the solver's own error.")
+        if not state.fit.outcome.ok:
+            faults.append(state.fit.outcome.text)
+    return faults
+
+
+def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcome]:
+    if faults:
+        helped = "; ".join(map(str, state.rounds))
+        text = "None of the known effects explains the records. " + " ".join(faults)
+        text += f" Provisional, no name: {helped}." if helped else ""
+        return "unexplained", Outcome(False, "unexplained", text + " Look at `located`: lump, sensor and conditions.")
+    if not state.rounds:
+        return "consistent", Outcome(True, "consistent", "Nothing is missing that these records could show: see "
+                                     "not_testable and the detection limits in scores.")
+    labels = ", ".join(candidate.label for candidate in ruled_out(state.rounds))
+    excluded = f" The validation records rule out {labels}, which the others could not." if labels else ""
+    if any(map(alternatives, state.rounds)):
+        return "ambiguous", Outcome(False, "ambiguous", "The records cannot tell some effects apart: see alternatives, "
+                                    f"and next_experiment for what separates them.{excluded}")
+    return "named", Outcome(True, "named", f"One set of effects explains the records.{excluded}")
+
+
+def _independent_of_step(fit: Refit) -> bool:
+    """Whether the sizes stay within a standard deviation when the simulation is ten times finer."""
+    structure = replace(fit.structure, tolerance=fit.structure.tolerance / 10.0)
+    finer = Whitened(structure, fit.whiteners).residual(fit.v)
+    scale = np.linalg.norm(fit.J, axis=0)
+    scale[scale == 0] = 1.0
+    step = np.linalg.lstsq(fit.J / scale, finer - fit.z, rcond=1e-10)[0] / scale
+    place = slice(structure.n_parameters, structure.n_parameters + structure.n_effects)
+    return bool(np.all(np.abs(step[place]) <= 1e-12 + np.sqrt(np.maximum(np.diag(fit.covariance)[place], 0.0))))
+
+
+def alternatives(round_: Accepted) -> tuple[Name, ...]:
+    """Everything the records cannot tell from the accepted effect.
+
+    Parameters
+    ----------
+    round_ : Accepted
+        Accepted effect with its contenders and aliases.
+    """
+    listed = [*round_.best.aliases]
+    for entry in round_.contenders:
+        listed += [entry.candidate, *entry.aliases]
+    return tuple(dict.fromkeys(c.key for c in listed if c.key != round_.best.candidate.key))

@@ -1,0 +1,150 @@
+"""Stages of the search, each from state to state: shortlist, refit, accept, revise, compare, validate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..._fitting import Data
+from ..data import ResponseData
+from ..evidence import Scores, explains, promising, score
+from ..fit import Refit
+from ._decide import Accepted, decide
+from ._joint_check import checked_jointly
+from ._revise import needed, revised
+from ._short_list import ShortList, flails, refit_short_list
+from ._state import SearchState
+from ._told_apart import told_apart
+from ._unseen_doubts import supported
+
+MOST_EFFECTS = 3
+_LARGE = 1.5  # whitened variance
+_LEAST = 0.3  # share of a large misfit that the last effect allowed must promise: it has to explain all of it
+
+
+def begin(nominal: Refit, names: Sequence[str] | None = None) -> SearchState:
+    """Score every candidate on the nominal fit; nothing is accepted yet.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Nominal system refitted.
+    names : sequence of str, optional
+        Effects to try; default the whole catalogue.
+    """
+    scores = score(nominal, names)
+    return SearchState(nominal=nominal, names=None if names is None else tuple(names), scores=scores, fit=nominal,
+                       current=scores, short=ShortList(nominal, (), {}))
+
+
+def shortlist(state: SearchState) -> SearchState:
+    """Score all candidates beside the accepted ones; the search is complete where none could pass.
+
+    Parameters
+    ----------
+    state : SearchState
+        State with any number of effects accepted.
+    """
+    if len(state.rounds) == MOST_EFFECTS:
+        return replace(state, complete=True)
+    scores = score(state.fit, state.names) if state.rounds else state.scores
+    state = replace(state, current=scores)
+    if not promising(state.fit, scores):
+        return replace(state, complete=True)
+    if len(state.rounds) == MOST_EFFECTS - 1 and too_much_left(state.fit, scores):
+        return replace(state, complete=True, misfit_left=True)
+    return state
+
+
+def refit_candidates(state: SearchState) -> SearchState:
+    """Refit the best candidates together with the nominal parameters.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `shortlist`, not complete.
+    """
+    return replace(state, short=refit_short_list(state.fit, state.current))
+
+
+def accept(state: SearchState) -> SearchState:
+    """Accept the best refitted candidate if it is beyond doubt; else the search is complete.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `refit_candidates`.
+    """
+    decision = decide(state.short)
+    if not isinstance(decision, Accepted):
+        return replace(state, complete=True)
+    rounds, fit = (*state.rounds, decision), decision.best.fit
+    left = flails(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
+    return replace(state, rounds=rounds, fit=fit, complete=left, misfit_left=left)
+
+
+def revise(state: SearchState) -> SearchState:
+    """Choose each effect again beside the others, and drop what is not needed any more.
+
+    Parameters
+    ----------
+    state : SearchState
+        Complete state; where a large misfit is left it is returned as it is.
+    """
+    if state.misfit_left:
+        return state
+    if len(state.rounds) < 2:
+        rounds, fit = needed(state.rounds, state.fit, state.nominal)
+    else:
+        rounds, fit = revised(state.rounds, state.nominal, state.names, last_is_new=True)
+    return replace(state, rounds=rounds, fit=fit)
+
+
+def compare(state: SearchState) -> SearchState:
+    """Compare two effects or more with a selection of all at once, and take that where it explains clearly more.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `revise`.
+    """
+    if len(state.rounds) < 2 or state.misfit_left:
+        return state
+    rounds, fit, joint = checked_jointly(state.rounds, state.fit, state.nominal, state.scores, state.names)
+    return replace(state, rounds=rounds, fit=fit, joint=joint)
+
+
+def validate(state: SearchState, data: Sequence[Data | ResponseData]) -> SearchState:
+    """Take effects back that validation data speak against, and resolve sets of alternatives where the data can.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `compare`.
+    data : sequence of Data or ResponseData
+        Validation data, from `validation_data`; nothing is fitted to them.
+    """
+    rounds, fit = state.rounds, state.fit
+    for _ in state.rounds if not state.misfit_left else ():  # a name in another's place may leave nothing of a third
+        rounds, fit = told_apart(*supported(rounds, fit, state.nominal, data), data)
+        fewer, less = needed(rounds, fit, state.nominal)
+        if len(fewer) == len(rounds):
+            break
+        rounds, fit = revised(fewer, state.nominal, state.names) if fewer else (fewer, less)
+    return replace(state, rounds=rounds, fit=fit)
+
+
+def too_much_left(fit: Refit, scores: Scores) -> bool:
+    """Whether the last effect allowed cannot be what is missing: a large misfit would be left, most of this one.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with all effects accepted so far.
+    scores : Scores
+        Scores of all candidates on it.
+    """
+    if fit.variance <= _LARGE:
+        return False
+    share = explains(fit, scores)
+    return share < _LEAST and 1.0 + (1.0 - share) * (fit.variance - 1.0) > _LARGE

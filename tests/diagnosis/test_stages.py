@@ -1,0 +1,119 @@
+"""Stages of the search, one by one: each takes a state and returns one, and can be printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis import search
+from robthermal.diagnosis.evidence import unseen_data
+
+Hide = Callable[..., tuple[rt.Record, rt.Record]]
+FEW = ("natural_convection", "sensor_lag", "sensor_offset")
+
+
+@pytest.fixture(scope="module")
+def convected(hide: Hide, rate: Callable[..., np.ndarray]) -> tuple[rt.Record, rt.Record]:
+    """Records of a plate that also loses heat by natural convection."""
+    def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return rate(T, u, np.array([0.3 * abs(u[1] - T[0]) ** 0.25 * (u[1] - T[0]), 0.0]))
+
+    return hide(hidden)
+
+
+@pytest.fixture(scope="module")
+def begun(plant: rt.System, convected: tuple[rt.Record, rt.Record]) -> search.SearchState:
+    return search.begin(rt.diagnosis.refit(plant, convected[0]), FEW)
+
+
+@pytest.fixture(scope="module")
+def accepted(begun: search.SearchState) -> search.SearchState:
+    return search.accept(search.refit_candidates(search.shortlist(begun)))
+
+
+def test_the_search_begins_with_every_candidate_scored_and_nothing_accepted(begun: search.SearchState) -> None:
+    assert {candidate.effect.name for candidate in begun.scores.candidates} == set(FEW)
+    assert begun.fit is begun.nominal and begun.current is begun.scores
+    assert not begun.rounds and not begun.complete and not begun.short.entries
+    assert str(begun).startswith("0 effects accepted") and "the search goes on" in str(begun)
+
+
+def test_refitting_lists_candidates_and_accepting_takes_the_best(begun: search.SearchState,
+                                                                 accepted: search.SearchState) -> None:
+    listed = search.refit_candidates(search.shortlist(begun))
+    assert listed.short.entries[0].candidate.label == "natural_convection(plate, room)" and not listed.rounds
+    best = accepted.rounds[0].best
+    assert best.candidate.label == "natural_convection(plate, room)" and accepted.fit is best.fit
+    assert not accepted.complete and not accepted.misfit_left
+    assert accepted.fit.variance < 1.2 < accepted.nominal.variance
+    assert "natural_convection(plate, room)" in str(accepted)
+
+
+def test_the_search_is_complete_when_nothing_promises_more(accepted: search.SearchState) -> None:
+    done = search.shortlist(accepted)
+    assert done.complete and not done.misfit_left and done.rounds == accepted.rounds
+    assert done.current is not accepted.current  # scored again beside what was accepted
+    assert "no further effect" in str(done)
+
+
+def test_nothing_is_accepted_without_evidence(plant: rt.System, hide: Hide) -> None:
+    state = search.begin(rt.diagnosis.refit(plant, hide()[0]), FEW)
+    none = search.accept(search.refit_candidates(state))
+    assert none.complete and not none.rounds and none.fit is state.nominal
+
+
+def test_at_most_three_effects_are_looked_for(accepted: search.SearchState) -> None:
+    full = replace(accepted, rounds=accepted.rounds * 3)
+    assert search.shortlist(full).complete
+    last = replace(accepted, rounds=accepted.rounds * 2, fit=accepted.nominal, names=("sensor_offset",))
+    given_up = search.shortlist(last)  # the last one allowed promises little of a large misfit
+    assert given_up.complete and given_up.misfit_left and "large misfit" in str(given_up)
+
+
+def test_where_a_large_misfit_is_left_no_later_stage_touches_the_state(
+        accepted: search.SearchState, convected: tuple[rt.Record, rt.Record]) -> None:
+    left = replace(accepted, rounds=accepted.rounds * 2, complete=True, misfit_left=True)
+    assert search.revise(left) is left and search.compare(left) is left
+    data = unseen_data(left.fit, convected[1], None)
+    assert search.validate(left, data).rounds == left.rounds
+
+
+def test_one_effect_is_kept_by_revision_and_not_compared(accepted: search.SearchState) -> None:
+    revised = search.revise(accepted)
+    assert [round_.best.candidate.key for round_ in revised.rounds] == [
+        ("natural_convection", ("plate", "room"))]
+    assert search.compare(revised) is revised and revised.joint is None
+
+
+def test_an_effect_that_needs_no_place_is_dropped_by_revision(plant: rt.System, hide: Hide) -> None:
+    fit = rt.diagnosis.refit(plant, hide()[0])  # nothing is hidden
+    offset = next(c for c in rt.diagnosis.candidates(plant, ["sensor_offset"]) if c.where == ("Tp",))
+    found = search.refit_set(fit, (offset,), [0.01])
+    state = replace(search.begin(fit, FEW), fit=found.fit, complete=True, rounds=(
+        search.Accepted(fit, best=rt.diagnosis.Entry(offset, found.fit, 100.0, 0.0)),))
+    assert search.revise(state).rounds == ()
+
+
+def test_validation_data_keep_an_effect_that_holds_and_take_back_one_that_does_not(
+        accepted: search.SearchState, convected: tuple[rt.Record, rt.Record], hide: Hide) -> None:
+    kept = search.validate(accepted, unseen_data(accepted.fit, convected[1], None))
+    assert kept.rounds == accepted.rounds and kept.fit is accepted.fit
+    gone = search.validate(accepted, unseen_data(accepted.fit, hide()[1], None))  # nothing is hidden there
+    assert gone.rounds == () and gone.fit is accepted.nominal
+
+
+def test_diagnose_is_the_stages_in_a_row(plant: rt.System, convected: tuple[rt.Record, rt.Record],
+                                         accepted: search.SearchState) -> None:
+    said: list[str] = []
+    found = rt.diagnose(plant, convected[0], validation=convected[1], effects=FEW, progress=said.append)
+    by_hand = search.validate(search.compare(search.revise(search.shortlist(accepted))),
+                              unseen_data(accepted.fit, convected[1], None))
+    assert found.verdict == "named"
+    assert [r.best.candidate.key for r in found.rounds] == [r.best.candidate.key for r in by_hand.rounds]
+    assert found.fit.v.tolist() == by_hand.fit.v.tolist()
+    assert said.index("refitting the best candidates") < said.index("testing whether anything is left")
+    assert len(said) == len(set(said)) and len(said) >= 7
