@@ -119,23 +119,32 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     if not data:
         return NoiseFloor(relative, (), {}, relative, Outcome(True, "estimated", "Noise of the elements as estimated "
                                                               "with the frequency response, relative to its size."))
-    for one in data:
-        if len(one.record) < _SHORTEST:
-            raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
-                             expected=f"at least {_SHORTEST}", remedy="Measure longer, or sample faster.")
+    _refuse_short(data)
     levels = declared_noise(system, data, noise)
     rough = {name: _rough(data, name) for name in levels}
     unknown = tuple(name for name, level in levels.items() if not level)
-    for name in unknown:
-        if rough[name] < SMALLEST:
-            raise InputError(f"the noise of sensor {name!r} is not declared, and none is visible in the record",
-                             where=f"[sensors.{name}] noise", expected="a positive standard deviation [K]",
-                             remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
+    _refuse_invisible({name: rough[name] for name in unknown})
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
     glitches = counted(without_glitches(system, data, noise_of))
     return NoiseFloor({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
                       _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
+
+
+def _refuse_short(data: Sequence[Data]) -> None:
+    for one in data:
+        if len(one.record) < _SHORTEST:
+            raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
+                             expected=f"at least {_SHORTEST}", remedy="Measure longer, or sample faster.")
+
+
+def _refuse_invisible(rough: Mapping[str, float]) -> None:
+    """Noise that is not declared has to be visible."""
+    for name, level in rough.items():
+        if level < SMALLEST:
+            raise InputError(f"the noise of sensor {name!r} is not declared, and none is visible in the record",
+                             where=f"[sensors.{name}] noise", expected="a positive standard deviation [K]",
+                             remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
 
 
 def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...]) -> Outcome:

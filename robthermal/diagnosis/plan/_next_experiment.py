@@ -201,16 +201,8 @@ def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequ
     most = {pair: max(trial.pairs.get(pair, 0.0) for trial in (*tried, *clearest)) for pair in clearest[0].pairs}
     apart = [pair for pair in most if most[pair] >= ALIKE]
     alike = tuple(pair for pair in most if most[pair] < ALIKE)
-
-    def expected_of(trial: Trial) -> float:
-        return min((trial.pairs[pair] for pair in apart), default=0.0)
-
-    best = clearest[0]
-    for trial in clearest:
-        if trial is best or trial.worth(LONGEST) > best.worth():
-            best = max(best, search.prolonged(trial, expected_of(trial)), key=Trial.worth)
-    expected = expected_of(best)
-    now = min((repeated.pairs.get(pair, 0.0) for pair in apart), default=0.0)
+    best = _best(search, clearest, apart)
+    expected, now = _expected(best, apart), _expected(repeated, apart)
     times = len(best.record) // len(search.setting.one.record)
     record = simulate(search.system, best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
@@ -219,6 +211,20 @@ def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequ
     text = _advice(named, alike, apart, expected, now, besides)
     return NextExperiment(record, expected, now, best.pairs, alike, text, best.measurement,
                           tuple(search.limits))
+
+
+def _expected(trial: Trial, apart: Sequence[Pair]) -> float:
+    """Expected ΔBIC between the closest two candidates of these pairs."""
+    return min((trial.pairs.get(pair, 0.0) for pair in apart), default=0.0)
+
+
+def _best(search: Search, clearest: Sequence[Trial], apart: Sequence[Pair]) -> Trial:
+    """The trial that tells most, prolonged where that is worth its trouble."""
+    best = clearest[0]
+    for trial in clearest:
+        if trial is best or trial.worth(LONGEST) > best.worth():
+            best = max(best, search.prolonged(trial, _expected(trial, apart)), key=Trial.worth)
+    return best
 
 
 def _besides(record: Record, faster: bool, times: int, measurement: Measurement | None) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -108,38 +109,79 @@ def best_sets(fit: Refit, pool: tuple[Candidate, ...], sizes: Sequence[float], t
     return tuple(sorted(found.values(), key=lambda one: -one.delta_bic))
 
 
-def _promising(fit: Refit, pooled: EffectSet) -> list[tuple[tuple[Candidate, ...], list[float]]]:
-    """Subsets by their linearised BIC about the refit of the pool, with their sizes; impossible ones are left out."""
-    structure, n = pooled.fit.structure, fit.n_readings
-    values = structure.quantities(pooled.fit.v)[len(fit.structure.effects):]
-    size = [value[c.effect.size.name] for c, value in zip(pooled.candidates, values, strict=True)]
+@dataclass(frozen=True, eq=False)
+class _Pool:
+    """Refit of a whole pool of candidates, linearized, so that the sums of squares of its subsets follow.
+
+    Parameters
+    ----------
+    fit : EffectSet
+        All candidates of the pool refitted together.
+    values : list of dict
+        Quantities of every candidate there.
+    own : list of ndarray
+        Unknowns of every candidate.
+    rest : ndarray
+        All other unknowns.
+    gone : list of ndarray
+        Change of the whitened residuals when a candidate is left out, all else as it is.
+    """
+
+    fit: EffectSet
+    values: list[dict[str, float]]
+    own: list[NDArray[np.intp]]
+    rest: NDArray[np.intp]
+    gone: list[Array]
+
+    def subset(self, members: tuple[int, ...]) -> tuple[float, list[float]]:
+        """BIC and sizes of a subset, linearized about the pool.
+
+        Parameters
+        ----------
+        members : tuple of int
+            Places in the pool.
+        """
+        J, scale = self._scaled
+        z = self.fit.fit.z + sum((self.gone[i] for i in range(len(self.own)) if i not in members), np.zeros(len(J)))
+        at = np.concatenate([self.rest, *(self.own[i] for i in members)])
+        step = np.linalg.lstsq(J[:, at], z, rcond=1e-9)[0]
+        moved = dict(zip(at.tolist(), (step / np.where(scale[at] > 0, scale[at], 1.0)).tolist(), strict=True))
+        sizes = [self.values[i][self.fit.candidates[i].effect.size.name] + moved[int(self.own[i][0])] for i in members]
+        rss, n = float(np.sum((z - J[:, at] @ step) ** 2)), self.fit.fit.n_readings
+        return n * math.log(rss) + sum(self.own[i].size for i in members) * math.log(n), sizes
+
+    @cached_property
+    def _scaled(self) -> tuple[Array, Array]:
+        """Derivatives with columns of length one, and the lengths."""
+        J = self.fit.fit.J
+        scale = np.linalg.norm(J, axis=0)
+        return J / np.where(scale > 0, scale, 1.0), scale
+
+
+def _linearized(fit: Refit, pooled: EffectSet) -> _Pool:
+    structure, first = pooled.fit.structure, len(fit.structure.effects)
+    values = structure.quantities(pooled.fit.v)[first:]
     ends = structure.n_parameters + np.cumsum([len(c.effect.free) for c in structure.effects])
-    own = [np.arange(end - len(c.effect.free), end) for c, end in zip(structure.effects, ends, strict=True)]
-    own = own[len(fit.structure.effects):]
+    own = [np.arange(end - len(c.effect.free), end) for c, end in zip(structure.effects, ends, strict=True)][first:]
     rest = np.setdiff1d(np.arange(pooled.fit.J.shape[1]), np.concatenate(own))
-    scale = np.linalg.norm(pooled.fit.J, axis=0)
-    J = pooled.fit.J / np.where(scale > 0, scale, 1.0)
     here = [modelled(one, system) for one, system in zip(structure.data, structure.systems(pooled.fit.v), strict=True)]
-    gone = [_without(fit, pooled, here, i) for i in range(len(own))]
-    found = []
-    for count in range(1, min(MOST, len(own)) + 1):
-        for members in combinations(range(len(own)), count):
-            others = [i for i in range(len(own)) if i not in members]
-            z = pooled.fit.z + sum((gone[i] for i in others), np.zeros(len(J)))
-            at = np.concatenate([rest, *(own[i] for i in members)])
-            step = np.linalg.lstsq(J[:, at], z, rcond=1e-9)[0]
-            moved = dict(zip(at.tolist(), (step / np.where(scale[at] > 0, scale[at], 1.0)).tolist(), strict=True))
-            sizes = [size[i] + moved[int(own[i][0])] for i in members]
-            if all(_possible(pooled.candidates[i], s) for i, s in zip(members, sizes, strict=True)):
-                rss = float(np.sum((z - J[:, at] @ step) ** 2))
-                dim = sum(own[i].size for i in members)
-                found.append((n * math.log(rss) + dim * math.log(n), members, sizes))
+    return _Pool(pooled, values, own, rest, [_without(fit, pooled, here, i) for i in range(len(own))])
+
+
+def _promising(fit: Refit, pooled: EffectSet) -> list[tuple[tuple[Candidate, ...], list[float]]]:
+    """Subsets by their linearized BIC about the refit of the pool, with their sizes; impossible ones are left out."""
+    pool, found = _linearized(fit, pooled), []
+    for count in range(1, min(MOST, len(pool.own)) + 1):
+        for members in combinations(range(len(pool.own)), count):
+            criterion, sizes = pool.subset(members)
+            if all(_possible(pooled.candidates[i], size) for i, size in zip(members, sizes, strict=True)):
+                found.append((criterion, members, sizes))
     kept: list[tuple[int, ...]] = []
     out = []
     for _, members, sizes in sorted(found):
         if not any(set(smaller) <= set(members) for smaller in kept):  # what a better set adds nothing to
             kept.append(members)
-            out.append((tuple(_shaped(pooled.candidates[i], values[i]) for i in members), sizes))
+            out.append((tuple(_shaped(pooled.candidates[i], pool.values[i]) for i in members), sizes))
     return out
 
 

@@ -66,20 +66,26 @@ def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0
         if tried and not in_reach(fit.n_readings * np.log(fit.rss / start.promise), best):
             continue
         new = _refitted(fit, start)
-        if new is not None:
-            if start.promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - start.promise):
-                return new
-            tried.append(new)
-            least = min(least, start.promise)
+        if new is None:
+            continue
+        if start.promise < fit.rss and fit.rss - new.rss > _KEPT * (fit.rss - start.promise):
+            return new
+        tried.append(new)
+        least = min(least, start.promise)
     worth = not tried or in_reach(fit.n_readings * np.log(fit.rss / least), best)
     if worth and not any(new.rss < fit.rss for new in tried):
-        nothing = float(np.sign(size)) * candidate.effect.size.typical
-        new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
-        if new is None and not tried:
-            raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
-        further = _along_the_valley(fit, tried, least, fit.rss if new is None else new.rss)
-        tried += [one for one in (new, further) if one is not None]
+        tried += _from_nothing(fit, candidate, size, tried, least)
     return min(tried, key=lambda new: new.rss)
+
+
+def _from_nothing(fit: Refit, candidate: Candidate, size: float, tried: list[Refit], least: float) -> list[Refit]:
+    """Refits from a size that hardly shows and, where that stands still, further iterations of the best start."""
+    nothing = float(np.sign(size)) * candidate.effect.size.typical
+    new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
+    if new is None and not tried:
+        raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
+    further = _along_the_valley(fit, tried, least, fit.rss if new is None else new.rss)
+    return [one for one in (new, further) if one is not None]
 
 
 @dataclass(frozen=True, eq=False)
