@@ -316,7 +316,7 @@ def test_stages_are_told_in_order(plant: rt.System, hide: Hide) -> None:
     train, unseen = hide(n=200)
     rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag"], progress=told.append)
     assert len(told) > 4 and all(told)
-    assert told.index("refitting the nominal system") < told.index("predicting the unseen records")
+    assert told.index("refitting the nominal system") < told.index("predicting the validation data")
 
 
 def test_effects_without_a_place_are_no_error(plant: rt.System, hide: Hide) -> None:
