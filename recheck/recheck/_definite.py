@@ -17,6 +17,7 @@ from operator import mul
 
 BITS = 256
 ONE = 1 << BITS
+_LIFT = 1 << (BITS // 2)
 Rows = list[list[int]]
 Entries = Mapping[tuple[int, int], Fraction]
 
@@ -65,10 +66,15 @@ def definite(rows: Rows, error: int) -> bool | None:
     >>> definite(matrix, 1), definite(unit.matrix({(0, 0): Fraction(2), (1, 1): Fraction(-1)}), 1)
     (True, False)
     """
-    partial = Factor(rows, error, len(rows))
-    if partial.failed is None:
+    factor = Factor(rows, error, len(rows))
+    if factor.failed is None:
         return True
-    return False if _negative_direction(rows, error, partial) else None
+    if _negative_direction(rows, error, factor):
+        return False
+    # the pivot is about zero: a later one may be negative, once this one is lifted a little
+    lifted = [[*row[:k], row[k] + _LIFT, *row[k + 1:]] for k, row in enumerate(rows)]
+    factor = Factor(lifted, error, len(rows))
+    return False if factor.failed is not None and _negative_direction(rows, error, factor) else None
 
 
 class Factor:

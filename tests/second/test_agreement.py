@@ -1,0 +1,103 @@
+"""Two checkers, one verdict; tests/benchmarks/two_checkers.py compares them on ten thousand certificates."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import mutant_linear
+import mutant_thermal
+import numpy as np
+import pytest
+from agreement import both, cases, judge
+
+import recheck
+import robthermal as rt
+from robthermal.verification import establish
+from robthermal.verification._kinds import KINDS
+
+SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS)}
+COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer")
+
+
+def document_of(certificate) -> dict:
+    """Return the content of the file of a certificate."""
+    return {"format": certificate.format, "kind": certificate.kind, "claim": certificate.claim,
+            **{key: getattr(certificate, key) for key in ("system", "region", "evidence", "margin", "made_by")}}
+
+
+@pytest.mark.parametrize("kind", COVERED)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_no_disagreement_on_certificates_and_mutants(kind):
+    pairs = [both(kind, document) for document in cases(SUBJECTS[kind], np.random.default_rng(11), 36)]
+    assert not [pair for pair in pairs if pair.disagree]
+    accepted = [pair for pair in pairs if pair.first]
+    assert len(accepted) >= 5 and all(pair.second == "valid" for pair in accepted)
+    assert sum(pair.second == "not valid" for pair in pairs) >= 5
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - set(COVERED) - {"loop"}))
+def test_other_kinds_are_not_covered(kind):
+    pair = both(kind, {"margin": {}, **SUBJECTS[kind].make(np.random.default_rng(1))})
+    assert pair.first and pair.second == "not covered"
+
+
+def test_kinds_are_those_of_the_first_checker():
+    from recheck._check import KINDS as SECOND
+    from recheck._check import OTHERS
+    assert {*SECOND, *OTHERS} == set(KINDS) and tuple(SECOND) == COVERED
+
+
+@pytest.mark.parametrize("method", ["sum", "max", "energy", "lyapunov"])
+def test_a_machine_of_the_size_people_have(method):
+    """18 lumps, two modules with constant numbers uncertain by 5 % (three of each), not modules for lyapunov."""
+    system = rt.systems.two_module()
+    values = {f"modules.{name}.{key}.value": getattr(module, key).value for name, module in system.modules.items()
+              for key in ("seebeck", "resistance", "conductance")}
+    spread = {name: (0.95 * value, 1.05 * value) for name, value in values.items()}
+    current = {"m1": (-1, 1), "m2": (-1, 1)}
+    found = rt.certify.contraction(system, current=current, temperature=(278, 330), method=method,
+                                   parameters=None if method == "lyapunov" else spread)
+    pair = judge(json.loads(json.dumps(document_of(found), default=dict)))
+    assert found.holds and pair.first and pair.second == "valid", pair.reasons
+
+
+@pytest.mark.parametrize("change", ["digit", "letter", "machine"])
+def test_another_sentence_is_rejected_by_both(change):
+    rng = np.random.default_rng(2)
+    document = {"margin": {}, **SUBJECTS["invariance"].make(rng)}
+    content = document_of(establish("invariance", system=document["system"], region=document["region"],
+                                    evidence=document["evidence"], made_by={}))
+    claim = content["claim"]
+    content["claim"] = {"digit": claim.replace("290", "291", 1), "letter": claim.replace("never", "ever", 1),
+                        "machine": claim.replace("machine ", "machine 0", 1)}[change]
+    assert content["claim"] != claim
+    pair = judge(content)
+    assert not pair.first and pair.second == "not valid"
+
+
+def test_a_stored_margin_is_part_of_the_claim():
+    rng = np.random.default_rng(3)
+    for kind, key in (("contraction", "rate"), ("invariance", "heat"), ("network", "rate"),
+                      ("observer", "contraction")):
+        document = {"margin": {}, **SUBJECTS[kind].make(rng)}
+        document["margin"] = {key: 10.0}
+        pair = both(kind, document)
+        assert not pair.first and pair.second == "not valid", kind
+        document["margin"] = {key: -1.0}
+        pair = both(kind, document)
+        assert pair.first and pair.second == "valid", kind
+
+
+def test_the_second_checker_imports_the_standard_library_only():
+    folder = Path(recheck.__file__).parent
+    for file in folder.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = ([alias.name for alias in node.names] if isinstance(node, ast.Import) else
+                     [node.module or ""] if isinstance(node, ast.ImportFrom) and node.level == 0 else [])
+            assert all(name.split(".")[0] in sys.stdlib_module_names for name in names), file
+    code = "import sys, recheck; sys.exit(any(name in sys.modules for name in ('robthermal', 'numpy', 'flint')))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=folder.parent, check=False).returncode == 0
