@@ -29,9 +29,26 @@ class Correlation:
     innovation: Array
 
     def meat(self, J: Array) -> Array:
-        """Jᵀ Cov(e) J for J of shape (n, n_sensors, p), by filtering J backwards in time."""
+        """Jᵀ Cov(e) J for J of shape (n, n_sensors, p), by filtering J backwards in time.
+
+        Zeros before the first sample let the innovations before it count too: e was stationary when it began.
+        """
+        J = np.concatenate([np.zeros_like(J), J])
         back = np.stack([lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)], axis=1)
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
+
+    def independent(self, psi: Array) -> float:
+        """How many independent samples the slow part of residuals (n, n_sensors) amounts to.
+
+        n γ₀/S(0) of each sensor, with γ₀ the variance and S(0) the spectral density of its autoregression at frequency
+        zero, not above n; over all sensors times S/‖R‖², R (S, S) the correlation of the innovations.
+        """
+        spread = np.diag(self.innovation)
+        density = spread / np.array([a.sum() for a in self.polynomials]) ** 2
+        share = np.minimum(np.mean(psi**2, axis=0) / np.where(density > 0, density, np.inf), 1.0)
+        deviation = np.sqrt(np.where(spread > 0, spread, 1.0))
+        R = self.innovation / np.outer(deviation, deviation)
+        return float(psi.size * share.mean() * len(R) / max(float(np.sum(R**2)), len(R)))
 
 
 def correlation_of(segments: list[Array]) -> Correlation:

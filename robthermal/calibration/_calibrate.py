@@ -37,7 +37,7 @@ from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System
 from ._covariance import information
-from ._directions import in_words
+from ._directions import in_words, named, weights
 from ._estimates import outcome_of
 from ._fit import Fit
 from ._innovations import has_disturbance, whitener
@@ -218,6 +218,8 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
         lower=ranges.lower, upper=ranges.upper, sigma=ranges.sigma, at_bound=ranges.at_bound(values),
         covariance=known.covariance * np.outer(slopes, slopes),
         undetermined=in_words(ranges, known.undetermined),
+        undetermined_parameters=named(ranges, known.undetermined), bounded=weights(ranges, known.bounded),
+        logarithmic=ranges.logarithmic, degrees_of_freedom=known.degrees_of_freedom, covariance_scale=known.scale,
         noise=solution.noise,
         data=tuple(one.record for one in problem.data),
         validation_data=tuple(one.record for one in unseen),

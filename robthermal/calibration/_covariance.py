@@ -10,6 +10,7 @@ from scipy.linalg import eigh
 
 from .._fitting import Loss, Problem, Ranges, score, score_slope
 from ._autoregression import correlation_of
+from ._score_blocks import block_scores, blocks_of, covariance_scale
 
 Array = NDArray[np.float64]
 _ZERO = 1e-12  # relative eigenvalue that is rounding
@@ -25,10 +26,19 @@ class Information:
         In coordinates, priors included.
     undetermined : tuple of ndarray
         Orthonormal directions, in units of `Ranges.unit`, that the data leave open by more than one unit.
+    bounded : tuple of ndarray
+        Directions among them, normalized, that the priors leave open too.
+    degrees_of_freedom : float
+        Of the noise: independent samples of the residuals less what the fit has used of them, at least 1.
+    scale : float
+        Factor by which residuals exceed what the covariance accounts for, at least 1.
     """
 
     covariance: Array
     undetermined: tuple[Array, ...]
+    bounded: tuple[Array, ...]
+    degrees_of_freedom: float
+    scale: float
 
 
 def information(problem: Problem, v: Array, loss: Loss) -> Information:
@@ -42,7 +52,9 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
     weighted = [(weigh(run.residual), weigh(run.by_parameter), weigh(run.by_start))
                 for run, weigh in zip(problem.runs(v), problem.weigh, strict=True)]
     H, G2, meat = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
-    answered, absorbed, power = [], 0.0, 0.0
+    answered, absorbed, power, independent = [], 0.0, 0.0, -float(p)
+    found, expected = np.zeros((p, p)), np.zeros((p, p))
+    blocks = blocks_of([len(e) for e, _, _ in weighted])
     starts: list[tuple[Array, Array]] = []
     for e, J, X in weighted:
         root = np.sqrt(score_slope(e, loss))[..., None]
@@ -54,6 +66,7 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
         G2 += G.T @ G
         answered.append(J - X @ G)
         starts.append((X, own))
+        independent -= X.shape[2] - float(np.trace(np.linalg.inv(own)))
     for alike in _same_sensors(problem):
         psi = [score(weighted[i][0], loss) for i in alike]
         correlation = correlation_of(psi)
@@ -61,8 +74,15 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
         absorbed += sum(float(np.trace(np.linalg.solve(own, correlation.meat(X))))
                         for X, own in (starts[i] for i in alike) if X.shape[2])
         power += sum(float(np.sum(e**2)) for e in psi)
+        independent += correlation.independent(np.concatenate(psi))
+        for i, e in zip(alike, psi, strict=True):
+            of_blocks = block_scores(e, answered[i], correlation, blocks[i])
+            found, expected = found + of_blocks[0], expected + of_blocks[1]
     absorbed += float(np.trace(np.linalg.pinv(H, rcond=_ZERO, hermitian=True) @ meat))
-    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * _inflation(power, absorbed))
+    larger, unit = _inflation(power, absorbed), problem.ranges.unit
+    scale = covariance_scale(found * np.outer(unit, unit), larger * expected * np.outer(unit, unit),
+                             sum(map(len, blocks)))
+    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * larger, max(independent, 1.0), scale)
 
 
 def _same_sensors(problem: Problem) -> list[list[int]]:
@@ -81,24 +101,37 @@ def _inflation(power: float, absorbed: float) -> float:
     return power / max(power - absorbed, power / 4.0) if power else 1.0
 
 
-def with_priors(ranges: Ranges, values: Array, H: Array, M: Array) -> Information:
+def with_priors(ranges: Ranges, values: Array, H: Array, M: Array, degrees_of_freedom: float, scale: float
+                ) -> Information:
     """H⁻¹ M H⁻¹ with the priors added to both; H and M are of the data alone, (p, p), in coordinates."""
     unit = ranges.unit
-    scale = np.outer(unit, unit)
-    H, M, P = H * scale, M * scale, np.diag(ranges.prior_slopes(values) ** 2) * scale
-    values, vectors = eigh(H)
-    spread = np.array([_variance(value, vector, M, values[-1])
-                       for value, vector in zip(values, vectors.T, strict=True)])
+    units = np.outer(unit, unit)
+    H, M, P = H * units, M * units, np.diag(ranges.prior_slopes(values) ** 2) * units
+    size, vectors = eigh(H)
+    spread = np.array([_variance(value, vector, M, size[-1])
+                       for value, vector in zip(size, vectors.T, strict=True)])
     open_ = tuple(vectors[:, i] for i in np.flatnonzero(spread > 1.0))
     bounds = np.diag((unit / ranges.spread) ** 2)
     H, M = H + P, M + P
-    for direction in open_:  # no prior either: as uncertain as its bounds
-        if direction @ P @ direction < direction @ bounds @ direction:
-            extra = (direction @ bounds @ direction) * np.outer(direction, direction)
-            H, M = H + extra, M + extra
-    inverse = np.linalg.inv(H)
-    covariance = inverse @ M @ inverse * scale
-    return Information((covariance + covariance.T) / 2, open_)
+    bounded, extra = _without_prior(vectors[:, spread > 1.0], P, bounds)
+    inverse = np.linalg.inv(H + extra)
+    covariance = inverse @ (M + extra) @ inverse * units
+    return Information((covariance + covariance.T) / 2, open_, bounded, degrees_of_freedom, scale)
+
+
+def _without_prior(V: Array, P: Array, bounds: Array) -> tuple[tuple[Array, ...], Array]:
+    """Directions in the space of V (p, k) about which the priors P say less than the bounds, and what those say there.
+
+    The generalized eigenvectors w of (VᵀPV, VᵀBV) tell what a prior closes from what none does; with wᵀVᵀBVw = 1 the
+    information added is Σ (VᵀBVw)(VᵀBVw)ᵀ over the latter, which makes their variance that of the bounds.
+    """
+    if not V.shape[1]:
+        return (), np.zeros_like(P)
+    B = V.T @ bounds @ V
+    told, w = eigh(V.T @ P @ V, B)
+    w = w[:, told < 1.0]
+    own = V @ B @ w
+    return tuple(d / np.linalg.norm(d) for d in (V @ w).T), own @ own.T
 
 
 def _variance(value: float, vector: Array, M: Array, largest: float) -> float:

@@ -18,6 +18,18 @@ def in_words(ranges: Ranges, directions: tuple[Array, ...]) -> tuple[str, ...]:
     return tuple(_sentence(ranges, direction) for direction in _sparse(np.array(directions)))
 
 
+def named(ranges: Ranges, directions: tuple[Array, ...]) -> tuple[str, ...]:
+    """Names of the parameters with visible weight in some direction."""
+    return tuple(name for name, seen in zip(ranges.names, weights(ranges, directions), strict=True) if seen)
+
+
+def weights(ranges: Ranges, directions: tuple[Array, ...]) -> NDArray[np.bool_]:
+    """Which parameters (p,) have visible weight in some direction, written with as few parameters as possible."""
+    if not directions:
+        return np.zeros(len(ranges.names), np.bool_)
+    return np.asarray((np.abs(_sparse(np.array(directions))) > _VISIBLE).any(axis=0))
+
+
 def _sparse(basis: Array) -> Array:
     """Basis of the same space with as many zeros as elimination gives: each direction then speaks of few parameters."""
     B = basis.copy()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import Outcome
 from ..thermal import System
+from ._parameter_ranges import Set, ranges_of
 
 Array = NDArray[np.float64]
 
@@ -31,10 +32,21 @@ class Estimates:
     at_bound : ndarray of bool, shape (p,)
         Estimates that ran into a bound; their standard deviation ignores it.
     covariance : ndarray, shape (p, p)
-        Covariance of the estimates, in the order of `parameters`, initial temperatures marginalised, residuals taken as
-        correlated in time. A direction the data leave open has the spread of its prior or of its bounds.
+        Covariance of the estimates, in the order of `parameters`. A direction the data leave open has the spread of its
+        prior or of its bounds.
     undetermined : tuple of str
         Directions the data do not determine, in words.
+    undetermined_parameters : tuple of str
+        Parameters with weight in such a direction, by name.
+    bounded : ndarray of bool, shape (p,)
+        Those of them that no prior determines either: their range is their bounds.
+    logarithmic : ndarray of bool, shape (p,)
+        Parameters that are estimated by their logarithm, in which their range is symmetric.
+    degrees_of_freedom : float
+        Of the estimated noise: how many independent samples it was estimated from, less those the fit has used.
+    covariance_scale : float
+        Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
+        for.
     iterations : int
         Model evaluations the optimiser tried.
     outcome : Outcome
@@ -50,6 +62,11 @@ class Estimates:
     at_bound: NDArray[np.bool_]
     covariance: Array
     undetermined: tuple[str, ...]
+    undetermined_parameters: tuple[str, ...]
+    bounded: NDArray[np.bool_]
+    logarithmic: NDArray[np.bool_]
+    degrees_of_freedom: float
+    covariance_scale: float
     iterations: int
     outcome: Outcome
 
@@ -63,6 +80,57 @@ class Estimates:
         """Correlation of the estimates, (p, p) [-]."""
         deviation = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(deviation, deviation)
+
+    def ranges(self, confidence: float = 0.95, set: Set = "ellipsoid") -> dict[str, tuple[float, float]]:
+        """Simultaneous ranges: all true values are inside at once with a probability of at least `confidence`.
+
+        For estimates of a model whose structure is right, and true values within the bounds of the calibration; the
+        covariance is taken times `covariance_scale`. May be passed as `parameters=` to the certify functions.
+
+        Parameters
+        ----------
+        confidence : float
+            Probability that all ranges hold, for example 0.95.
+        set : {"ellipsoid", "box"}
+            Box around the joint confidence ellipsoid; or the smaller box of simultaneous intervals (Bonferroni).
+
+        Returns
+        -------
+        dict
+            {parameter: (lower, upper)} in the unit of each; tied parameters one by one. What neither data nor prior
+            determine has the bounds of the calibration. Ranges end at those bounds.
+
+        Raises
+        ------
+        InputError
+            A calibration that did not converge; an impossible confidence; an unknown set.
+
+        Notes
+        -----
+        Seber and Wild, *Nonlinear Regression*, 1989, section 5.1; derivation in the documentation, "Calibration".
+        """
+        ends = zip(self.parameters, *ranges_of(self, confidence, set), strict=True)
+        return {own: (float(low), float(high)) for name, low, high in ends for own in name.split(" = ")}
+
+    def range_table(self, confidence: float = 0.95) -> pd.DataFrame:
+        """Estimates with their simultaneous ranges ("ellipsoid"), for reports.
+
+        Parameters
+        ----------
+        confidence : float
+            Probability that all ranges hold, for example 0.95.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index: parameter. Columns: value, std, low, high, determined (by the data), ends_at ("" or which bound).
+        """
+        low, high = ranges_of(self, confidence, "ellipsoid")
+        at = np.array([["", "upper bound"], ["lower bound", "both bounds"]])
+        columns = {"value": list(self.parameters.values()), "std": list(self.std.values()), "low": low, "high": high,
+                   "determined": [name not in self.undetermined_parameters for name in self.parameters],
+                   "ends_at": at[(low <= self.lower).astype(int), (high >= self.upper).astype(int)]}
+        return pd.DataFrame(columns, index=pd.Index(self.parameters, name="parameter"))
 
     def table(self) -> pd.DataFrame:
         """Estimates as a table.
@@ -91,6 +159,9 @@ class Estimates:
             "parameters": {name: {key: plain(row[key]) for key in table.columns} for name, row in table.iterrows()},
             "covariance": self.covariance.tolist(),
             "undetermined": list(self.undetermined),
+            "undetermined_parameters": list(self.undetermined_parameters),
+            "ranges": None if self.outcome.code == "not_converged" else {
+                name: list(ends) for name, ends in self.ranges().items()},
             "iterations": self.iterations,
             "outcome": vars(self.outcome),
         }

@@ -37,6 +37,17 @@ class Fit(Estimates):
         correlated in time. A direction the data leave open has the spread of its prior or of its bounds.
     undetermined : tuple of str
         Directions the data do not determine, in words.
+    undetermined_parameters : tuple of str
+        Parameters with weight in such a direction, by name.
+    bounded : ndarray of bool, shape (p,)
+        Those of them that no prior determines either: their range is their bounds.
+    logarithmic : ndarray of bool, shape (p,)
+        Parameters that are estimated by their logarithm, in which their range is symmetric.
+    degrees_of_freedom : float
+        Of the estimated noise: how many independent samples it was estimated from, less those the fit has used.
+    covariance_scale : float
+        Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
+        for.
     iterations : int
         Model evaluations the optimiser tried.
     outcome : Outcome

@@ -46,6 +46,13 @@ def _independent(G: FrequencyResponse, index: NDArray[np.intp]) -> NDArray[np.in
     return index if np.any(pair[:half, half:]) else index[::2 * G.half_width + 1]
 
 
+def independent_freedom(G: FrequencyResponse, bins: Bins) -> float:
+    """Degrees of freedom of the noise, all bins together: neighbouring bins of a local method share their windows."""
+    q = float(G.degrees_of_freedom[bins.index].sum())
+    stride = float(np.median(np.diff(bins.index))) if bins.index.size > 1 else 1.0
+    return max(q / max((2 * G.half_width + 1) / stride, 1.0), 1.0)
+
+
 def _inverse_roots(covariance: Complex, frequencies: Array) -> Complex:
     try:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.complex128)

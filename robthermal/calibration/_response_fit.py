@@ -15,9 +15,9 @@ from ..errors import InputError, Outcome
 from ..identify import FrequencyResponse
 from ..thermal import System
 from ._covariance import with_priors
-from ._directions import in_words
+from ._directions import in_words, named, weights
 from ._estimates import Estimates, outcome_of
-from ._response_bins import bins_of, spread_of_score
+from ._response_bins import bins_of, independent_freedom, spread_of_score
 from ._response_model import ResponseProblem
 
 Array = NDArray[np.float64]
@@ -38,10 +38,21 @@ class ResponseFit(Estimates):
     at_bound : ndarray of bool, shape (p,)
         Estimates that ran into a bound; their standard deviation ignores it.
     covariance : ndarray, shape (p, p)
-        Covariance of the estimates, in the order of `parameters`, initial temperatures marginalised, residuals taken as
-        correlated in time. A direction the data leave open has the spread of its prior or of its bounds.
+        Covariance of the estimates, in the order of `parameters`, from the covariance of the response, that between
+        neighbouring bins included. A direction the data leave open has the spread of its prior or of its bounds.
     undetermined : tuple of str
         Directions the data do not determine, in words.
+    undetermined_parameters : tuple of str
+        Parameters with weight in such a direction, by name.
+    bounded : ndarray of bool, shape (p,)
+        Those of them that no prior determines either: their range is their bounds.
+    logarithmic : ndarray of bool, shape (p,)
+        Parameters that are estimated by their logarithm, in which their range is symmetric.
+    degrees_of_freedom : float
+        Of the estimated noise: how many independent samples it was estimated from, less those the fit has used.
+    covariance_scale : float
+        Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
+        for.
     iterations : int
         Model evaluations the optimiser tried.
     outcome : Outcome
@@ -115,10 +126,10 @@ def _result(problem: ResponseProblem, q: Array, converged: bool, iterations: int
     ranges, G, bins = problem.ranges, problem.response, problem.bins
     values, J, z = ranges.values(q), problem.slopes(q), problem.whitened(q)
     H = 2.0 * np.einsum("kap,kaq->pq", J.conj(), J).real
-    known = with_priors(ranges, values, H, spread_of_score(G, bins, J))
     slopes, freedom = ranges.slopes(values), G.degrees_of_freedom[bins.index].astype(float)
     # E zᴴz = m q/(q - n_y) with a covariance that is estimated with q degrees of freedom
-    misfit = np.mean(np.abs(z) ** 2 * ((freedom - len(G.output_names)) / freedom)[:, None])
+    misfit = float(np.mean(np.abs(z) ** 2 * ((freedom - len(G.output_names)) / freedom)[:, None]))
+    known = with_priors(ranges, values, H, spread_of_score(G, bins, J), independent_freedom(G, bins), max(misfit, 1.0))
     fit = ResponseFit(
         system=problem.system_at(q),
         parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
@@ -126,10 +137,12 @@ def _result(problem: ResponseProblem, q: Array, converged: bool, iterations: int
         lower=ranges.lower, upper=ranges.upper, sigma=ranges.sigma, at_bound=ranges.at_bound(values),
         covariance=known.covariance * np.outer(slopes, slopes),
         undetermined=in_words(ranges, known.undetermined),
+        undetermined_parameters=named(ranges, known.undetermined), bounded=weights(ranges, known.bounded),
+        logarithmic=ranges.logarithmic, degrees_of_freedom=known.degrees_of_freedom, covariance_scale=known.scale,
         iterations=iterations, outcome=Outcome(True, "converged", ""),
         response=G, bins=bins.index, outputs=bins.outputs, inputs=bins.inputs,
         model=problem.model(q).reshape(-1, len(bins.inputs), len(bins.outputs)).transpose(2, 1, 0),
-        misfit=float(misfit),
+        misfit=misfit,
     )
     return replace(fit, outcome=outcome_of(fit, converged))
 
