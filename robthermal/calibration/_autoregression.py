@@ -37,18 +37,33 @@ class Correlation:
         back = np.stack([lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)], axis=1)
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
 
+    def share(self, psi: Array) -> float:
+        """Independent samples in the slow part of residuals (n, n_sensors), as a part of all samples [-].
+
+        γ₀/S(0), not above 1, with γ₀ the variance and S(0) the spectral density of the autoregression at frequency
+        zero; mean of the sensors.
+        """
+        density = np.diag(self.innovation) / np.array([a.sum() for a in self.polynomials]) ** 2
+        return float(np.minimum(np.mean(psi**2, axis=0) / np.where(density > 0, density, np.inf), 1.0).mean())
+
     def independent(self, psi: Array) -> float:
         """How many independent samples the slow part of residuals (n, n_sensors) amounts to.
 
-        n γ₀/S(0) of each sensor, with γ₀ the variance and S(0) the spectral density of its autoregression at frequency
-        zero, not above n; over all sensors times S/‖R‖², R (S, S) the correlation of the innovations.
+        `share` of all readings, times S/‖R‖² for S sensors whose innovations have the correlation R (S, S).
         """
         spread = np.diag(self.innovation)
-        density = spread / np.array([a.sum() for a in self.polynomials]) ** 2
-        share = np.minimum(np.mean(psi**2, axis=0) / np.where(density > 0, density, np.inf), 1.0)
         deviation = np.sqrt(np.where(spread > 0, spread, 1.0))
         R = self.innovation / np.outer(deviation, deviation)
-        return float(psi.size * share.mean() * len(R) / max(float(np.sum(R**2)), len(R)))
+        return psi.size * self.share(psi) * len(R) / max(float(np.sum(R**2)), len(R))
+
+    def bias(self, psi: Array) -> float:
+        """Factor by which the autoregression's spectral density at frequency zero is too small on average.
+
+        Its pole φ comes out too small by 2φ/n (Marriott and Pope, 1954), hence S(0) by a part 2/n_e of itself, with n_e
+        independent samples per sensor; nothing of white residuals.
+        """
+        share = self.share(psi)
+        return 1.0 + 2.0 * (1.0 - share) / max(share * len(psi), 1.0)
 
 
 def correlation_of(segments: list[Array]) -> Correlation:

@@ -52,7 +52,7 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
     weighted = [(weigh(run.residual), weigh(run.by_parameter), weigh(run.by_start))
                 for run, weigh in zip(problem.runs(v), problem.weigh, strict=True)]
     H, G2, meat = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
-    answered, absorbed, power, independent = [], 0.0, 0.0, -float(p)
+    answered, absorbed, power, independent, bias = [], 0.0, 0.0, -float(p), 1.0
     found, expected = np.zeros((p, p)), np.zeros((p, p))
     blocks = blocks_of([len(e) for e, _, _ in weighted])
     starts: list[tuple[Array, Array]] = []
@@ -75,6 +75,7 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
                         for X, own in (starts[i] for i in alike) if X.shape[2])
         power += sum(float(np.sum(e**2)) for e in psi)
         independent += correlation.independent(np.concatenate(psi))
+        bias = max(bias, correlation.bias(np.concatenate(psi)))
         for i, e in zip(alike, psi, strict=True):
             of_blocks = block_scores(e, answered[i], correlation, blocks[i])
             found, expected = found + of_blocks[0], expected + of_blocks[1]
@@ -82,7 +83,8 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
     larger, unit = _inflation(power, absorbed), problem.ranges.unit
     scale = covariance_scale(found * np.outer(unit, unit), larger * expected * np.outer(unit, unit),
                              sum(map(len, blocks)))
-    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * larger, max(independent, 1.0), scale)
+    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * larger, max(independent, 1.0),
+                       bias * scale)
 
 
 def _same_sensors(problem: Problem) -> list[list[int]]:
