@@ -49,6 +49,10 @@ def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json
 
 
 def _lines(one: rt.project.FileCheck) -> list[str]:
+    """File and finding; of a valid certificate also what is now proven."""
     lines = [f"{_WORDS[one.valid]}  {one.file}: {one.reason}"]
-    return lines if one.second is None else [*lines, f"            second checker: {one.second.status}: "
-                                                     f"{one.second.reason}"]
+    if one.valid:
+        lines.append(f"            {one.claim}")
+    if one.second is not None:
+        lines.append(f"            second checker: {one.second.status}: {one.second.reason}")
+    return lines

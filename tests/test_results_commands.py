@@ -191,6 +191,17 @@ def test_verify_json_has_margins_and_claims(run: Cli, results: Path) -> None:
     assert rows[0]["claim"].startswith("The thermal network")
 
 
+def test_verify_prints_the_claim_that_it_has_proven_and_no_other(run: Cli, results: Path, tmp_path: Path) -> None:
+    file = results / "certificates" / "contraction.json"
+    claim = json.loads(file.read_text(encoding="utf-8"))["claim"]
+    assert "machine " in claim and "nominal parameters" in claim
+    assert claim in " ".join(run("verify", file).out.split())
+    edited = tmp_path / "edited.json"
+    edited.write_text(file.read_text(encoding="utf-8").replace('"claim": "The thermal', '"claim": "Any thermal'))
+    answer = run("verify", edited)
+    assert answer.status == 1 and "Any thermal network" not in answer.out and "not the one the data give" in answer.out
+
+
 # new
 
 

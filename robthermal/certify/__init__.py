@@ -6,6 +6,7 @@ from .._linear import frequency_radius as frequency_radius
 from .._linear import hinf as hinf
 from .._linear import peak as peak
 from .._linear import stability as stability
+from ._authority import check_certificate as check_certificate
 from ._contraction import contraction as contraction
 from ._enclosure import RunawayFree as RunawayFree
 from ._enclosure import runaway_free as runaway_free
@@ -31,6 +32,7 @@ from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
 __all__ = ["CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds",
-           "UsableCurrent", "contraction", "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf",
-           "invariance", "largest_current", "largest_regulated_current", "limit_map", "loop", "network", "observer",
-           "peak", "regulated", "runaway", "runaway_free", "stability", "thesis_bounds", "usable_current"]
+           "UsableCurrent", "check_certificate", "contraction", "frequency_norm", "frequency_radius", "gains",
+           "heater_heat", "hinf", "invariance", "largest_current", "largest_regulated_current", "limit_map", "loop",
+           "network", "observer", "peak", "regulated", "runaway", "runaway_free", "stability", "thesis_bounds",
+           "usable_current"]

@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..certify import UsableCurrent
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate
-from ._error_box import check_box
+from ._authority import proven_currents
 from ._export_law import export
 from ._modules import Array, ModuleSet, Properties
 
@@ -282,7 +283,7 @@ class FeedbackLinearization:
 def feedback_linearization(system: System, modules: Iterable[str] | str | None = None, *,
                            current_limits: Limits = None, voltage_limits: Limits = None,
                            slew: float | Mapping[str, float] | None = None,
-                           certificate: Certificate | None = None) -> FeedbackLinearization:
+                           certificate: Certificate | UsableCurrent | None = None) -> FeedbackLinearization:
     """Law that makes the cold side linear in v, the heat from each module into its cold lump.
 
     Parameters
@@ -297,8 +298,10 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
         [V].
     slew : float or mapping of module to float, optional
         Largest change of current [A/s].
-    certificate : Certificate, optional
-        A contraction certificate: its current box is the default, and limits beyond it are refused.
+    certificate : UsableCurrent or Certificate, optional
+        What `certify.usable_current` returned, or a contraction certificate: its current box is the default, and limits
+        beyond it are refused. It is proven again, and must be of exactly this system. A contraction certificate alone
+        says nothing of where the temperatures go: a current inside it can still overheat the machine.
 
     Returns
     -------
@@ -308,7 +311,7 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     ------
     InputError
         Unknown modules; limits that exclude zero, or exceed the system file's or the certificate's; a certificate that
-        does not hold or is another system's.
+        is not valid or is another system's.
 
     References
     ----------
@@ -331,14 +334,14 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     own = chosen.ranges({name: pair for name, pair in declared.items() if pair}, "system", "A")
     widest, source = own, "the range in the system file"
     if certificate is not None:
-        proven = _certified(chosen, certificate)
+        proven = proven_currents(chosen, certificate)
         widest, source = (np.maximum(own[0], proven[0]), np.minimum(own[1], proven[1])), "the certified range"
     low, high = (np.asarray(a) for a in chosen.ranges(current_limits, "current_limits", "A"))
     for i, name in enumerate(chosen.names):
         if current_limits is not None and np.isfinite(high[i]) and (low[i] < widest[0][i] or high[i] > widest[1][i]):
             raise InputError(f"({low[i]:g}, {high[i]:g}) A exceeds {source}, ({widest[0][i]:g}, {widest[1][i]:g}) A",
                              where=f"argument current_limits[{name!r}]", expected="limits inside it",
-                             remedy="Lower them. rt.certify.largest_current tells how much is safe.")
+                             remedy="Lower them; rt.certify.usable_current tells how much the machine can have.")
     slews = np.full(len(chosen.names), np.inf) if slew is None else chosen.vector(slew, "slew", "A/s")
     if not (slews > 0).all():
         raise InputError(f"slew = {slews.min():g} A/s", where="argument slew", expected="positive numbers [A/s]")
@@ -353,21 +356,6 @@ def _refuse_effects(modules: ModuleSet) -> None:
             raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the law",
                              where="argument system", expected="modules with Seebeck, Joule and conducted heat only",
                              remedy="Set it to 0 for the law; what it adds is then a disturbance of v.")
-
-
-def _certified(modules: ModuleSet, certificate: Certificate) -> tuple[Array, Array]:
-    """Current box of a contraction certificate of this system."""
-    if not isinstance(certificate, Certificate) or certificate.kind != "contraction" or not certificate.holds:
-        raise InputError("certificate is not a contraction certificate that holds", where="argument certificate",
-                         expected="what rt.certify.contraction returned, with .holds True")
-    for name in modules.names:
-        if name not in certificate.region["current"]:
-            raise InputError(f"the certificate does not know module {name!r}", where="argument certificate",
-                             expected="a certificate of this system")
-    check_box(modules.system, certificate.region["current"], certificate.region["temperature"],
-              "argument certificate")
-    pairs = [[float(value) for value in certificate.region["current"][name]] for name in modules.names]
-    return np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs])
 
 
 def _stable_root(q: Array, p: Properties) -> Array:

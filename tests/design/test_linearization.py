@@ -1,5 +1,6 @@
 """The law (5.15)-(5.18): exact, free of cancellation, inside its limits."""
 
+from dataclasses import replace
 from decimal import Decimal, getcontext
 
 import numpy as np
@@ -157,8 +158,40 @@ def test_a_certificate_sets_the_limits(system):
     proven = rt.certify.contraction(system, method="energy", **box)
     law = rt.design.feedback_linearization(system, certificate=proven)
     assert law.current_high.tolist() == [1.5, 1.5]
-    with pytest.raises(rt.InputError, match=r"current_limits\['m1'\].*certified range.*largest_current"):
+    with pytest.raises(rt.InputError, match=r"current_limits\['m1'\].*certified range.*usable_current"):
         rt.design.feedback_linearization(system, certificate=proven, current_limits=(0.0, 2.0))
+
+
+def test_a_certificate_is_no_authority_before_it_is_proven(system, tmp_path):
+    """A hand-edited file that the checker rejects, and an honest certificate of another machine."""
+    box = {"current": {"m1": (0.0, 1.0), "m2": (0.0, 1.0)}, "temperature": (278.15, 358.15)}
+    path = tmp_path / "contraction.json"
+    rt.certify.contraction(system, method="energy", **box).save(path)
+    path.write_text(path.read_text().replace("1.0", "9.0"))
+    with pytest.raises(rt.InputError, match="not valid: the claim is not the one the data give"):
+        rt.design.feedback_linearization(system, certificate=rt.Certificate.load(path))
+    for name, factor in (("lumps.x1.capacity", 1 + 1e-12), ("modules.m1.seebeck.value", 0.99)):
+        other = system.with_parameters({name: system.parameter(name) * factor})
+        proven = rt.certify.contraction(other, method="energy", **box)
+        assert rt.design.feedback_linearization(other, certificate=proven).current_high.tolist() == [1.0, 1.0]
+        with pytest.raises(rt.InputError, match="about another machine"):
+            rt.design.feedback_linearization(system, certificate=proven)
+    invariant = rt.certify.invariance(system, ambient={"room": (293.15, 303.15)}, **box)
+    with pytest.raises(rt.InputError, match="not a contraction certificate that holds"):
+        rt.design.feedback_linearization(system, certificate=invariant)
+
+
+def test_a_usable_current_sets_the_limits(system):
+    usable = rt.certify.usable_current(system, direction="cooling", temperature=(268.15, 358.15),
+                                       ambient={"room": (296.15, 300.15)})
+    assert usable.holds
+    law = rt.design.feedback_linearization(system, certificate=usable)
+    assert law.current_high.tolist() == [usable.current] * 2 and law.current_low.tolist() == [0.0, 0.0]
+    wider = replace(usable, range={name: (0.0, 2 * usable.current) for name in usable.range})
+    with pytest.raises(rt.InputError, match="exceeds the currents of its certificate"):
+        rt.design.feedback_linearization(system, certificate=wider)
+    with pytest.raises(rt.InputError, match="contraction: the certificate is about another machine"):
+        rt.design.feedback_linearization(system.with_parameters({"lumps.x1.capacity": 41.0}), certificate=usable)
 
 
 @pytest.mark.parametrize(("arguments", "message"), [

@@ -1,0 +1,53 @@
+"""A certificate as authority: only after it was proven again, and only for the machine it is about."""
+
+from __future__ import annotations
+
+from ..errors import InputError
+from ..thermal import System
+from ..verification import Certificate, machine_hash, same_system, verify
+from ._sections import system_section
+
+
+def check_certificate(certificate: Certificate, system: System, kind: str, where: str = "argument certificate") -> None:
+    """Refuse a certificate that cannot be relied on for a machine: it is proven again, and its system compared exactly.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        From a file or just made; nothing it says of itself is believed.
+    system : System
+        Machine that is to rely on it.
+    kind : str
+        Kind of claim that is needed.
+    where : str
+        Argument or file that is named in the message.
+
+    Raises
+    ------
+    InputError
+        No certificate, another kind, one that is not proven, or one of another machine.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> system = rt.systems.two_module()
+    >>> box = {"m1": (-1.0, 1.5), "m2": (-1.0, 1.5)}
+    >>> cert = rt.certify.contraction(system, current=box, temperature=(278.15, 358.15), method="sum")
+    >>> rt.certify.check_certificate(cert, system, "contraction")
+    >>> rt.certify.check_certificate(cert, system.with_parameters({"lumps.x1.capacity": 41.0}), "contraction")
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: argument certificate: the certificate is about another machine, ...
+    """
+    if not isinstance(certificate, Certificate) or certificate.kind != kind or not certificate.holds:
+        raise InputError(f"this is not a {kind} certificate that holds", where=where,
+                         expected=f"a Certificate of kind {kind!r} with .holds True")
+    verdict = verify(certificate)
+    if not verdict.valid:
+        raise InputError(f"the certificate is not valid: {verdict.reason}", where=where,
+                         expected="a certificate that rt.verify proves", remedy="Make it again from the machine.")
+    section = system_section(system, forcing=True)
+    if not same_system(certificate, section):
+        raise InputError(f"the certificate is about another machine, {machine_hash(certificate.system)} instead of "
+                         f"{machine_hash(section)}", where=where, expected="a certificate of exactly this system",
+                         remedy="Certify this system; any changed number makes it another machine.")
