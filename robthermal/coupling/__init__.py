@@ -16,6 +16,8 @@ from ._mu_bound import mu_bound as mu_bound
 from ._mu_result import MuBound as MuBound
 from ._normalized import NormalizedFactors as NormalizedFactors
 from ._normalized import normalized as normalized
+from ._norms import NORMS as NORMS
+from ._norms import Norm as Norm
 from ._overbound import overbound as overbound
 from ._performance import Performance as Performance
 from ._sampled import discretize as discretize
@@ -29,7 +31,8 @@ from ._uncertainty import dual_youla as dual_youla
 from ._worst_case import WorstCase as WorstCase
 from ._worst_case import worst_case as worst_case
 
-__all__ = ["CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "NormalizedFactors",
+__all__ = ["NORMS", "CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "Norm",
+           "NormalizedFactors",
            "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime",
            "destabilising", "discretize", "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound",
            "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]

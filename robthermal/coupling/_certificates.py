@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .._linear import frequency_radius, hinf, hinf_norm, interval_norms, interval_radii, stability
 from ..verification import Certificate
 from ._intervals import Intervals
+from ._norms import NORMS
 from ._read import connected
 from ._response import Response
 
@@ -70,14 +71,14 @@ class Proofs:
             return worst, where
         if worst == 0.0:  # one-way coupling without interaction: nilpotent, robust whatever the envelope
             proof = frequency_radius(system, intervals.edges[[0, -1]], intervals.widest(), 1e-6)
-            return (0.0 if self._kept(proof, "robust number") else float("inf")), where
+            return (0.0 if self._kept(proof, NORMS["robust"].proof) else float("inf")), where
         merged = intervals.merged(radii, worst)
         for room in _ROOM:
             bound = worst * room if worst >= 1.0 else min(worst * room, 0.5 * (1.0 + worst))
             certificate = frequency_radius(system, merged.edges, merged.envelopes, bound)
             if certificate.holds:
                 break
-        return (bound if self._kept(certificate, "robust number") else float("inf")), where
+        return (bound if self._kept(certificate, NORMS["robust"].proof) else float("inf")), where
 
     def small_gain(self, system: control.StateSpace, intervals: Intervals, weights: Array) -> float:
         """sup of sigma_max(Delta_k) times the weight of each interval: level sets, not proven."""

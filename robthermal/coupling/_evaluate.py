@@ -14,6 +14,7 @@ from ._certificates import Proofs
 from ._filters import Filters
 from ._intervals import intervals_of
 from ._joined import beside
+from ._norms import NORMS
 from ._performance import coupled, h2, variances
 from ._problem import Problem, prepare
 from ._read import LTI, state_space_of
@@ -148,17 +149,10 @@ def refused(problem: Problem, outcome: Outcome, *, basis: str, order: int, solve
 def _norms(problem: Problem, parts: Realisation, proofs: Proofs) -> dict[str, float]:
     signals = coupled(problem, parts.X, parts.Y)
     alone = realise(problem.one.signal), realise(problem.two.signal)
-    return {
-        "X": proofs.norm(parts.X, "norm of X"),
-        "Y": proofs.norm(parts.Y, "norm of Y"),
-        "XY": proofs.norm(series(parts.X, parts.Y), "norm of XY"),
-        "improvement_1": proofs.norm(plus_one(parts.Y), "norm of 1 + Y"),
-        "improvement_2": proofs.norm(plus_one(parts.X), "norm of 1 + X"),
-        "hinf": proofs.norm(beside(*signals), "norm of weighted e12"),
-        "hinf_uncoupled": proofs.norm(beside(*alone), "norm of weighted e12 without coupling"),
-        "h2": h2(signals),
-        "h2_uncoupled": h2(alone),
-    }
+    systems = {"X": parts.X, "Y": parts.Y, "XY": series(parts.X, parts.Y), "improvement_1": plus_one(parts.Y),
+               "improvement_2": plus_one(parts.X), "hinf": beside(*signals), "hinf_uncoupled": beside(*alone)}
+    proven = {key: proofs.norm(system, NORMS[key].proof) for key, system in systems.items()}
+    return proven | {"h2": h2(signals), "h2_uncoupled": h2(alone)}
 
 
 def _robust_numbers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace, proofs: Proofs

@@ -16,6 +16,7 @@ from ..verification import Certificate
 from . import _files
 from ._export import export
 from ._fixed_point import FixedPoint, fixed_point
+from ._norms import NORMS
 from ._performance import Performance
 from ._problem import Problem
 from ._reduce import reduce
@@ -264,8 +265,7 @@ class Filters:
 
     def __str__(self) -> str:
         rows = [f"coupling ({self.basis}, order {self.order}): {self.outcome.text}"]
-        for key in ("X", "Y", "XY", "improvement_1", "improvement_2", "hinf", "h2", "robust", "small_gain"):
-            rows.append(f"  {key:<14} {self.norms[key]:.5g}")
+        rows += [f"  {key:<18}{self.norms[key]:.5g}" for key in NORMS]
         if np.isfinite(self.performance.ma_before):
             rows.append(str(self.performance))
         return "\n".join(rows)

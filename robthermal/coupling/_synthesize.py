@@ -15,14 +15,16 @@ from ._basis import make_basis
 from ._design import Design, Limits, default_pole
 from ._evaluate import finish, refused
 from ._filters import Filters
+from ._norms import NORMS
 from ._problem import prepare
 from ._program import solve
 from ._read import LTI
 from ._uncertainty import Uncertainty
 
 Array = NDArray[Any]
+_FIELDS = {key: norm.limit for key, norm in NORMS.items() if norm.limit} | {"msd": "msd"}  # of `Limits`
+_MARGINS = {key: norm.proof_margin for key, norm in NORMS.items()}
 _ATTEMPTS = 6
-_ROOM = {"robust": 1.003, "XY": 1.006, "hinf": 1.006, "improvement_1": 1.006, "improvement_2": 1.006}  # proven / true
 _SPARE = 2e-3  # taken off beyond what a bound was missed by
 _BARELY = ("Filters meet the limits on a grid of frequencies, but too barely for a proof between them. Relax the "
            "limits by a percent. Both filters are zero.")
@@ -149,7 +151,7 @@ def _prove_or_back_off(design: Design, start: Array | None, limits: Limits, star
             outcome = _infeasible(design, limits) if tried == limits else outcome
             break
         requested, start = design.values(solution.coefficients), solution.coefficients
-        excess = _excess(requested | design.relative_spread(solution.coefficients), asked, _ROOM)
+        excess = _excess(requested | design.relative_spread(solution.coefficients), asked, _MARGINS)
         if all(ratio <= 1 for ratio in excess.values()):  # proofs take longest: only where there is room for them
             X_hat, Y_hat = (design.basis.filter(c) for c in solution.coefficients)
             filters = finish(design.problem, X_hat, Y_hat, basis=design.basis.name, order=design.basis.size,
@@ -167,9 +169,8 @@ def _prove_or_back_off(design: Design, start: Array | None, limits: Limits, star
 def _asked(design: Design, limits: Limits) -> dict[str, float]:
     """The limits as `finish` names them."""
     Y_acts, X_acts = design.free[1], design.free[0]
-    named = {"robust": limits.robust, "XY": limits.product, "hinf": limits.hinf, "msd": limits.msd,
-             "improvement_1": limits.improvement if Y_acts else None,
-             "improvement_2": limits.improvement if X_acts else None}
+    acting = {"improvement_1": Y_acts, "improvement_2": X_acts}
+    named = {name: getattr(limits, field) for name, field in _FIELDS.items() if acting.get(name, True)}
     return {name: bound for name, bound in named.items() if bound is not None}
 
 
@@ -181,11 +182,9 @@ def _excess(reached: dict[str, float], asked: dict[str, float], room: dict[str, 
 def _tightened(limits: Limits, excess: dict[str, float]) -> Limits:
     """Limits lowered by what they were missed by; all of them a little when none was missed (the proof failed)."""
     missed = {name: ratio for name, ratio in excess.items() if ratio > 1} or dict.fromkeys(excess, 1 + _SPARE)
-    fields = {"robust": "robust", "XY": "product", "hinf": "hinf", "msd": "msd",
-              "improvement_1": "improvement", "improvement_2": "improvement"}
     lowered: dict[str, float] = {}
     for name, ratio in missed.items():
-        field = fields[name]
+        field = _FIELDS[name]
         bound = getattr(limits, field) / ratio * (1 - _SPARE)
         lowered[field] = min(bound, lowered.get(field, bound))
     return replace(limits, **lowered)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from .. import coupling
-from ..coupling import Filters, Simulation, Spectra, Uncertainty, WorstCase
+from ..coupling import NORMS, Filters, Simulation, Spectra, Uncertainty, WorstCase
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..verification import verify
@@ -16,9 +16,9 @@ from ._couple_file import CouplingJob
 
 _SHOWN = 50  # exposure windows in the simulated trace
 _SAMPLES, _LONGEST = 2500, 50_000  # of the trace
-LIMITS = {"norm_XY": "XY", "norm_1_plus_Y": "improvement_1", "norm_1_plus_X": "improvement_2",
-          "norm_weighted_e12": "hinf"}  # which certificate proves which limit of the design
-_FILES = {"internal stability": "stability", "robust number": "robust", "stability of the controller": "controller"}
+LIMITED = {norm.file: norm for norm in NORMS.values() if norm.limit and norm.key != "robust"}  # by certificate
+_FILES = {"internal stability": "stability", "stability of the controller": "controller"} | {
+    norm.proof: norm.file for norm in NORMS.values() if norm.proof}  # name of each certificate's file
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,17 +142,12 @@ def _checked(filters: Filters) -> Iterator[Checked]:
 
     A bound that is proven but too large is a certificate, not a claim: then `filters.holds` is False and says why.
     """
-    kept = {key for key, limit in LIMITS.items() if filters.norms[limit] <= filters.asked.get(limit, -1.0)}
+    kept = {file for file, norm in LIMITED.items() if filters.norms[norm.key] <= filters.asked.get(norm.key, -1.0)}
     required = {"stability"} | kept | ({"robust"} if filters.verdict == "robust" else set())
-    found = [(_key(what), what, certificate) for what, certificate in filters.proofs.items()]
-    found.sort(key=lambda f: (f[0] not in required, f[0] != "stability", f[1] not in _FILES))
+    found = [(_FILES[what], what, certificate) for what, certificate in filters.proofs.items()]
+    found.sort(key=lambda f: (f[0] not in required, f[0] != "stability", f[0].startswith("norm")))
     for key, what, certificate in found:
         yield Checked(key, what[0].upper() + what[1:], certificate, verify(certificate), key in required)
-
-
-def _key(what: str) -> str:
-    """File name: norm_1_plus_X for the norm of 1 + X."""
-    return _FILES.get(what) or what.replace(" of ", " ").replace("+", "plus").replace(" ", "_")
 
 
 def _simulation(filters: Filters) -> Simulation | None:

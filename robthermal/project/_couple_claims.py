@@ -9,14 +9,13 @@ import numpy as np
 from ..report import Claim
 from ._assumptions import ARITHMETIC
 from ._claims import Checked
-from ._couple import LIMITS, Coupling
+from ._couple import LIMITED, Coupling
 
 _HOW = {
     "stability": "A Lyapunov function of the whole loop; re-derived in ball arithmetic.",
     "frequency": "Multipliers on intervals that cover every frequency; re-derived in ball arithmetic.",
     "hinf": "Bounded real lemma; re-derived in ball arithmetic.",
 }
-_SYMBOL = {"XY": "‖XY‖∞", "improvement_1": "‖1+Y‖∞", "improvement_2": "‖1+X‖∞", "hinf": "The H∞ norm of weighted e12"}
 
 
 def coupling_claims(result: Coupling) -> Iterator[Claim]:
@@ -76,10 +75,10 @@ def _words(key: str, result: Coupling) -> tuple[str, str]:
         factor = f"{1 / norms['robust']:.4g} times the envelope" if norms["robust"] else "an envelope of any size"
         return (f"The coupled loops are stable for every plant whose Δp stays under the envelope: ρ(|Δk| R) is at most "
                 f"{norms['robust']:.4g} at every frequency.", f"stable up to {factor}")
-    limit = LIMITS[key]
-    asked, reached = result.filters.asked[limit], norms[limit]
-    meaning = ": the coupled controller has no unstable mode that C1 and C2 have not" if limit == "XY" else ""
-    return f"{_SYMBOL[limit]} is at most {reached:.4g}{meaning}.", f"{asked - reached:.3g} below the limit {asked:.4g}"
+    norm = LIMITED[key]
+    asked, reached = result.filters.asked[norm.key], norms[norm.key]
+    meaning = ": the coupled controller has no unstable mode that C1 and C2 have not" if norm.key == "XY" else ""
+    return f"{norm.symbol} is at most {reached:.4g}{meaning}.", f"{asked - reached:.3g} below the limit {asked:.4g}"
 
 
 def _about(key: str, result: Coupling) -> str:

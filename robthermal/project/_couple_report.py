@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..coupling import Filters
+from ..coupling import NORMS, Filters, Norm
 from ..report import Report, Section, Table
 from ._couple import Coupling
 from ._couple_claims import coupling_assumptions, coupling_claims
@@ -18,15 +18,6 @@ from ._folder import output_folder
 from ._now import now
 from ._write import provenance
 
-_NORMS = {  # key: what it is, key of its certificate or "" where it is computed
-    "robust": ("robust number ρ(|Δk| R)", "robust"),
-    "small_gain": ("small gain σ(Δk) μ(Δp), Evers (6.22)", ""),
-    "X": ("‖X‖∞", "norm_X"), "Y": ("‖Y‖∞", "norm_Y"), "XY": ("‖XY‖∞", "norm_XY"),
-    "improvement_1": ("‖1+Y‖∞", "norm_1_plus_Y"), "improvement_2": ("‖1+X‖∞", "norm_1_plus_X"),
-    "hinf_uncoupled": ("weighted e12 without coupling, H∞", "norm_weighted_e12_without_coupling"),
-    "hinf": ("weighted e12, H∞", "norm_weighted_e12"),
-    "h2_uncoupled": ("weighted e12 without coupling, H2", ""), "h2": ("weighted e12, H2", ""),
-}
 _SYSTEMS = ("X_hat", "Y_hat", "Z1", "Z2", "X", "Y", "X_input", "Y_input", "controller")
 
 
@@ -126,9 +117,9 @@ def _of_measured_plants(result: Coupling) -> str:
 
 def _norm_section(result: Coupling) -> Section:
     filters, good = result.filters, {c.key for c in result.checked if c.good}
-    rows = [{"number": name, "value": filters.norms[key], "proven": _proven(filters, proof, filters.norms[key], good),
+    rows = [{"number": norm.symbol, "value": filters.norms[key], "proven": _proven(filters, norm, good),
              "solver's own": filters.requested.get(key, float("nan")),
-             "asked at most": filters.asked.get(key, float("nan"))} for key, (name, proof) in _NORMS.items()]
+             "asked at most": filters.asked.get(key, float("nan"))} for key, norm in NORMS.items()]
     if "msd" in filters.asked:
         rows.append({"number": "MSD, after over before", "value": filters.performance.msd_growth, "proven": "computed",
                      "solver's own": float("nan"), "asked at most": filters.asked["msd"]})
@@ -137,14 +128,14 @@ def _norm_section(result: Coupling) -> Section:
     return Section("Norms", text, tables=(Table(pd.DataFrame(rows), "Norms, proven and asked for."),), anchor="norms")
 
 
-def _proven(filters: Filters, proof: str, value: float, good: set[str]) -> str:
-    if not proof:
+def _proven(filters: Filters, norm: Norm, good: set[str]) -> str:
+    if not norm.proof:
         return "computed"
-    if proof in good:
+    if norm.file in good:
         return "yes"
-    if proof == "robust" and filters.problem.uncertainty is None:
+    if norm.key == "robust" and filters.problem.uncertainty is None:
         return "no uncertainty"
-    return "a constant" if np.isfinite(value) else "no"
+    return "a constant" if np.isfinite(filters.norms[norm.key]) else "no"
 
 
 def _robustness_section(result: Coupling) -> Section:
