@@ -13,7 +13,8 @@ from ._basis import Basis
 from ._cascade import realise
 from ._moments import moments, square_root
 from ._problem import Problem
-from ._program import Demands, Responses, radius
+from ._program import Demands, Responses
+from ._radius import radius
 from ._response import Response
 from ._zpk import Zpk, natural
 

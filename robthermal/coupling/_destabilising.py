@@ -14,7 +14,7 @@ from ..errors import InputError
 from ._cascade import realise
 from ._filters import Filters
 from ._problem import Problem
-from ._program import radius
+from ._radius import radius
 from ._response import siso
 from ._zpk import Zpk
 

@@ -41,7 +41,7 @@ def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> di
             "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
 
 
-def save(filters: Filters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()) -> None:
+def save_filters(filters: Filters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()) -> None:
     """Write the file whole, or not at all.
 
     Parameters

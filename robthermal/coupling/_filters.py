@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..errors import Outcome
 from ..verification import Certificate
-from . import _files
 from ._export import export
+from ._files import save_filters
 from ._fixed_point import FixedPoint, fixed_point
 from ._norms import NORMS
 from ._performance import Performance
@@ -230,7 +230,7 @@ class Filters:
         InputError
             If the file cannot be written.
         """
-        _files.save(self, path, name, remarks)
+        save_filters(self, path, name, remarks)
 
     def export(self, path: str | Path, name: str = "coupling") -> None:
         """Write the filters for another program: MATLAB (.mat) or C99 (.c, .h).

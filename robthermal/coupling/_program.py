@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._conic import NormBounds, smallest_bound
+from ._radius import radius
 
 Array = NDArray[Any]
 _ROUNDS = 12
@@ -125,13 +126,6 @@ def solve(responses: Responses, demands: Demands, start: Array | None = None) ->
         active |= broken
         touching = Touching.at(responses, demands, coefficients)
     return found
-
-
-def radius(envelope: Array, a: Array, b: Array) -> Array:
-    """rho(|Delta_k| R) of Delta_k = [[0, a], [b, 0]]: larger root of x² - (a r21 + b r12) x - a b det R."""
-    (r11, r12), (r21, r22) = envelope
-    half = (a * r21 + b * r12) / 2
-    return half + np.sqrt(np.maximum(half**2 + a * b * (r11 * r22 - r12 * r21), 0.0))
 
 
 def violations(responses: Responses, demands: Demands, coefficients: Array, value: float) -> Array:

@@ -13,7 +13,8 @@ import robthermal as rt
 from robthermal._conic import NormBounds, smallest_bound
 from robthermal.coupling._basis import make_basis
 from robthermal.coupling._moments import moments, square_root
-from robthermal.coupling._program import _ellipse, radius
+from robthermal.coupling._program import _ellipse
+from robthermal.coupling._radius import radius
 from robthermal.coupling._realisation import youla_parameter
 from robthermal.coupling._worst_case import _Maps
 
