@@ -1,35 +1,35 @@
 """Coupling filters between two controlled subsystems: Youla factors, measured uncertainty, proven robust stability."""
 
-from ._coprime import CoprimeFactors as CoprimeFactors
-from ._coprime import coprime as coprime
-from ._destabilising import Destabilising as Destabilising
-from ._destabilising import destabilising as destabilising
-from ._evaluate import evaluate as evaluate
-from ._filters import Filters as Filters
-from ._fixed_point import FixedPoint as FixedPoint
-from ._fixed_point import ScaledPath as ScaledPath
-from ._inner import inner_factor as inner_factor
-from ._joint import Joint as Joint
-from ._joint import joint as joint
-from ._mu import mu as mu
-from ._mu_bound import mu_bound as mu_bound
-from ._mu_result import MuBound as MuBound
-from ._normalized import NormalizedFactors as NormalizedFactors
-from ._normalized import normalized as normalized
-from ._norms import NORMS as NORMS
-from ._norms import Norm as Norm
-from ._overbound import overbound as overbound
-from ._performance import Performance as Performance
-from ._sampled import discretize as discretize
-from ._simulate import Simulation as Simulation
-from ._simulate import simulate as simulate
-from ._spectra import Spectra as Spectra
-from ._spectra import spectra as spectra
-from ._synthesize import synthesize as synthesize
-from ._uncertainty import Uncertainty as Uncertainty
-from ._uncertainty import dual_youla as dual_youla
-from ._worst_case import WorstCase as WorstCase
-from ._worst_case import worst_case as worst_case
+from .analysis import Destabilising as Destabilising
+from .analysis import Simulation as Simulation
+from .analysis import WorstCase as WorstCase
+from .analysis import destabilising as destabilising
+from .analysis import simulate as simulate
+from .analysis import worst_case as worst_case
+from .evaluation import Filters as Filters
+from .evaluation import Joint as Joint
+from .evaluation import Spectra as Spectra
+from .evaluation import discretize as discretize
+from .evaluation import evaluate as evaluate
+from .evaluation import joint as joint
+from .evaluation import spectra as spectra
+from .factors import CoprimeFactors as CoprimeFactors
+from .factors import NormalizedFactors as NormalizedFactors
+from .factors import Uncertainty as Uncertainty
+from .factors import coprime as coprime
+from .factors import dual_youla as dual_youla
+from .factors import inner_factor as inner_factor
+from .factors import normalized as normalized
+from .factors import overbound as overbound
+from .implementation import FixedPoint as FixedPoint
+from .implementation import ScaledPath as ScaledPath
+from .mu_bounds import MuBound as MuBound
+from .mu_bounds import mu as mu
+from .mu_bounds import mu_bound as mu_bound
+from .problem import NORMS as NORMS
+from .problem import Norm as Norm
+from .problem import Performance as Performance
+from .synthesis import synthesize as synthesize
 
 __all__ = ["NORMS", "CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "Norm",
            "NormalizedFactors",

@@ -10,10 +10,18 @@ from _timing import best_of, header, row
 
 import robthermal as rt
 from robthermal._conic import smallest_bound
-from robthermal.coupling._basis import make_basis
-from robthermal.coupling._design import Design, Limits, default_pole
-from robthermal.coupling._problem import prepare
-from robthermal.coupling._program import Demands, Responses, Touching, cones, solve
+from robthermal.coupling.problem import prepare
+from robthermal.coupling.synthesis import (
+    Demands,
+    Design,
+    Limits,
+    Responses,
+    Touching,
+    cones,
+    default_pole,
+    make_basis,
+    solve,
+)
 
 SIZES = (125, 250, 500)  # frequencies of the naive formulation; the largest is extrapolated to 4000
 

@@ -14,7 +14,7 @@ from scipy.io import loadmat
 from scipy.signal import sosfilt, sosfreqz
 
 import robthermal as rt
-from robthermal.coupling._recursion import Recursion
+from robthermal.coupling.implementation import Recursion
 
 from .conftest import DT, Array, Pair, at, make_random_pair
 

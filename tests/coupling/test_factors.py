@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.coupling._cascade import realise
-from robthermal.coupling._read import zpk_of
-from robthermal.coupling._response import Response
-from robthermal.coupling._zpk import Zpk
+from robthermal.coupling.systems import Response, Zpk, realise, zpk_of
 
 from .conftest import DT, Pair, at
 

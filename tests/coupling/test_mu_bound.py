@@ -132,7 +132,7 @@ def test_without_a_proof_there_is_no_bound(monkeypatch: pytest.MonkeyPatch) -> N
     def too_low(system: Any, edges: Any, bound: float, **scalings: Any) -> rt.Certificate:
         return rt.certify.frequency_norm(system, edges, 0.9 * bound, **scalings)
 
-    monkeypatch.setattr("robthermal.coupling._mu_bound.frequency_norm", too_low)
+    monkeypatch.setattr("robthermal.coupling.mu_bounds._mu_bound.frequency_norm", too_low)
     b = rt.coupling.mu_bound(random_system(3, 5, 2, 2, 0.0), SCALARS * 2)
     assert not b.outcome and not b.certificate.holds
     assert b.upper == np.inf and b.lower > 0

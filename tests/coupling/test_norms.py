@@ -49,7 +49,7 @@ def test_proof_margins_hold_for_what_is_proven(filters: rt.coupling.Filters) -> 
 
 
 def test_limits_are_fields_of_the_design() -> None:
-    from robthermal.coupling._design import Limits
+    from robthermal.coupling.synthesis import Limits
 
     limits = {norm.limit for norm in NORMS.values() if norm.limit}
     assert limits | {"msd"} == {field.name for field in fields(Limits)}

@@ -11,12 +11,10 @@ import pytest
 
 import robthermal as rt
 from robthermal._conic import NormBounds, smallest_bound
-from robthermal.coupling._basis import make_basis
-from robthermal.coupling._moments import moments, square_root
-from robthermal.coupling._program import _ellipse
-from robthermal.coupling._radius import radius
-from robthermal.coupling._realisation import youla_parameter
-from robthermal.coupling._worst_case import _Maps
+from robthermal.coupling.analysis._worst_case import _Maps
+from robthermal.coupling.problem import radius, youla_parameter
+from robthermal.coupling.synthesis import make_basis, moments, square_root
+from robthermal.coupling.synthesis._program import _ellipse
 
 DT = 1e-3
 

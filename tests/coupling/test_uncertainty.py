@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.coupling._overbound import overbound
+from robthermal.coupling.factors import overbound
 
 from .conftest import DT, Array, Pair, at
 

@@ -1,0 +1,13 @@
+"""From filters to the result: numbers, proofs and spectra; the result reduced, or joined over several axes."""
+
+from ._evaluate import evaluate as evaluate
+from ._evaluate import finish as finish
+from ._evaluate import refused as refused
+from ._filters import Filters as Filters
+from ._joint import Joint as Joint
+from ._joint import joint as joint
+from ._sampled import discretize as discretize
+from ._spectra import Spectra as Spectra
+from ._spectra import spectra as spectra
+
+__all__ = ["Filters", "Joint", "Spectra", "discretize", "evaluate", "finish", "joint", "refused", "spectra"]

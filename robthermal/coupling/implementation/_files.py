@@ -1,0 +1,74 @@
+"""coupling.json: the filters as numbers another program can read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import control
+import numpy as np
+
+from ..._export import json_bytes, write
+from ...errors import InputError, Outcome
+from ._sections import sections
+
+if TYPE_CHECKING:
+    from ..evaluation import Filters
+
+FORMAT = "robthermal-coupling/1"
+_SYSTEMS = ("X", "Y", "X_hat", "Y_hat", "Z1", "Z2", "X_input", "Y_input", "controller")
+_PERFORMANCE = ("ma_before", "ma_after", "msd_before", "msd_after")
+
+
+def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> dict[str, Any]:
+    """Content of coupling.json; numbers that are not finite become null.
+
+    Parameters
+    ----------
+    filters : Filters
+        What is written.
+    name : str
+        Name of the design.
+    remarks : sequence of Outcome
+        What the verdict leaves out.
+    """
+    return {"format": FORMAT, "name": name, "sample_time": filters.problem.dt, "verdict": filters.verdict,
+            "filters": {key: _matrices(getattr(filters, key)) for key in _SYSTEMS},
+            "sections": _sections(filters),
+            "norms": {key: _number(value) for key, value in filters.norms.items()},
+            "performance": {key: _number(getattr(filters.performance, key)) for key in _PERFORMANCE},
+            "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
+
+
+def save_filters(filters: Filters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()) -> None:
+    """Write the file whole, or not at all.
+
+    Parameters
+    ----------
+    filters : Filters
+        What is written.
+    path : str or path
+        File to write.
+    name : str
+        Name of the design.
+    remarks : sequence of Outcome
+        What the verdict leaves out.
+    """
+    write(path, json_bytes(document(filters, name, remarks)))
+
+
+def _sections(filters: Filters) -> dict[str, Any]:
+    """Empty in continuous time, and for filters that have to be reduced first."""
+    try:
+        return {key: rows.tolist() for key, rows in sections(filters).items()}
+    except InputError:
+        return {}
+
+
+def _matrices(system: control.StateSpace) -> dict[str, Any]:
+    return {key: np.asarray(getattr(system, key)).tolist() for key in "ABCD"}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

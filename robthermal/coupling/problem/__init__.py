@@ -1,0 +1,20 @@
+"""What a coupling is designed for, its closed loop, its numbers and their proofs."""
+
+from ._certificates import Proofs as Proofs
+from ._norms import NORMS as NORMS
+from ._norms import Norm as Norm
+from ._performance import Performance as Performance
+from ._performance import coupled as coupled
+from ._performance import h2 as h2
+from ._performance import variances as variances
+from ._problem import Problem as Problem
+from ._problem import Subsystem as Subsystem
+from ._problem import prepare as prepare
+from ._radius import radius as radius
+from ._realisation import Realisation as Realisation
+from ._realisation import drivers as drivers
+from ._realisation import realisation as realisation
+from ._realisation import youla_parameter as youla_parameter
+
+__all__ = ["NORMS", "Norm", "Performance", "Problem", "Proofs", "Realisation", "Subsystem", "coupled", "drivers", "h2",
+           "prepare", "radius", "realisation", "variances", "youla_parameter"]
