@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,3 +102,24 @@ def test_the_second_checker_imports_the_standard_library_only():
             assert all(name.split(".")[0] in sys.stdlib_module_names for name in names), file
     code = "import sys, recheck; sys.exit(any(name in sys.modules for name in ('robthermal', 'numpy', 'flint')))"
     assert subprocess.run([sys.executable, "-c", code], cwd=folder.parent, check=False).returncode == 0
+
+
+def test_the_page_names_every_key_of_every_kind():
+    """A checker can be written from docs/reference/certificate_format.md: no key of any certificate is missing there."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "certificate_format.md").read_text()
+    words = set(re.findall(r"[A-Za-z_]+", page))
+    free = {"name", "capacity"}
+
+    def keys(value, names):
+        if isinstance(value, dict):
+            for key, part in value.items():
+                names |= set() if key in free or not part and part != 0 else {key}
+                keys(part, names)
+        return names
+
+    for kind, subject in SUBJECTS.items():
+        document = subject.make(np.random.default_rng(7))
+        parts = {section: document[section] for section in ("system", "region", "evidence")}
+        own = {*parts["system"].get("lumps", {}), *parts["system"].get("modules", {}),
+               *parts["system"].get("ambients", []), *parts["region"].get("parameters", {})}
+        assert kind in words and keys(parts, set()) - own <= words, kind
