@@ -105,7 +105,7 @@ def test_the_second_checker_imports_the_standard_library_only():
 
 
 def test_the_page_names_every_key_of_every_kind():
-    """A checker can be written from docs/reference/certificate_format.md: no key of any certificate is missing there."""
+    """A checker can be written from docs/reference/certificate_format.md: no key of a certificate is missing there."""
     page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "certificate_format.md").read_text()
     words = set(re.findall(r"[A-Za-z_]+", page))
     free = {"name", "capacity"}
