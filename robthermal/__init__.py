@@ -39,6 +39,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .diagnosis.diagnose import diagnose as diagnose
     from .signals import Record as Record
     from .signals import read_record as read_record
+    from .signals import read_records as read_records
     from .thermal import System as System
     from .thermal import read_system as read_system
     from .verification import Certificate as Certificate
@@ -58,6 +59,7 @@ _HOME = {  # public name: the room it lives in
     "diagnose": "diagnosis",
     "fleet": "_fleet",
     "read_record": "signals",
+    "read_records": "signals",
     "read_system": "thermal",
     "verify": "verification",
 }

@@ -10,26 +10,40 @@ from ._excitation_set import Excitation as Excitation
 from ._glitches import find_glitches as find_glitches
 from ._glitches import median_filter as median_filter
 from ._multisine import multisine as multisine
-from ._read import read_record as read_record
 from ._record import Record as Record
 from ._staircase import staircase as staircase
 from ._units import celsius_to_kelvin as celsius_to_kelvin
 from ._units import kelvin_to_celsius as kelvin_to_celsius
+from .importing import Declared as Declared
+from .importing import Import as Import
+from .importing import ImportOptions as ImportOptions
+from .importing import declared as declared
+from .importing import from_text as options_from_text
+from .importing import inspect as inspect_file
+from .importing import read_record as read_record
+from .importing import read_records as read_records
 
 __all__ = [
+    "Declared",
     "DesignCheck",
     "Excitation",
+    "Import",
+    "ImportOptions",
     "Record",
     "celsius_to_kelvin",
     "crest_factor",
+    "declared",
     "design_check",
     "find_glitches",
+    "inspect_file",
     "kelvin_to_celsius",
     "median_filter",
     "multisine",
     "multisines",
     "noise",
+    "options_from_text",
     "prbs",
     "read_record",
+    "read_records",
     "staircase",
 ]

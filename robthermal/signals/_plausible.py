@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ._checks import Array
-from ._timebase import RowLabel
 from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN
+
+RowLabel = Callable[[int], str]
 
 _MILLI = 100.0  # a current this many times beyond its limits is in mA
 

@@ -20,6 +20,8 @@ from ._names import suggestion
 if TYPE_CHECKING:
     import pandas as pd
 
+    from .importing import Import
+
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Record:
@@ -46,6 +48,8 @@ class Record:
         For reports.
     notes : sequence of str, optional
         What was done to the data on the way, in words.
+    imported : Import, optional
+        How the file was read, column by column; None for records that come from no file.
 
     Attributes
     ----------
@@ -79,6 +83,7 @@ class Record:
     units: Mapping[str, str]
     name: str
     notes: tuple[str, ...]
+    imported: Import | None
 
     def __init__(
         self,
@@ -92,6 +97,7 @@ class Record:
         units: Mapping[str, str] | None = None,
         name: str = "",
         notes: Sequence[str] = (),
+        imported: Import | None = None,
     ):
         h = positive_number(sample_time, "sample_time", "s")
         t0 = finite_number(start_time, "start_time", "s")
@@ -110,6 +116,7 @@ class Record:
             "units": channel_units(units, input_list + output_list),
             "name": _text(name, "name"),
             "notes": _texts(notes),
+            "imported": imported,
         }
         for field, value in fields.items():
             object.__setattr__(self, field, value)  # frozen: this is the one place that writes

@@ -41,6 +41,8 @@ class TdmsSource:
         self._waveforms = {channel.name: _waveform(channel, path) for channel in found}
         self._has_clock = any(name.split("[")[0].strip().lower() == "time" for name in names)
         self._made_time = () if self._has_clock else ("time",)
+        started = next((channel.properties.get("wf_start_time") for channel in found), None)
+        self.origin = None if started is None else str(started)  # a date, as ISO text
         self.headers = self._made_time + tuple(names)
 
     def read(self, wanted: Sequence[str]) -> dict[str, Array]:

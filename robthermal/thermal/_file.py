@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..signals import declared
 from ._parameters import LISTED
 from ._parts import Part
 from ._system import System, build
@@ -80,7 +81,9 @@ def parse_system(text: str, where: str = "system text") -> System:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"is not valid TOML: {error}", where=where, remedy="Correct the line it names.") from None
-    return build(_kelvin(_flat(data, where), where), where)
+    flat = _flat(data, where)
+    declared((flat.get("record", {}), flat.get("columns", {}), where))  # refuses what no reader would take
+    return build(_kelvin(flat, where), where)
 
 
 def write_system(system: System, path: str | Path) -> None:
@@ -256,6 +259,9 @@ def _lines(system: System) -> Iterator[str]:
         for name, bounds in system.fit.items():
             fields = bounds.model_dump(exclude_unset=True)
             yield f"{_string(name)} = {_value(_shifted(fields, convert) if _is_temperature(name) else fields)}"
+    for table in ("record", "columns"):
+        if getattr(system, table):
+            yield from ("", f"[{table}]", *(f"{_key(key)} = {_value(value)}" for key, value in getattr(system, table).items()))
 
 
 def _convert_key(fields: dict[str, Any], key: str, convert: Callable[[float], float]) -> None:

@@ -123,6 +123,8 @@ class Input(Part):
         [W per unit of the record column].
     limits : tuple of float, optional
         Range of the record column [unit].
+    unit : str, optional
+        Unit of the record column, for example "%"; default W where gain is 1.
     drive : Drive
         What the heater makes of its column; default: exactly that.
     power_slope : float, optional
@@ -134,6 +136,7 @@ class Input(Part):
     lump: Name
     gain: Finite = 1.0
     limits: Range | None = None
+    unit: str | None = None
     drive: Drive = Drive()
     power_slope: Finite | None = None
     feedthrough: Feedthrough | None = None

@@ -39,6 +39,8 @@ class System(Part):
         Parameter name to `FitRange`.
     temperature_unit : {"K", "degC"}
         Unit of the temperatures in the files of this system and in its records; inside, all is kelvin.
+    record, columns : mapping
+        How measured files of this machine are read, as in `rt.read_records`: keys of [record], and name to header.
 
     Raises
     ------
@@ -64,6 +66,8 @@ class System(Part):
     leads: tuple[Lead, ...] = ()
     sensors: dict[Name, Sensor] = {}
     fit: dict[str, FitRange] = {}
+    record: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
 
     def __init__(self, **data: Any):
         try:
@@ -118,6 +122,16 @@ class System(Part):
     def input_limits(self) -> dict[str, tuple[float, float] | None]:
         """Declared range of each heater column [unit]."""
         return {name: heater.limits for name, heater in self.inputs.items()}
+
+    @property
+    def input_units(self) -> dict[str, str | None]:
+        """Declared unit of each heater column."""
+        return {name: heater.unit for name, heater in self.inputs.items()}
+
+    @property
+    def input_gains(self) -> dict[str, float]:
+        """Heat of each heater per unit of its column [W/unit]."""
+        return {name: heater.gain for name, heater in self.inputs.items()}
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

@@ -1,0 +1,107 @@
+"""Which column holds the time."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...errors import InputError
+from ._options import ImportOptions
+from ._stamps import Clock, read_stamps
+from ._table import Action, Table
+from ._tokens import short
+from ._units import split_header, unit_of
+
+_NAMES = ("time", "t", "timestamp", "datetime", "date/time", "zeit", "zeitstempel", "elapsed", "elapsed time", "seconds",
+          "datum/zeit", "date time", "date_time", "datum/uhrzeit", "time stamp", "timestamps")
+_PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
+
+
+def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -> tuple[int, ...]:
+    """Places of the time column, or of date and time of day; empty where the time is counted with sample_time.
+
+    Parameters
+    ----------
+    table : Table
+        Headers as written.
+    options : ImportOptions
+        time and sample_time.
+    wanted : frozenset of str
+        Names of the system, which are no time columns.
+
+    Raises
+    ------
+    InputError
+        None, or several that could be it.
+    """
+    if options.time is not None:
+        asked = (options.time,) if isinstance(options.time, str) else options.time
+        return tuple(_place(table, name) for name in asked)
+    names = [split_header(header)[0].strip().lower() for header in table.headers]
+    free = [k for k, header in enumerate(table.headers) if header and header not in wanted
+            and split_header(header)[0] not in wanted]
+    for date, clock in _PAIRS:
+        both = [[k for k in free if names[k] == part] for part in (date, clock)]
+        if all(len(found) == 1 for found in both):
+            return (both[0][0], both[1][0])
+    found = [k for k in free if names[k] in _NAMES]
+    if len(found) == 1:
+        return (found[0],)
+    if not found:
+        if options.sample_time is not None:
+            return ()
+        listed = ", ".join(header for header in table.headers if header)[:200]
+        raise InputError("there is no column 'time'", where=table.where, expected="one column 'time', or a declared one",
+                         remedy=f'Write time = "HEADER", or sample_time = 1.0. Columns: {listed}.')
+    numeric = [k for k in found if table.columns[k].dtype.kind == "f" and _in_seconds(table.headers[k])]
+    if len(numeric) == 1:
+        table.actions.append(Action("mapped", 1, f"time taken from {table.headers[numeric[0]]!r}, the one in seconds; other "
+                                    "columns with times: " + ", ".join(repr(table.headers[k]) for k in found if k != numeric[0]),
+                                    table.headers[numeric[0]]))
+        return (numeric[0],)
+    listed = ", ".join(repr(table.headers[k]) for k in found)
+    raise InputError(f"there are {len(found)} time columns ({listed})", where=table.where, expected="one time column",
+                     remedy=f'Write time = "{table.headers[found[0]]}", or another of them.')
+
+
+def read_clock(table: Table, places: tuple[int, ...], options: ImportOptions) -> Clock:
+    """Time of every row of a table."""
+    n = len(table.lines)
+    if not places:
+        return Clock(np.arange(n) * float(options.sample_time or 1.0), None, "counted", 0.0)
+    if len(places) == 2:
+        first, second = (table.columns[k] for k in places)
+        if first.dtype.kind != "O" or second.dtype.kind != "O":
+            raise InputError(f"{table.headers[places[0]]!r} and {table.headers[places[1]]!r} are not both texts",
+                             where=table.where, expected="a date and a time of day in every row")
+        joined = pd.Series(first, dtype=object).str.strip() + " " + pd.Series(second, dtype=object).str.strip()
+        return read_stamps(table, table.headers[places[0]], joined.to_numpy(object), None, options)
+    header = table.headers[places[0]]
+    unit = table.units[places[0]] if table.units and table.units[places[0]].strip("-") else split_header(header)[1]
+    cells: Any = table.columns[places[0]]
+    known = unit is not None and unit_of(unit) is not None
+    if cells.dtype.kind == "O" and unit is not None and not known:
+        unit = None  # "Time [dd.mm.yyyy]" says how the text looks, which the text itself says
+    return read_stamps(table, header, cells, unit, options)
+
+
+def _place(table: Table, name: str) -> int:
+    exact = [k for k, header in enumerate(table.headers) if header == name.strip()]
+    bare = [k for k, header in enumerate(table.headers) if split_header(header)[0].lower() == name.strip().lower()]
+    found = exact or bare
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(header for header in table.headers if header)[:200]
+    raise InputError(f"time = {short(name)}: " + ("several columns" if found else "there is no such column"), where=table.where,
+                     expected="a header of the file", remedy=f"Columns: {listed}.")
+
+
+def _in_seconds(header: str) -> bool:
+    unit = split_header(header)[1]
+    found = unit_of(unit) if unit is not None else None
+    bare = re.sub(r"[\W_]+", "", split_header(header)[0]).lower()
+    return (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit")) or (
+        found is not None and found.quantity == "time")

@@ -1,0 +1,285 @@
+"""Which column of a file is what in the system, in which unit it is read and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ...errors import InputError
+from .._names import misspelt, suggestion
+from ._options import ColumnChoice, Declared
+from ._table import Action, Table
+from ._tokens import short
+from ._units import Unit, split_header, unit_of
+
+Limits = tuple[float, float] | None
+_LISTED = 200  # characters of a list of headers in a message
+_SI = {"temperature": "K", "current": "A", "power": "W", "voltage": "V", "resistance": "ohm", "percent": "%"}
+_KINDS = {"input": "heater", "current": "module current", "ambient": "ambient", "sensor": "sensor"}
+
+
+class SystemLike(Protocol):
+    """What the reader asks of a system; `robthermal.System` has it."""
+
+    @property
+    def temperature_unit(self) -> str: ...
+    @property
+    def input_names(self) -> Sequence[str]: ...
+    @property
+    def module_names(self) -> Sequence[str]: ...
+    @property
+    def ambient_names(self) -> Sequence[str]: ...
+    @property
+    def sensor_names(self) -> Sequence[str]: ...
+    @property
+    def current_limits(self) -> Mapping[str, Limits]: ...
+    @property
+    def input_limits(self) -> Mapping[str, Limits]: ...
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column that is used.
+
+    Parameters
+    ----------
+    name : str
+        In the record.
+    role : str
+        "input", "current", "ambient" or "sensor".
+    place : int
+        Column of the table.
+    unit_read : Unit or None
+        Unit of the cells; None where neither header nor declaration says one.
+    unit : str
+        Unit that is kept: "K", "A", "W", or the input's own; "" where nobody says.
+    scale, offset : float
+        Value = scale · cell + offset, before a unit is converted; declared, or 1 and 0.
+    scaled : bool
+        Whether scale or offset were declared.
+    """
+
+    name: str
+    role: str
+    place: int
+    unit_read: Unit | None
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+    scaled: bool = False
+
+
+def channels_of_system(table: Table, system: SystemLike, choice: Declared, time: Sequence[int]) -> tuple[Channel, ...]:
+    """Channels of a system that the file has: heaters and currents must be there, ambients and sensors may.
+
+    Raises
+    ------
+    InputError
+        A heater or current without a column, a mapped name that the system does not have, units that do not fit.
+    """
+    roles = {**dict.fromkeys(system.input_names, "input"), **dict.fromkeys(system.module_names, "current"),
+             **dict.fromkeys(system.ambient_names, "ambient"), **dict.fromkeys(system.sensor_names, "sensor")}
+    for name in choice.columns:
+        if name not in roles:
+            raise InputError(f"columns has {name!r}, which is no name of the system", where=table.where,
+                             remedy=suggestion(name, tuple(roles)))
+    units = dict(getattr(system, "input_units", {}))
+    gains = dict(getattr(system, "input_gains", {}))
+    places = match(table, tuple(roles), choice.columns, time)
+    unknown = _unknown(table, places, time)
+    for name, role in roles.items():
+        if name not in places:
+            _refuse_misspelt(table, name, role, unknown)
+            if role in ("input", "current"):
+                raise _missing(table, name, role, unknown)
+    found = []
+    for name, role in roles.items():
+        if name in places:
+            found.append(_channel(table, name, role, places[name], choice, system.temperature_unit, units.get(name),
+                                  gains.get(name, 1.0)))
+    return tuple(found)
+
+
+def channels_of_names(table: Table, inputs: Sequence[str], outputs: Sequence[str], choice: Declared,
+                      time: Sequence[int]) -> tuple[Channel, ...]:
+    """Channels as the caller lists them; outputs without a unit are temperatures."""
+    places = match(table, (*inputs, *outputs), choice.columns, time)
+    found = []
+    for name in (*inputs, *outputs):
+        if name not in places:
+            raise _missing(table, name, "", _unknown(table, places, time))
+        place = places[name]
+        unit = _unit(table, name, place, choice.columns.get(name))
+        sensor = name in outputs
+        if sensor and (unit is None or unit.quantity == "temperature"):
+            found.append(_channel(table, name, "sensor", place, choice, choice.record.temperature_unit or "K", None, 1.0))
+        else:
+            picked = choice.columns.get(name, ColumnChoice(column=""))
+            found.append(Channel(name, "output" if sensor else "input", place, unit,
+                                 _SI.get(unit.quantity, unit.name) if unit else "", *_scaling(picked)))
+    return tuple(found)
+
+
+def match(table: Table, wanted: Sequence[str], columns: Mapping[str, ColumnChoice], time: Sequence[int]) -> dict[str, int]:
+    """Name to column: as declared, else by exact header, else by header without unit, else without case."""
+    free = [k for k, header in enumerate(table.headers) if header and k not in time]
+    exact: dict[str, list[int]] = {}
+    for k in free:
+        exact.setdefault(table.headers[k], []).append(k)
+    bare: dict[str, list[int]] = {}
+    for k in free:
+        bare.setdefault(split_header(table.headers[k])[0], []).append(k)
+    folded: dict[str, list[int]] = {}
+    for k in free:
+        folded.setdefault(split_header(table.headers[k])[0].casefold(), []).append(k)
+    places: dict[str, int] = {}
+    for name in wanted:
+        asked = columns[name].column.strip() if name in columns else name
+        name_only = split_header(asked)[0] if name in columns else asked
+        found = exact.get(asked) or bare.get(asked) or (exact.get(name_only) or bare.get(name_only)
+                                                        if name in columns else None) or folded.get(asked.casefold())
+        if not found:
+            if name in columns:
+                raise _missing(table, asked, "declared", [table.headers[k] for k in free], name)
+            continue
+        if len(found) > 1:
+            listed = ", ".join(repr(table.headers[k]) for k in found[:4])
+            raise InputError(f"columns {listed} have the same name {asked!r}", where=table.where,
+                             expected="one column", remedy=f"Write columns {name} = \"HEADER\" exactly, or rename one.")
+        places[name] = found[0]
+    used: dict[int, str] = {}
+    for name, place in places.items():
+        if place in used and name not in columns and used[place] not in columns:
+            raise InputError(f"{used[place]!r} and {name!r} both match column {table.headers[place]!r}", where=table.where,
+                             expected="a column for each", remedy=f"Write --column '{name}=HEADER'.")
+        used[place] = name
+    return places
+
+
+def _channel(table: Table, name: str, role: str, place: int, choice: Declared, default: str, own: str | None,
+             gain: float) -> Channel:
+    picked = choice.columns.get(name)
+    unit = _unit(table, name, place, picked)
+    header, scaling = table.headers[place], _scaling(picked)
+    where = f"{table.where}, column {header!r}"
+    if role in ("sensor", "ambient"):
+        unit = unit or unit_of(choice.record.temperature_unit or default)
+        if unit is None or unit.quantity != "temperature":
+            if not scaling[2]:
+                raise InputError(f"{name!r} is a temperature and the column is in {unit.name if unit else '?'}", where=where,
+                                 expected="K, mK, °C or °F", remedy=f'Convert it with scale and offset: {name} = {{ column = '
+                                 f'"{header}", scale = 1.0, offset = 0.0 }}.')
+            unit = unit_of(choice.record.temperature_unit or default)
+        return Channel(name, role, place, unit, "K", *scaling)
+    if role == "current":
+        if unit is not None and unit.quantity != "current" and not scaling[2]:
+            raise InputError(f"the current {name!r} is in [{unit.name}]", where=where, expected="A or mA",
+                             remedy=f'Another column? Write --column \'{name}=HEADER\'.')
+        return Channel(name, role, place, unit, "A", *scaling)
+    return _input(name, place, unit, own, gain, scaling, where)
+
+
+def _input(name: str, place: int, unit: Unit | None, own: str | None, gain: float, scaling: tuple[float, float, bool],
+           where: str) -> Channel:
+    """A heater's column: in W, or in the unit the system file gives the input."""
+    kept = unit_of(own) if own else None
+    if scaling[2]:
+        return Channel(name, "input", place, None, own or "W", *scaling)
+    if own is None:
+        if unit is None or unit.name == "W":
+            return Channel(name, "input", place, unit, "W" if gain == 1.0 or unit else "", *scaling)
+        if unit.quantity == "power" and gain == 1.0:
+            return Channel(name, "input", place, unit, "W", *scaling)
+        raise InputError(f"{name!r} is in {unit.name} and the system does not say so (gain = {gain:g} W per unit)", where=where,
+                         expected="W, or a declared conversion",
+                         remedy=f'Write unit = "{unit.name}" in [inputs.{name}], or [columns] {name} = {{ column = …, unit = '
+                         f'"{unit.name}", scale = (W per {unit.name}) }}.')
+    if unit is None or unit.name == (kept.name if kept else own):
+        return Channel(name, "input", place, kept, own, *scaling)
+    if kept is not None and unit.quantity == kept.quantity:
+        return Channel(name, "input", place, unit, own, *scaling)
+    raise InputError(f"the column is in {unit.name} and [inputs.{name}] in {own}", where=where, expected=own,
+                     remedy="Correct one of the two, or declare scale.")
+
+
+def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> Unit | None:
+    """Unit of a used column, from its header, the units row or the declaration; two that differ are refused."""
+    header = table.headers[place]
+    where = f"{table.where}, column {header!r}"
+    written = None if header == name and picked is None else split_header(header)[1]
+    if written is None and table.units and table.units[place].strip("- "):
+        written = table.units[place]
+    known = None
+    if written is not None:
+        known = unit_of(written)
+        if known is None and not (picked is not None and picked.unit is not None):
+            raise InputError(f"its unit {short(written)} is not known", where=where, expected="a known unit",
+                             remedy=f'Write [columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
+                             "W, mW, kW, %, K, mK, degC, degF, ohm.")
+    asked = picked.unit if picked is not None and picked.unit is not None else None
+    if picked is not None and asked is None and picked.column.strip() != header:
+        asked = split_header(picked.column.strip())[1]
+    if asked is None:
+        return known
+    declared = unit_of(asked)
+    if declared is None:
+        raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit")
+    if known is not None and known.name != declared.name:
+        raise InputError(f"the header says {known.name} and the declaration {declared.name}", where=where,
+                         expected="one unit", remedy="Remove the declaration, or correct it.")
+    return declared
+
+
+def _scaling(picked: ColumnChoice | None) -> tuple[float, float, bool]:
+    if picked is None or picked.scale is None and picked.offset is None:
+        return 1.0, 0.0, False
+    return (1.0 if picked.scale is None else picked.scale), picked.offset or 0.0, True
+
+
+def _unknown(table: Table, places: Mapping[str, int], time: Sequence[int]) -> list[str]:
+    used = {*places.values(), *time}
+    return [header for k, header in enumerate(table.headers) if header and k not in used]
+
+
+def _refuse_misspelt(table: Table, name: str, role: str, unknown: Sequence[str]) -> None:
+    for header in unknown:
+        if misspelt(split_header(header)[0], [name]) is not None:
+            raise InputError(f"there is no column {name!r} ({_KINDS[role]}), but {header!r}", where=table.where,
+                             expected="the names of the system file",
+                             remedy=f"Write --column '{name}={header}' if it is the same; else give it a name less alike.")
+
+
+def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted: str = "") -> InputError:
+    kind = f" ({_KINDS[role]})" if role in _KINDS else ""
+    near = suggestion(name, tuple(split_header(header)[0] for header in unknown)).split(" Known:")[0] if unknown else ""
+    near = near if near.startswith("Did") else ""
+    listed = ", ".join(map(repr, unknown))
+    listed = listed if len(listed) <= _LISTED else listed[:_LISTED] + " …"
+    example = unknown[0] if unknown else "HEADER"
+    remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
+    if role in ("input", "current"):
+        remedy += f" Zeros if {name!r} was off."
+    return InputError(f"there is no column {name!r}{kind}", where=table.where,
+                      expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
+                      remedy=remedy.strip())
+
+
+def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:
+    """What is said of names that differ from their headers and of units that are converted."""
+    found = []
+    for c in channels:
+        header = table.headers[c.place]
+        if split_header(header)[0] != c.name and header != c.name:
+            found.append(Action("mapped", 1, f"{c.name} is column {header!r}", header))
+        if c.scaled:
+            found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
+        elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
+            found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
+    return found
+
+
+def kept_factor(channel: Channel) -> float:
+    """Factor from SI to the unit an input is kept in: 1 except for inputs with a unit of their own."""
+    own: Any = unit_of(channel.unit) if channel.unit else None
+    return 1.0 if own is None or channel.role != "input" or own.factor == 0 else 1.0 / own.factor

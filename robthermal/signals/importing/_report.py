@@ -1,0 +1,132 @@
+"""What was understood of a file and done to it: the import report, which travels with the record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+FORMAT = "robthermal-import/1"
+_HEADS = ("column", "name", "role", "unit", "min … max", "missing", "glitches")
+
+
+@dataclass(frozen=True)
+class ImportedColumn:
+    """One column of the file.
+
+    Parameters
+    ----------
+    column, name : str
+        Header in the file, and name in the record; empty where it is not used.
+    role : str
+        "sensor", "ambient", "input", "current", "time" or "unused".
+    unit_read, unit : str
+        Unit of the cells, and unit that is kept; empty where nobody says.
+    scale, offset : float
+        Declared conversion, 1 and 0 without one.
+    min, max : float or None
+        Of the kept values, in the kept unit.
+    missing, glitches : int
+        Cells without a value, and readings that jump away and back.
+    """
+
+    column: str
+    name: str
+    role: str
+    unit_read: str = ""
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    min: float | None = None
+    max: float | None = None
+    missing: int = 0
+    glitches: int = 0
+
+
+@dataclass(frozen=True)
+class Import:
+    """How a measured file was read.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file, or the kind of source.
+    sha256 : str
+        Hash of the file's bytes; empty for sources that are no files.
+    encoding, delimiter, decimal : str
+        Of a text file, else empty.
+    header_line, skipped_lines : int
+        Line of the header, counted from 1, and how many lines before it were skipped.
+    time : dict
+        columns, format, timezone, origin.
+    sample_time : float
+        Of the record [s].
+    rows : dict
+        "file": data rows in the file; "used": rows in some record.
+    parts : tuple of dict
+        start [s], samples, first_line, last_line of every part.
+    columns : tuple of ImportedColumn
+        Every column of the file.
+    actions : tuple of dict
+        What was done: what, n, column, lines, times [s], text, rows.
+    absent : tuple of str
+        Names of the system without a column.
+    """
+
+    file: str
+    sha256: str
+    encoding: str
+    delimiter: str
+    decimal: str
+    header_line: int
+    skipped_lines: int
+    time: dict[str, Any]
+    sample_time: float
+    rows: dict[str, int]
+    parts: tuple[dict[str, Any], ...]
+    columns: tuple[ImportedColumn, ...]
+    actions: tuple[dict[str, Any], ...]
+    absent: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as plain objects, ready for JSON.
+
+        Returns
+        -------
+        dict
+        """
+        plain = {key: getattr(self, key) for key in ("file", "sha256", "encoding", "delimiter", "decimal", "header_line",
+                                                     "skipped_lines", "time", "sample_time", "rows")}
+        return {"format": FORMAT, **plain, "parts": list(self.parts), "columns": [vars(column) for column in self.columns],
+                "actions": list(self.actions), "absent": list(self.absent)}
+
+    def __str__(self) -> str:
+        table = [_HEADS, *(_row(column) for column in self.columns)]
+        widths = [max(len(row[k]) for row in table) for k in range(len(_HEADS))]
+        lines = [f"{self.file}"]
+        lines += ["  " + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
+        lines.append(f"  rows: {self.rows['used']} of {self.rows['file']} used, in {_parts(self.parts, self.sample_time)}")
+        if self.delimiter:
+            delimiter = {"\t": "tab"}.get(self.delimiter, repr(self.delimiter))
+            lines.append(f"  text: {self.encoding}, delimiter {delimiter}, decimal {self.decimal!r}, header in line "
+                         f"{self.header_line}" + (f", {self.skipped_lines} lines skipped" if self.skipped_lines else ""))
+        zone = f", zone {self.time['timezone']}" if self.time.get("timezone") else ""
+        origin = f", zero is {self.time['origin']}" if self.time.get("origin") else ""
+        lines.append(f"  time: {', '.join(self.time['columns']) or 'counted'} as {self.time['format']}{zone}{origin}")
+        lines += [f"  {action['what']}: {action['text']}" for action in self.actions]
+        if self.absent:
+            lines.append(f"  no column for: {', '.join(self.absent)}")
+        return "\n".join(lines)
+
+
+def _row(column: ImportedColumn) -> tuple[str, ...]:
+    unit = column.unit_read if column.unit_read == column.unit else f"{column.unit_read or '-'} → {column.unit or '-'}"
+    span = "" if column.min is None or column.max is None else f"{column.min:.6g} … {column.max:.6g}"
+    return (column.column or "(no name)", column.name or "-", column.role, unit or "-", span, str(column.missing), str(column.glitches))
+
+
+def _parts(parts: Sequence[dict[str, Any]], sample_time: float) -> str:
+    if len(parts) == 1:
+        return f"one part of {parts[0]['samples']} samples of {sample_time:.10g} s, from {parts[0]['start']:.10g} s"
+    shown = "; ".join(f"{part['start']:.6g} s: {part['samples']}" for part in parts[:6])
+    return f"{len(parts)} parts of {sample_time:.10g} s ({shown}{'; …' if len(parts) > 6 else ''} samples)"
