@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ._checks import Array
-from ._source import equally_long, numeric, refuse_large
+from ._source import refuse_large
 
 # What npTDMS raises for damaged files, by what its parser trips over. NotImplementedError: data it does not know.
 # OverflowError: a damaged place in the file, or a damaged date.
@@ -45,24 +45,21 @@ class TdmsSource:
         self.origin = None if started is None else str(started)  # a date, as ISO text
         self.headers = self._made_time + tuple(names)
 
-    def read(self, wanted: Sequence[str]) -> dict[str, Array]:
-        """The wanted columns; time is made from the waveform increment where there is no channel for it."""
-        names = [header for header in wanted if header not in self._made_time]
-        groups = {name: self._group[name] for name in names}
+    def everything(self) -> tuple[dict[str, Array], dict[str, str]]:
+        """All numeric channels, time made from the waveform increment where there is none; and what the others are."""
         try:
             with self._library.TdmsFile.open(self.path) as file:
-                raw = {name: np.asarray(file[group][name][:]) for name, group in groups.items()}
+                raw = {name: np.asarray(file[group][name][:]) for name, group in self._group.items()}
         except _DAMAGED as error:
             raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from error
-        columns = {name: numeric(column, name, self.path) for name, column in raw.items()}
-        equally_long(columns, self.path)
-        if self._made_time and names:
-            columns = {"time": self._made(names, len(columns[names[0]])), **columns}
-        return columns
-
-    def row(self, index: int) -> str:
-        """Words for a data row, counted from 0."""
-        return f"row {index}"
+        columns = {name: np.asarray(column, np.float64) for name, column in raw.items() if column.dtype.kind in "fiu"}
+        left_out = {name: "text or dates" for name in raw if name not in columns}
+        if self._made_time and columns:
+            lengths = [len(column) for column in columns.values()]
+            n = max(set(lengths), key=lengths.count)
+            names = [name for name, column in columns.items() if len(column) == n]
+            columns = {"time": self._made(names, n), **columns}
+        return columns, left_out
 
     def _made(self, names: Sequence[str], n: int) -> Array:
         increments = {self._waveforms[name] for name in names}

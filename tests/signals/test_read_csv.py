@@ -63,36 +63,31 @@ FAULTS = {
     "comments only": ("# a\n# b\n", "no header row"),
     "header only": ("time,u,T\n# nothing yet\n", "a header and no data rows"),
     "one row": ("time,u,T\n0,1,300\n", "1 data row"),
-    "no header": ("0,1,300\n1,2,301\n", "line 1: the first row holds numbers.*header row"),
+    "no header": ("0,1,300\n1,2,301\n", "line 1: the first row holds numbers.*header row.*header = "),
     "nul bytes": (b"time,u,T\n0,1,\x00\x01\n", "binary.*NUL"),
-    "binary junk": (bytes(range(255, 128, -1)) * 40 + b"\n", "no UTF-8"),
-    "latin-1": ("time,u,T\n0,1,300\n# 20 °C\n".encode("latin-1"), r"line 3\) is no UTF-8.*Save it as UTF-8"),
-    "utf-16": (PLAIN.encode("utf-16"), "binary"),
-    "no time": ("t,u,T\n0,1,300\n1,1,300\n", "no column 'time'.*Columns in the file: t, u, T"),
+    "binary junk": (bytes(range(255, 128, -1)) * 40 + b"\n", "no utf-16-le text"),
+    "a letter that is not certain": ("time,u,T\n0,1,300\n# Ø\n".encode("cp1252"), "line 3: byte 0xD8.*no UTF-8"),
+    "no time": ("clock_x,u,T\n0,1,300\n1,1,300\n", "no column 'time'.*Write time = .*Columns: clock_x, u, T"),
     "two times": ("time,Time,u,T\n0,0,1,300\n1,1,1,300\n", "2 time columns"),
-    "time in ms": ("time [ms],u,T\n0,1,300\n1,1,300\n", r"'time \[ms\]' is in ms.*seconds"),
-    "column twice": ("time,u,u,T\n0,1,1,300\n1,1,1,300\n", "'u' stands twice"),
+    "time in metres": ("time [m],u,T\n0,1,300\n1,1,300\n", r"'time \[m\]' is in 'm'.*time_format"),
+    "column twice": ("time,u,u,T\n0,1,1,300\n1,1,1,300\n", "columns 'u', 'u' have the same name"),
     "same name, two units": ("time,u,T [K],T [C]\n0,1,1,300\n1,1,1,300\n", "have the same name"),
-    "nameless": ("time,u,T,\n0,1,300,\n1,1,300,\n", "a column has no name.*trailing separator"),
-    "no such column": ("time,u,t\n0,1,300\n1,1,300\n", "no column 'T'. Did you mean 't'"),
-    "long row": (PLAIN.replace("1,2,301", "1,2,301,7"), "line 3: row 1 has 4 cells and the header has 3"),
-    "all rows long": ("time,u,T\n0,1,300,9\n1,1,300,9\n", "line 2: row 0 has 4 cells"),
-    "short row": (PLAIN.replace("1,2,301", "# x\n1,2"), "line 4: row 1 has 2 cells"),
-    "short row, text column": ("time,a,u,T\n0,x,1,300\n1,y,1\n", "line 3: row 1 has 3 cells"),
-    "text": (PLAIN.replace("301", "off"), "line 3: column 'T' holds 'off' in row 1, time 1 s, which is not a number"),
-    "text after a comment": ("# c\n" + PLAIN.replace("301", "off"), "line 4: column 'T' holds 'off' in row 1"),
-    "hexadecimal": (PLAIN.replace("301", "0x10"), "'0x10'"),
-    "underscore": (PLAIN.replace("301", "3_01"), "'3_01'.*not a number"),
-    "boolean": (PLAIN.replace("1,2,301", "1,True,301"), "column 'u' holds 'True'"),
+    "no such column": ("time,u,x\n0,1,300\n1,1,300\n", "no column 'T'.*--column 'T=x'"),
+    "long row": (PLAIN.replace("1,2,301", "1,2,301,7"), "line 3: the row has 4 cells and the header has 3"),
+    "all rows long": ("time,u,T\n0,1,300,9\n1,1,300,9\n", "line 2: the row has 4 cells"),
+    "short row": (PLAIN.replace("1,2,301", "# x\n1,2"), "line 4: the row has 2 cells"),
+    "text": (PLAIN.replace("301", "off"), "line 3, column 'T': 'off' is not a number.*missing = "),
+    "text after a comment": ("# c\n" + PLAIN.replace("301", "off"), "line 4, column 'T': 'off'"),
+    "hexadecimal": (PLAIN.replace("301", "0x10"), "'0x10' is not a number"),
+    "underscore": (PLAIN.replace("301", "3_01"), "'3_01' is not a number"),
+    "boolean": (PLAIN.replace("1,2,301", "1,True,301"), "column 'u': 'True'"),
     "complex": (PLAIN.replace("301", "1+2j"), r"'1\+2j'"),
-    "infinite": (PLAIN.replace("301", "inf"), "'inf' in row 1, time 1 s, which is not finite"),
-    "overflow": (PLAIN.replace("301", "1e999"), "'1e999'.*not finite"),
-    "nan": (PLAIN.replace("301", "NaN"), r"line 3: column 'T' is NaN \(not a number\) in row 1, time 1 s"),
-    "empty cell": (PLAIN.replace("301", ""), "line 3: column 'T' is empty in row 1, time 1 s.*not filled"),
-    "empty time": (PLAIN.replace("1,2,301", ",2,301"), "column 'time' is empty in row 1"),
-    "decimal comma": (PLAIN.replace(",", ";").replace("302.5", "302,5"), "'302,5'.*decimal comma.*decimal point"),
-    "decimal comma and separator": ("time,u,T\n0,0,1,0,300,1\n1,0,1,0,300,1\n", "6 cells.*decimal point"),
-    "quote never closed": (PLAIN.replace("2,301", '"2,301'), "line 3: row 1 has 2 cells"),
+    "all missing": ("time,u,T\n0,1,nan\n1,1,nan\n2,1,\n", "column 'T' holds no value at all"),
+    "empty time": (PLAIN.replace("1,2,301", ",2,301"), "line 3, column 'time': is empty"),
+    "decimal comma and point": (PLAIN.replace(",", ";").replace("302.5", "302,5").replace("300", "300.5"),
+                                "decimal comma .* decimal point .*decimal = "),
+    "decimal comma and separator": ("time,u,T\n0,0,1,0,300,1\n1,0,1,0,300,1\n", "6 cells.*decimal commas"),
+    "thousands": ("time;u;T\n0;1;1.234,5\n1;1;1.235,5\n", "line 2: '1.234,5' has a decimal and a thousands separator"),
 }
 
 
@@ -120,7 +115,7 @@ def test_a_line_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
 
 def test_a_long_line_later_is_named_in_a_short_message(write: Write) -> None:
     path = write(PLAIN + "3,4," + "9x" * 1_000_000 + "\n")
-    with pytest.raises(InputError, match="line 5: column 'T' holds '9x9x") as caught:
+    with pytest.raises(InputError, match="line 5, column 'T': '9x9x") as caught:
         read(path)
     assert len(str(caught.value)) < 500
 
@@ -149,9 +144,13 @@ def test_paths(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(InputError, match="not a file"):
         read(tmp_path / "folder.csv")
-    with pytest.raises(InputError, match="ends in '.xlsx'.*one of .csv"):
+    (tmp_path / "run.xlsx").write_text("time,u,T")
+    with pytest.raises(InputError, match="no workbook"):
         read(tmp_path / "run.xlsx")
-    with pytest.raises(InputError, match="path is 7"):
+    (tmp_path / "run.csv").write_bytes(b"%PDF-1.7 x")
+    with pytest.raises(InputError, match="a PDF.*Export it as CSV"):
+        read(tmp_path / "run.csv")
+    with pytest.raises(InputError, match="the source is a int"):
         read(7)  # type: ignore[arg-type]
 
 
@@ -170,11 +169,10 @@ def test_units_of_listed_outputs(write: Write) -> None:
     record = rt.read_record(path, inputs=["u"], outputs=["T", "x"], temperature_unit="degC")
     np.testing.assert_array_equal(record["T"], [303.15, 304.15])
     np.testing.assert_array_equal(record["x"], [1.0, 1.0])
-    np.testing.assert_array_equal(record["u"], [20.0, 20.0])
-    assert dict(record.units) == {"u": "degC", "T": "K", "x": "mm"}
-    with pytest.raises(InputError, match=r"'T' is in \[degC\] and temperature_unit is 'K'"):
-        rt.read_record(path, outputs=["T"])
-    with pytest.raises(InputError, match="temperature_unit is 'C'"):
+    np.testing.assert_array_equal(record["u"], [293.15, 293.15])
+    assert dict(record.units) == {"u": "K", "T": "K", "x": "mm"}
+    assert rt.read_record(path, outputs=["T"])["T"][0] == 303.15  # the header says degC, nothing has to be declared
+    with pytest.raises(InputError, match="temperature_unit = 'C'"):
         rt.read_record(path, outputs=["T"], temperature_unit="C")  # type: ignore[arg-type]
 
 
@@ -184,7 +182,8 @@ def test_columns_not_listed_are_noted(write: Write) -> None:
     assert record.notes == ("columns not read: 'u'",)
 
 
-floats = st.floats(allow_nan=False, allow_infinity=False)
+CODES = (-127.0, -127.94, 85.0, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)  # of sensors without a reading
+floats = st.floats(allow_nan=False, allow_infinity=False).filter(lambda value: value not in CODES)
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -41,8 +41,15 @@ def numbers(table: Table, place: int, options: ImportOptions) -> Array:
     for code in codes:
         hit = values == code
         if hit.any():
-            table.actions.append(Action("fault_code", int(hit.sum()), f"{code:g} taken as missing in {header!r}", header,
-                                        [int(k) for k in table.lines[hit][:50]]))
+            table.actions.append(
+                Action(
+                    "fault_code",
+                    int(hit.sum()),
+                    f"{code:g} taken as missing in {header!r}",
+                    header,
+                    [int(k) for k in table.lines[hit][:50]],
+                )
+            )
             values = np.where(hit, np.nan, values)
     return values
 
@@ -51,21 +58,37 @@ def _number(table: Table, row: int, header: str, text: str) -> float:
     decimal = table.facts.get("decimal", ".")
     where = table.place(row, header)
     if THOUSANDS.fullmatch(text):
-        raise InputError(f"{short(text)} has a decimal and a thousands separator", where=where, expected="plain numbers",
-                         remedy='Declare both, for example decimal = "," and thousands = ".".')
+        raise InputError(
+            f"{short(text)} has a decimal and a thousands separator",
+            where=where,
+            expected="plain numbers",
+            remedy='Declare both, for example decimal = "," and thousands = ".".',
+        )
     if decimal == "." and DECIMAL_COMMA.fullmatch(text):
-        raise InputError(f"{short(text)} has a decimal comma, other cells a decimal point", where=where,
-                         expected="one of the two", remedy='Write decimal = ",".')
+        raise InputError(
+            f"{short(text)} has a decimal comma, other cells a decimal point",
+            where=where,
+            expected="one of the two",
+            remedy='Write decimal = ",".',
+        )
     if decimal == "," and "." in text:
-        raise InputError(f"{short(text)} has a decimal point, other cells a decimal comma", where=where,
-                         expected="one of the two", remedy='Write decimal = ".".')
+        raise InputError(
+            f"{short(text)} has a decimal point, other cells a decimal comma",
+            where=where,
+            expected="one of the two",
+            remedy='Write decimal = ".".',
+        )
     try:
         if "_" in text:
             raise ValueError
         value = float(text.replace(",", ".") if decimal == "," else text)
     except ValueError:
-        raise InputError(f"{short(text)} is not a number", where=where, expected="a number in every cell",
-                         remedy=f'If it means that nothing was measured: missing = ["{text[:20]}"].') from None
+        raise InputError(
+            f"{short(text)} is not a number",
+            where=where,
+            expected="a number in every cell",
+            remedy=f'If it means that nothing was measured: missing = ["{text[:20]}"].',
+        ) from None
     return value if np.isfinite(value) else float("nan")
 
 
@@ -84,22 +107,29 @@ def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions)
         if not hit.any() or hit.all():
             continue
         before = np.flatnonzero(hit[1:] & ~hit[:-1] & (np.abs(values[1:] - values[:-1]) > _JUMP)) + 1
-        if hit[0] and not hit[:3].all():
-            before = np.concatenate([[0], before])
         for start in before.tolist():
-            after = start + int(np.argmin(hit[start:])) if not hit[start:].all() else len(values)
-            back = after >= len(values) or abs(values[after] - code) > _JUMP
-            if not back or (after - start > 3 and code == _DOUBTED):
+            after = start + int(np.argmin(hit[start:]))
+            if hit[start:].all() or abs(values[after] - code) <= _JUMP:  # it stays there: a value like any other
                 continue
             row = int(index[start])
             if code == _DOUBTED:
-                table.actions.append(Action("glitches", after - start, f"{header!r} reads exactly 85.0 in single rows: a "
-                                            "DS18B20 after power-up? missing = [85.0] takes it as missing", header,
-                                            [int(table.lines[row])]))
+                table.actions.append(
+                    Action(
+                        "glitches",
+                        after - start,
+                        f"{header!r} reads exactly 85.0 in single rows: a "
+                        "DS18B20 after power-up? missing = [85.0] takes it as missing",
+                        header,
+                        [int(table.lines[row])],
+                    )
+                )
                 break
-            raise InputError(f"{code:g} jumps there and back, like a fault code ({int(hit.sum())} such cells)",
-                             where=table.place(row, header), expected="measured values",
-                             remedy=f"Write missing = [{code:g}] to take it as missing.")
+            raise InputError(
+                f"{code:g} jumps there and back, like a fault code ({int(hit.sum())} such cells)",
+                where=table.place(row, header),
+                expected="measured values",
+                remedy=f"Write missing = [{code:g}] to take it as missing.",
+            )
 
 
 def in_si(channel: Channel, raw: Array) -> Array:

@@ -15,8 +15,24 @@ from ._table import Action, Table
 from ._tokens import short
 from ._units import split_header, unit_of
 
-_NAMES = ("time", "t", "timestamp", "datetime", "date/time", "zeit", "zeitstempel", "elapsed", "elapsed time", "seconds",
-          "datum/zeit", "date time", "date_time", "datum/uhrzeit", "time stamp", "timestamps")
+_NAMES = (
+    "time",
+    "t",
+    "timestamp",
+    "datetime",
+    "date/time",
+    "zeit",
+    "zeitstempel",
+    "elapsed",
+    "elapsed time",
+    "seconds",
+    "datum/zeit",
+    "date time",
+    "date_time",
+    "datum/uhrzeit",
+    "time stamp",
+    "timestamps",
+)
 _PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
 
 
@@ -41,8 +57,11 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         asked = (options.time,) if isinstance(options.time, str) else options.time
         return tuple(_place(table, name) for name in asked)
     names = [split_header(header)[0].strip().lower() for header in table.headers]
-    free = [k for k, header in enumerate(table.headers) if header and header not in wanted
-            and split_header(header)[0] not in wanted]
+    free = [
+        k
+        for k, header in enumerate(table.headers)
+        if header and header not in wanted and split_header(header)[0] not in wanted
+    ]
     for date, clock in _PAIRS:
         both = [[k for k in free if names[k] == part] for part in (date, clock)]
         if all(len(found) == 1 for found in both):
@@ -54,29 +73,46 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         if options.sample_time is not None:
             return ()
         listed = ", ".join(header for header in table.headers if header)[:200]
-        raise InputError("there is no column 'time'", where=table.where, expected="one column 'time', or a declared one",
-                         remedy=f'Write time = "HEADER", or sample_time = 1.0. Columns: {listed}.')
+        raise InputError(
+            "there is no column 'time'",
+            where=table.where,
+            expected="one column 'time', or a declared one",
+            remedy=f'Write time = "HEADER", or sample_time = 1.0. Columns: {listed}.',
+        )
     numeric = [k for k in found if table.columns[k].dtype.kind == "f" and _in_seconds(table.headers[k])]
     if len(numeric) == 1:
-        table.actions.append(Action("mapped", 1, f"time taken from {table.headers[numeric[0]]!r}, the one in seconds; other "
-                                    "columns with times: " + ", ".join(repr(table.headers[k]) for k in found if k != numeric[0]),
-                                    table.headers[numeric[0]]))
+        table.actions.append(
+            Action(
+                "mapped",
+                1,
+                f"time taken from {table.headers[numeric[0]]!r}, the one in seconds; other "
+                "columns with times: " + ", ".join(repr(table.headers[k]) for k in found if k != numeric[0]),
+                table.headers[numeric[0]],
+            )
+        )
         return (numeric[0],)
     listed = ", ".join(repr(table.headers[k]) for k in found)
-    raise InputError(f"there are {len(found)} time columns ({listed})", where=table.where, expected="one time column",
-                     remedy=f'Write time = "{table.headers[found[0]]}", or another of them.')
+    raise InputError(
+        f"there are {len(found)} time columns ({listed})",
+        where=table.where,
+        expected="one time column",
+        remedy=f'Write time = "{table.headers[found[0]]}", or another of them.',
+    )
 
 
 def read_clock(table: Table, places: tuple[int, ...], options: ImportOptions) -> Clock:
     """Time of every row of a table."""
     n = len(table.lines)
     if not places:
-        return Clock(np.arange(n) * float(options.sample_time or 1.0), None, "counted", 0.0)
+        return Clock(np.arange(n, dtype=np.float64) * float(options.sample_time or 1.0), None, "counted", 0.0)
     if len(places) == 2:
         first, second = (table.columns[k] for k in places)
         if first.dtype.kind != "O" or second.dtype.kind != "O":
-            raise InputError(f"{table.headers[places[0]]!r} and {table.headers[places[1]]!r} are not both texts",
-                             where=table.where, expected="a date and a time of day in every row")
+            raise InputError(
+                f"{table.headers[places[0]]!r} and {table.headers[places[1]]!r} are not both texts",
+                where=table.where,
+                expected="a date and a time of day in every row",
+            )
         joined = pd.Series(first, dtype=object).str.strip() + " " + pd.Series(second, dtype=object).str.strip()
         return read_stamps(table, table.headers[places[0]], joined.to_numpy(object), None, options)
     header = table.headers[places[0]]
@@ -95,8 +131,12 @@ def _place(table: Table, name: str) -> int:
     if len(found) == 1:
         return found[0]
     listed = ", ".join(header for header in table.headers if header)[:200]
-    raise InputError(f"time = {short(name)}: " + ("several columns" if found else "there is no such column"), where=table.where,
-                     expected="a header of the file", remedy=f"Columns: {listed}.")
+    raise InputError(
+        f"time = {short(name)}: " + ("several columns" if found else "there is no such column"),
+        where=table.where,
+        expected="a header of the file",
+        remedy=f"Columns: {listed}.",
+    )
 
 
 def _in_seconds(header: str) -> bool:
@@ -104,4 +144,5 @@ def _in_seconds(header: str) -> bool:
     found = unit_of(unit) if unit is not None else None
     bare = re.sub(r"[\W_]+", "", split_header(header)[0]).lower()
     return (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit")) or (
-        found is not None and found.quantity == "time")
+        found is not None and found.quantity == "time"
+    )

@@ -78,12 +78,19 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
     InputError
         A heater or current without a column, a mapped name that the system does not have, units that do not fit.
     """
-    roles = {**dict.fromkeys(system.input_names, "input"), **dict.fromkeys(system.module_names, "current"),
-             **dict.fromkeys(system.ambient_names, "ambient"), **dict.fromkeys(system.sensor_names, "sensor")}
+    roles = {
+        **dict.fromkeys(system.input_names, "input"),
+        **dict.fromkeys(system.module_names, "current"),
+        **dict.fromkeys(system.ambient_names, "ambient"),
+        **dict.fromkeys(system.sensor_names, "sensor"),
+    }
     for name in choice.columns:
         if name not in roles:
-            raise InputError(f"columns has {name!r}, which is no name of the system", where=table.where,
-                             remedy=suggestion(name, tuple(roles)))
+            raise InputError(
+                f"columns has {name!r}, which is no name of the system",
+                where=table.where,
+                remedy=suggestion(name, tuple(roles)),
+            )
     units = dict(getattr(system, "input_units", {}))
     gains = dict(getattr(system, "input_gains", {}))
     places = match(table, tuple(roles), choice.columns, time)
@@ -96,13 +103,24 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
     found = []
     for name, role in roles.items():
         if name in places:
-            found.append(_channel(table, name, role, places[name], choice, system.temperature_unit, units.get(name),
-                                  gains.get(name, 1.0)))
+            found.append(
+                _channel(
+                    table,
+                    name,
+                    role,
+                    places[name],
+                    choice,
+                    system.temperature_unit,
+                    units.get(name),
+                    gains.get(name, 1.0),
+                )
+            )
     return tuple(found)
 
 
-def channels_of_names(table: Table, inputs: Sequence[str], outputs: Sequence[str], choice: Declared,
-                      time: Sequence[int]) -> tuple[Channel, ...]:
+def channels_of_names(
+    table: Table, inputs: Sequence[str], outputs: Sequence[str], choice: Declared, time: Sequence[int]
+) -> tuple[Channel, ...]:
     """Channels as the caller lists them; outputs without a unit are temperatures."""
     places = match(table, (*inputs, *outputs), choice.columns, time)
     found = []
@@ -110,18 +128,33 @@ def channels_of_names(table: Table, inputs: Sequence[str], outputs: Sequence[str
         if name not in places:
             raise _missing(table, name, "", _unknown(table, places, time))
         place = places[name]
-        unit = _unit(table, name, place, choice.columns.get(name))
-        sensor = name in outputs
-        if sensor and (unit is None or unit.quantity == "temperature"):
-            found.append(_channel(table, name, "sensor", place, choice, choice.record.temperature_unit or "K", None, 1.0))
-        else:
-            picked = choice.columns.get(name, ColumnChoice(column=""))
-            found.append(Channel(name, "output" if sensor else "input", place, unit,
-                                 _SI.get(unit.quantity, unit.name) if unit else "", *_scaling(picked)))
+        picked = choice.columns.get(name)
+        written = split_header(table.headers[place])[1]
+        own = written is not None and unit_of(written) is None and (picked is None or picked.unit is None)
+        unit = None if own else _unit(table, name, place, picked)
+        sensor = name in outputs and not own and (unit is None or unit.quantity == "temperature")
+        if sensor and (unit is not None or choice.record.temperature_unit is not None):
+            found.append(
+                _channel(table, name, "sensor", place, choice, choice.record.temperature_unit or "K", None, 1.0)
+            )
+        else:  # a unit that is not known, or none at all: numbers as they are
+            kept = written if own else _SI.get(unit.quantity, unit.name) if unit else ""
+            found.append(
+                Channel(
+                    name,
+                    "sensor" if sensor else "output" if name in outputs else "input",
+                    place,
+                    unit,
+                    kept or "",
+                    *_scaling(picked),
+                )
+            )
     return tuple(found)
 
 
-def match(table: Table, wanted: Sequence[str], columns: Mapping[str, ColumnChoice], time: Sequence[int]) -> dict[str, int]:
+def match(
+    table: Table, wanted: Sequence[str], columns: Mapping[str, ColumnChoice], time: Sequence[int]
+) -> dict[str, int]:
     """Name to column: as declared, else by exact header, else by header without unit, else without case."""
     free = [k for k, header in enumerate(table.headers) if header and k not in time]
     exact: dict[str, list[int]] = {}
@@ -137,28 +170,41 @@ def match(table: Table, wanted: Sequence[str], columns: Mapping[str, ColumnChoic
     for name in wanted:
         asked = columns[name].column.strip() if name in columns else name
         name_only = split_header(asked)[0] if name in columns else asked
-        found = exact.get(asked) or bare.get(asked) or (exact.get(name_only) or bare.get(name_only)
-                                                        if name in columns else None) or folded.get(asked.casefold())
+        found = (
+            exact.get(asked)
+            or bare.get(asked)
+            or (exact.get(name_only) or bare.get(name_only) if name in columns else None)
+            or folded.get(asked.casefold())
+        )
         if not found:
             if name in columns:
                 raise _missing(table, asked, "declared", [table.headers[k] for k in free], name)
             continue
         if len(found) > 1:
             listed = ", ".join(repr(table.headers[k]) for k in found[:4])
-            raise InputError(f"columns {listed} have the same name {asked!r}", where=table.where,
-                             expected="one column", remedy=f"Write columns {name} = \"HEADER\" exactly, or rename one.")
+            raise InputError(
+                f"columns {listed} have the same name {asked!r}",
+                where=table.where,
+                expected="one column",
+                remedy=f'Write columns {name} = "HEADER" exactly, or rename one.',
+            )
         places[name] = found[0]
     used: dict[int, str] = {}
     for name, place in places.items():
         if place in used and name not in columns and used[place] not in columns:
-            raise InputError(f"{used[place]!r} and {name!r} both match column {table.headers[place]!r}", where=table.where,
-                             expected="a column for each", remedy=f"Write --column '{name}=HEADER'.")
+            raise InputError(
+                f"{used[place]!r} and {name!r} both match column {table.headers[place]!r}",
+                where=table.where,
+                expected="a column for each",
+                remedy=f"Write --column '{name}=HEADER'.",
+            )
         used[place] = name
     return places
 
 
-def _channel(table: Table, name: str, role: str, place: int, choice: Declared, default: str, own: str | None,
-             gain: float) -> Channel:
+def _channel(
+    table: Table, name: str, role: str, place: int, choice: Declared, default: str, own: str | None, gain: float
+) -> Channel:
     picked = choice.columns.get(name)
     unit = _unit(table, name, place, picked)
     header, scaling = table.headers[place], _scaling(picked)
@@ -167,21 +213,36 @@ def _channel(table: Table, name: str, role: str, place: int, choice: Declared, d
         unit = unit or unit_of(choice.record.temperature_unit or default)
         if unit is None or unit.quantity != "temperature":
             if not scaling[2]:
-                raise InputError(f"{name!r} is a temperature and the column is in {unit.name if unit else '?'}", where=where,
-                                 expected="K, mK, °C or °F", remedy=f'Convert it with scale and offset: {name} = {{ column = '
-                                 f'"{header}", scale = 1.0, offset = 0.0 }}.')
+                raise InputError(
+                    f"{name!r} is a temperature and the column is in {unit.name if unit else '?'}",
+                    where=where,
+                    expected="K, mK, °C or °F",
+                    remedy=f"Convert it with scale and offset: {name} = {{ column = "
+                    f'"{header}", scale = 1.0, offset = 0.0 }}.',
+                )
             unit = unit_of(choice.record.temperature_unit or default)
         return Channel(name, role, place, unit, "K", *scaling)
     if role == "current":
         if unit is not None and unit.quantity != "current" and not scaling[2]:
-            raise InputError(f"the current {name!r} is in [{unit.name}]", where=where, expected="A or mA",
-                             remedy=f'Another column? Write --column \'{name}=HEADER\'.')
+            raise InputError(
+                f"the current {name!r} is in [{unit.name}]",
+                where=where,
+                expected="A or mA",
+                remedy=f"Another column? Write --column '{name}=HEADER'.",
+            )
         return Channel(name, role, place, unit, "A", *scaling)
     return _input(name, place, unit, own, gain, scaling, where)
 
 
-def _input(name: str, place: int, unit: Unit | None, own: str | None, gain: float, scaling: tuple[float, float, bool],
-           where: str) -> Channel:
+def _input(
+    name: str,
+    place: int,
+    unit: Unit | None,
+    own: str | None,
+    gain: float,
+    scaling: tuple[float, float, bool],
+    where: str,
+) -> Channel:
     """A heater's column: in W, or in the unit the system file gives the input."""
     kept = unit_of(own) if own else None
     if scaling[2]:
@@ -191,16 +252,23 @@ def _input(name: str, place: int, unit: Unit | None, own: str | None, gain: floa
             return Channel(name, "input", place, unit, "W" if gain == 1.0 or unit else "", *scaling)
         if unit.quantity == "power" and gain == 1.0:
             return Channel(name, "input", place, unit, "W", *scaling)
-        raise InputError(f"{name!r} is in {unit.name} and the system does not say so (gain = {gain:g} W per unit)", where=where,
-                         expected="W, or a declared conversion",
-                         remedy=f'Write unit = "{unit.name}" in [inputs.{name}], or [columns] {name} = {{ column = …, unit = '
-                         f'"{unit.name}", scale = (W per {unit.name}) }}.')
+        raise InputError(
+            f"{name!r} is in {unit.name} and the system does not say so (gain = {gain:g} W per unit)",
+            where=where,
+            expected="W, or a declared conversion",
+            remedy=f'Write unit = "{unit.name}" in [inputs.{name}], or [columns] {name} = {{ column = …, unit = '
+            f'"{unit.name}", scale = (W per {unit.name}) }}.',
+        )
     if unit is None or unit.name == (kept.name if kept else own):
         return Channel(name, "input", place, kept, own, *scaling)
     if kept is not None and unit.quantity == kept.quantity:
         return Channel(name, "input", place, unit, own, *scaling)
-    raise InputError(f"the column is in {unit.name} and [inputs.{name}] in {own}", where=where, expected=own,
-                     remedy="Correct one of the two, or declare scale.")
+    raise InputError(
+        f"the column is in {unit.name} and [inputs.{name}] in {own}",
+        where=where,
+        expected=own,
+        remedy="Correct one of the two, or declare scale.",
+    )
 
 
 def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> Unit | None:
@@ -214,9 +282,13 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> U
     if written is not None:
         known = unit_of(written)
         if known is None and not (picked is not None and picked.unit is not None):
-            raise InputError(f"its unit {short(written)} is not known", where=where, expected="a known unit",
-                             remedy=f'Write [columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
-                             "W, mW, kW, %, K, mK, degC, degF, ohm.")
+            raise InputError(
+                f"its unit {short(written)} is not known",
+                where=where,
+                expected="a known unit",
+                remedy=f'Write [columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
+                "W, mW, kW, %, K, mK, degC, degF, ohm.",
+            )
     asked = picked.unit if picked is not None and picked.unit is not None else None
     if picked is not None and asked is None and picked.column.strip() != header:
         asked = split_header(picked.column.strip())[1]
@@ -226,8 +298,12 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> U
     if declared is None:
         raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit")
     if known is not None and known.name != declared.name:
-        raise InputError(f"the header says {known.name} and the declaration {declared.name}", where=where,
-                         expected="one unit", remedy="Remove the declaration, or correct it.")
+        raise InputError(
+            f"the header says {known.name} and the declaration {declared.name}",
+            where=where,
+            expected="one unit",
+            remedy="Remove the declaration, or correct it.",
+        )
     return declared
 
 
@@ -245,13 +321,22 @@ def _unknown(table: Table, places: Mapping[str, int], time: Sequence[int]) -> li
 def _refuse_misspelt(table: Table, name: str, role: str, unknown: Sequence[str]) -> None:
     for header in unknown:
         if misspelt(split_header(header)[0], [name]) is not None:
-            raise InputError(f"there is no column {name!r} ({_KINDS[role]}), but {header!r}", where=table.where,
-                             expected="the names of the system file",
-                             remedy=f"Write --column '{name}={header}' if it is the same; else give it a name less alike.")
+            raise InputError(
+                f"there is no column {name!r} ({_KINDS[role]}), but {header!r}",
+                where=table.where,
+                expected="the names of the system file",
+                remedy=f"Write --column '{name}={header}' if it is the same; else give it a name less alike.",
+            )
 
 
 def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted: str = "") -> InputError:
     kind = f" ({_KINDS[role]})" if role in _KINDS else ""
+    if name in table.facts.get("left_out", {}):
+        return InputError(
+            f"column {name!r} is {table.facts['left_out'][name]}",
+            where=table.where,
+            expected="a numeric vector as long as the others",
+        )
     near = suggestion(name, tuple(split_header(header)[0] for header in unknown)).split(" Known:")[0] if unknown else ""
     near = near if near.startswith("Did") else ""
     listed = ", ".join(map(repr, unknown))
@@ -260,9 +345,12 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
     remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
     if role in ("input", "current"):
         remedy += f" Zeros if {name!r} was off."
-    return InputError(f"there is no column {name!r}{kind}", where=table.where,
-                      expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
-                      remedy=remedy.strip())
+    return InputError(
+        f"there is no column {name!r}{kind}",
+        where=table.where,
+        expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
+        remedy=remedy.strip(),
+    )
 
 
 def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:

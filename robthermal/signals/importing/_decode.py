@@ -54,8 +54,12 @@ def decode(content: bytes, where: str, encoding: str | None = None) -> Decoded:
         return _as(content, dict(_MARKS)[mark], where, _NAMES[mark])
     if b"\0" in content[:_HEAD] or b"\0" in content:
         if encoding is None or not encoding.lower().replace("_", "-").startswith("utf-16"):
-            raise InputError("the file is binary (it holds NUL bytes)", where=where, expected="a text file with columns",
-                             remedy='UTF-16 without a byte-order mark: declare encoding = "utf-16-le".')
+            raise InputError(
+                "the file is binary (it holds NUL bytes)",
+                where=where,
+                expected="a text file with columns",
+                remedy='UTF-16 without a byte-order mark: declare encoding = "utf-16-le".',
+            )
     if encoding is not None:
         return _as(content, encoding, where, encoding)
     try:
@@ -66,9 +70,12 @@ def decode(content: bytes, where: str, encoding: str | None = None) -> Decoded:
             return Decoded(_lines(content.decode("cp1252")), "cp1252", True)
         place = foreign if foreign is not None else error.start
         line = content.count(b"\n", 0, place) + 1
-        raise InputError(f"byte 0x{content[place]:02X} (byte {place}) is no UTF-8 text, and could be several other letters",
-                         where=f"{where}, line {line}", expected="UTF-8, or a declared encoding",
-                         remedy='Write encoding = "cp1252" (or what the logger says), or save the file as UTF-8.') from None
+        raise InputError(
+            f"byte 0x{content[place]:02X} (byte {place}) is no UTF-8 text, and could be several other letters",
+            where=f"{where}, line {line}",
+            expected="UTF-8, or a declared encoding",
+            remedy='Write encoding = "cp1252" (or what the logger says), or save the file as UTF-8.',
+        ) from None
 
 
 def _as(content: bytes, codec: str, where: str, name: str) -> Decoded:
@@ -76,8 +83,12 @@ def _as(content: bytes, codec: str, where: str, name: str) -> Decoded:
         return Decoded(_lines(content.decode(codec).removeprefix("\ufeff")), name, False)
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"byte {error.start} is no {name} text", where=f"{where}, line {line}",
-                         expected=f"a file in {name}", remedy="Declare another encoding.") from None
+        raise InputError(
+            f"byte {error.start} is no {name} text",
+            where=f"{where}, line {line}",
+            expected=f"a file in {name}",
+            remedy="Declare another encoding.",
+        ) from None
 
 
 def _lines(text: str) -> str:

@@ -15,7 +15,9 @@ from ._table import Table
 
 def is_in_memory(source: Any) -> bool:
     """Whether a source is a frame, a series, a mapping or a structured array."""
-    return isinstance(source, pd.DataFrame | pd.Series | Mapping) or (isinstance(source, np.ndarray) and bool(source.dtype.names))
+    return isinstance(source, pd.DataFrame | pd.Series | Mapping) or (
+        isinstance(source, np.ndarray) and bool(source.dtype.names)
+    )
 
 
 def read_frame(source: Any) -> Table:
@@ -71,7 +73,9 @@ def frame_table(frame: pd.DataFrame, where: str, first_row: int = 0) -> Table:
     elif index.name is not None and pd.api.types.is_numeric_dtype(index):
         headers.insert(0, str(index.name))
         columns.insert(0, np.asarray(index, float))
-    return Table(where, tuple(headers), columns, np.arange(first_row, first_row + len(frame)), facts={"rows": len(frame)})
+    return Table(
+        where, tuple(headers), columns, np.arange(first_row, first_row + len(frame)), facts={"rows": len(frame)}
+    )
 
 
 def plain_column(column: pd.Series[Any]) -> Any:
@@ -85,12 +89,20 @@ def plain_column(column: pd.Series[Any]) -> Any:
     if pd.api.types.is_numeric_dtype(column.dtype):
         return column.to_numpy(dtype=float, na_value=np.nan)
     cells = column.to_numpy(object)
-    dates = [isinstance(cell, pd.Timestamp) or hasattr(cell, "isoformat") and hasattr(cell, "hour") and hasattr(cell, "year")
-             for cell in cells if cell is not None and cell == cell]
+    dates = [
+        isinstance(cell, pd.Timestamp) or hasattr(cell, "isoformat") and hasattr(cell, "hour") and hasattr(cell, "year")
+        for cell in cells
+        if cell is not None and cell == cell
+    ]
     if dates and all(dates):
         return pd.DatetimeIndex(pd.to_datetime(pd.Series(cells)))
-    if all(cell is None or cell != cell or isinstance(cell, int | float | Decimal | np.number) and not isinstance(cell, bool)
-           for cell in cells):
+    if all(
+        cell is None
+        or cell != cell
+        or isinstance(cell, int | float | Decimal | np.number)
+        and not isinstance(cell, bool)
+        for cell in cells
+    ):
         return np.array([np.nan if cell is None or cell != cell else float(cell) for cell in cells], float)
     return np.array([np.nan if cell is None or cell != cell or cell is pd.NA else str(cell) for cell in cells], object)
 

@@ -87,8 +87,11 @@ def find_layout(lines: Sequence[str], options: ImportOptions, where: str) -> Lay
     """
     content = [k for k, line in enumerate(lines) if is_content(line)]
     if not content:
-        raise InputError("the file has no header row, only comments or blank lines", where=where,
-                         expected="a header row and data rows")
+        raise InputError(
+            "the file has no header row, only comments or blank lines",
+            where=where,
+            expected="a header row and data rows",
+        )
     tried = (options.delimiter,) if options.delimiter else DELIMITERS
     if options.header is not None:
         return _declared(lines, content, tried, options, where)
@@ -98,18 +101,21 @@ def find_layout(lines: Sequence[str], options: ImportOptions, where: str) -> Lay
         raise _no_header(lines, content, tried, options, where)
     if len(lines_found) > 1:
         listed = ", ".join(str(k + 1) for k in lines_found[:4])
-        raise InputError(f"lines {listed} could all be the header: {short(lines[lines_found[0]])} and "
-                         f"{short(lines[lines_found[1]])}", where=where, expected="one header row",
-                         remedy=f"Write header_line = {lines_found[0] + 1}.")
+        raise InputError(
+            f"lines {listed} could all be the header: {short(lines[lines_found[0]])} and "
+            f"{short(lines[lines_found[1]])}",
+            where=where,
+            expected="one header row",
+            remedy=f"Write header_line = {lines_found[0] + 1}.",
+        )
     header, delimiter, width = found[0]
     return _layout(lines, content, header, delimiter, width, options, where)
 
 
-def _candidates(lines: Sequence[str], content: list[int], d: str,
-                options: ImportOptions) -> list[tuple[int, str, int]]:
+def _candidates(lines: Sequence[str], content: list[int], d: str, options: ImportOptions) -> list[tuple[int, str, int]]:
     """Lines that could be the header with this delimiter: (line, delimiter, cells per row)."""
     found: list[tuple[int, str, int]] = []
-    split = {k: cells_of(lines[k], d) for k in content[:_SEARCHED + _ROWS + 2]}
+    split = {k: cells_of(lines[k], d) for k in content[: _SEARCHED + _ROWS + 2]}
     for place, k in enumerate(content[:_SEARCHED]):
         if options.header_line is not None and k + 1 != options.header_line:
             continue
@@ -117,7 +123,7 @@ def _candidates(lines: Sequence[str], content: list[int], d: str,
         least = 1 if options.header_line is not None and options.sample_time else 2
         if len(cells) < least or not _names(cells) and options.header_line is None:
             continue
-        after = content[place + 1:]
+        after = content[place + 1 :]
         if after and _is_units(split.get(after[0], [])):
             after = after[1:]
         rows = [split[j] for j in after[:_ROWS] if j in split]
@@ -150,36 +156,62 @@ def _is_units(cells: list[str]) -> bool:
     return len(filled) > 0 and all(unit_of(cell) is not None for cell in filled) and len(cells) > 1
 
 
-def _declared(lines: Sequence[str], content: list[int], tried: Sequence[str], options: ImportOptions,
-              where: str) -> Layout:
+def _declared(
+    lines: Sequence[str], content: list[int], tried: Sequence[str], options: ImportOptions, where: str
+) -> Layout:
     """Layout of a file whose headers are declared: its first content line is data."""
     header = options.header or ()
     for d in tried:
         rows = [cells_of(lines[k], d) for k in content[:_ROWS]]
         if all(_fits(row, len(rows[0]), list(header)) for row in rows):
             names = (*header, *("" for _ in range(len(rows[0]) - len(header))))
-            return Layout(d, _decimal(lines, content, d, options, where), options.thousands, names[:len(rows[0])], 0, (), 0,
-                          content[0] + 1, ())
-    raise InputError(f"header has {len(header)} names and the first row reads {short(lines[content[0]])}",
-                     where=f"{where}, line {content[0] + 1}", expected="one name per cell", remedy="Correct header = [...].")
+            return Layout(
+                d,
+                _decimal(lines, content, d, options, where),
+                options.thousands,
+                names[: len(rows[0])],
+                0,
+                (),
+                0,
+                content[0] + 1,
+                (),
+            )
+    raise InputError(
+        f"header has {len(header)} names and the first row reads {short(lines[content[0]])}",
+        where=f"{where}, line {content[0] + 1}",
+        expected="one name per cell",
+        remedy="Correct header = [...].",
+    )
 
 
-def _layout(lines: Sequence[str], content: list[int], header: int, d: str, width: int, options: ImportOptions,
-            where: str) -> Layout:
+def _layout(
+    lines: Sequence[str], content: list[int], header: int, d: str, width: int, options: ImportOptions, where: str
+) -> Layout:
     place = content.index(header)
     cells = cells_of(lines[header], d)
     names = tuple((cells + [""] * width)[:width])
-    after = content[place + 1:]
+    after = content[place + 1 :]
     units: tuple[str, ...] = ()
     units_line = 0
     if options.units_line is not None or (after and _is_units(cells_of(lines[after[0]], d))):
         row = options.units_line - 1 if options.units_line is not None else after[0]
         if row not in content or row <= header:
-            raise InputError(f"units_line = {row + 1}", where=where, expected=f"a line after the header, line {header + 1}")
+            raise InputError(
+                f"units_line = {row + 1}", where=where, expected=f"a line after the header, line {header + 1}"
+            )
         units, units_line = tuple((cells_of(lines[row], d) + [""] * width)[:width]), row + 1
     start = max(header + 1, units_line) + 1
-    return Layout(d, _decimal(lines, [k for k in content if k >= start - 1], d, options, where), options.thousands, names,
-                  header + 1, units, units_line, start, tuple(k + 1 for k in content[:place]))
+    return Layout(
+        d,
+        _decimal(lines, [k for k in content if k >= start - 1], d, options, where),
+        options.thousands,
+        names,
+        header + 1,
+        units,
+        units_line,
+        start,
+        tuple(k + 1 for k in content[:place]),
+    )
 
 
 def _decimal(lines: Sequence[str], rows: list[int], d: str, options: ImportOptions, where: str) -> str:
@@ -190,52 +222,76 @@ def _decimal(lines: Sequence[str], rows: list[int], d: str, options: ImportOptio
     for k in rows[:_SEARCHED]:
         for place, cell in enumerate(cells_of(lines[k], d)):
             if THOUSANDS.fullmatch(cell) and options.thousands is None:
-                raise InputError(f"{short(cell)} has a decimal and a thousands separator", where=f"{where}, line {k + 1}",
-                                 expected="plain numbers",
-                                 remedy='Declare both, for example decimal = "," and thousands = ".".')
+                raise InputError(
+                    f"{short(cell)} has a decimal and a thousands separator",
+                    where=f"{where}, line {k + 1}",
+                    expected="plain numbers",
+                    remedy='Declare both, for example decimal = "," and thousands = ".".',
+                )
             if d != "," and DECIMAL_COMMA.fullmatch(cell):
                 comma = comma or (k, place)
             elif DECIMAL_POINT.fullmatch(cell):
                 point = point or (k, place)
     if comma is not None and point is not None:
-        raise InputError(f"numbers with a decimal comma (line {comma[0] + 1}) and with a decimal point (line {point[0] + 1})",
-                         where=where, expected="one of the two", remedy='Write decimal = "," or decimal = ".".')
+        raise InputError(
+            f"numbers with a decimal comma (line {comma[0] + 1}) and with a decimal point (line {point[0] + 1})",
+            where=where,
+            expected="one of the two",
+            remedy='Write decimal = "," or decimal = ".".',
+        )
     return "," if comma is not None else "."
 
 
-def _no_header(lines: Sequence[str], content: list[int], tried: Sequence[str], options: ImportOptions,
-               where: str) -> InputError:
+def _no_header(
+    lines: Sequence[str], content: list[int], tried: Sequence[str], options: ImportOptions, where: str
+) -> InputError:
     """Why no header was found, most telling reason first."""
     first = content[0]
     if options.header_line is not None:
-        return InputError(f"line {options.header_line} is no header of the rows below it", where=where,
-                          expected="names, then rows with as many cells", remedy="Correct header_line, or delimiter.")
+        return InputError(
+            f"line {options.header_line} is no header of the rows below it",
+            where=where,
+            expected="names, then rows with as many cells",
+            remedy="Correct header_line, or delimiter.",
+        )
     for d in tried:
         rows = [cells_of(lines[k], d) for k in content[:_ROWS]]
         if len(rows[0]) >= 2 and all(is_value(cell) or is_missing(cell) for cell in rows[0]):
-            return InputError("the first row holds numbers", where=f"{where}, line {first + 1}",
-                              expected="a header row with column names",
-                              remedy='Add one, or declare it: header = ["time", "heater", "T1"].')
+            return InputError(
+                "the first row holds numbers",
+                where=f"{where}, line {first + 1}",
+                expected="a header row with column names",
+                remedy='Add one, or declare it: header = ["time", "heater", "T1"].',
+            )
     if len(content) == 1:
         return InputError("the file has a header and no data rows", where=where, expected="a row per sample")
     for k, after in zip(content, content[1:], strict=False):
         names, row = cells_of(lines[k], ","), cells_of(lines[after], ",")
         if len(names) >= 2 and _names(names) and len(row) in (2 * len(names), 2 * len(names) - 1) and "," in tried:
-            return InputError(f"the row has {len(row)} cells and the header {len(names)}: decimal commas between commas?",
-                              where=f"{where}, line {after + 1}", expected="as many cells as the header",
-                              remedy='Export with ";" between the cells, or with decimal points.')
+            return InputError(
+                f"the row has {len(row)} cells and the header {len(names)}: decimal commas between commas?",
+                where=f"{where}, line {after + 1}",
+                expected="as many cells as the header",
+                remedy='Export with ";" between the cells, or with decimal points.',
+            )
     for d in tried:
         names = cells_of(lines[first], d)
         if len(names) >= 2 and _names(names):
-            for k in content[1:_ROWS + 1]:
+            for k in content[1 : _ROWS + 1]:
                 row = cells_of(lines[k], d)
                 if len(row) != len(names):
-                    return InputError(f"the row has {len(row)} cells and the header has {len(names)}: {short(lines[k])}",
-                                      where=f"{where}, line {k + 1}", expected="as many cells as the header",
-                                      remedy="Repair or remove the line.")
-    return InputError(f"no line is followed by rows of as many cells with numbers; line {first + 1} reads "
-                      f"{short(lines[first])}", where=where, expected='a header row; cells separated by ";", tab, "," or "|"',
-                      remedy="Write header_line = N, or delimiter = \"…\".")
+                    return InputError(
+                        f"the row has {len(row)} cells and the header has {len(names)}: {short(lines[k])}",
+                        where=f"{where}, line {k + 1}",
+                        expected="as many cells as the header",
+                        remedy="Repair or remove the line.",
+                    )
+    return InputError(
+        f"no line is followed by rows of as many cells with numbers; line {first + 1} reads {short(lines[first])}",
+        where=where,
+        expected='a header row; cells separated by ";", tab, "," or "|"',
+        remedy='Write header_line = N, or delimiter = "…".',
+    )
 
 
 def delimiter_name(delimiter: str) -> str:

@@ -37,8 +37,11 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
     if is_in_memory(source):
         return read_frame(source)
     if not isinstance(source, str | Path):
-        raise InputError(f"the source is a {type(source).__name__}", where="argument source",
-                         expected="the name of a file, a DataFrame, or a dictionary of arrays")
+        raise InputError(
+            f"the source is a {type(source).__name__}",
+            where="argument source",
+            expected="the name of a file, a DataFrame, or a dictionary of arrays",
+        )
     path = Path(source)
     check_file(path, max_bytes)
     with path.open("rb") as file:
@@ -53,8 +56,12 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
     if kind == "tdms":
         return read_tdms(path, max_bytes)
     if kind:
-        raise InputError(f"the file is {kind}", where=f"{path}", expected="a table of measured columns",
-                         remedy="Export it as CSV, XLSX, Parquet, MATLAB or TDMS.")
+        raise InputError(
+            f"the file is {kind}",
+            where=f"{path}",
+            expected="a table of measured columns",
+            remedy="Export it as CSV, XLSX, Parquet, MATLAB or TDMS.",
+        )
     return read_text(path, options)
 
 
@@ -69,8 +76,13 @@ def _kind(head: bytes, path: Path) -> str:
         return "tdms"
     if head.startswith(b"MATLAB ") or b"\x89HDF\r\n\x1a\n" in head[:520]:
         return "mat"
-    for mark, name in ((b"\xd0\xcf\x11\xe0", "an old Excel workbook (.xls)"), (b"%PDF", "a PDF"), (b"\x89PNG", "a picture"),
-                       (b"\x1f\x8b", "compressed (gzip)"), (b"SQLite format 3", "a database")):
+    for mark, name in (
+        (b"\xd0\xcf\x11\xe0", "an old Excel workbook (.xls)"),
+        (b"%PDF", "a PDF"),
+        (b"\x89PNG", "a picture"),
+        (b"\x1f\x8b", "compressed (gzip)"),
+        (b"SQLite format 3", "a database"),
+    ):
         if head.startswith(mark):
             return name
     binary = b"\0" in head and not head.startswith((b"\xff\xfe", b"\xfe\xff"))

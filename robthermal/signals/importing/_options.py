@@ -49,7 +49,8 @@ class ImportOptions(_Table):
     time : str or tuple of str, optional
         Header of the time column, or of date and time of day.
     time_format : str, optional
-        "iso", "s", "ms", "min", "h", "epoch_s", "epoch_ms", "excel", "elapsed", or a pattern such as "%d.%m.%Y %H:%M:%S".
+        "iso", "s", "ms", "min", "h", "epoch_s", "epoch_ms", "excel", "elapsed", or a pattern such as
+        "%d.%m.%Y %H:%M:%S".
     timezone : str, optional
         Zone of stamps without one, for example "Europe/Berlin".
     sample_time : float, optional
@@ -168,8 +169,11 @@ def declared(*places: tuple[Mapping[str, Any], Mapping[str, Any], str]) -> Decla
         for name, choice in own_columns.items():
             table = {"column": choice} if isinstance(choice, str) else choice
             if not isinstance(table, Mapping):
-                raise InputError(f"{name} = {str(choice)[:60]!r}", where=f"{place} [columns]",
-                                 expected=f'a header, or a table: {name} = {{ column = "I_TEC", unit = "mA" }}')
+                raise InputError(
+                    f"{name} = {str(choice)[:60]!r}",
+                    where=f"{place} [columns]",
+                    expected=f'a header, or a table: {name} = {{ column = "I_TEC", unit = "mA" }}',
+                )
             columns[name] = ColumnChoice(**_checked(ColumnChoice, table, f"{place} [columns] {name}"))
     return Declared(record=ImportOptions(**record), columns=columns)
 
@@ -178,16 +182,20 @@ def _checked(schema: type[_Table], table: Mapping[str, Any], where: str) -> dict
     """The keys that are given, validated; one message for the first that is wrong."""
     for key in table:
         if key not in schema.model_fields:
-            raise InputError(f"unknown key {str(key)[:60]!r}", where=where,
-                             remedy=suggestion(str(key), tuple(schema.model_fields)))
+            raise InputError(
+                f"unknown key {str(key)[:60]!r}", where=where, remedy=suggestion(str(key), tuple(schema.model_fields))
+            )
     try:
         found = schema(**table)
     except ValidationError as error:
         fault: Any = error.errors(include_url=False)[0]
         key = str(fault["loc"][0]) if fault["loc"] else "?"
         given = str(table.get(key, ""))[:60]
-        raise InputError(f"{key} = {given!r}: {fault['msg'].removeprefix('Value error, ')}", where=where,
-                         remedy="The keys and their values are in the documentation, \"Measured files\".") from None
+        raise InputError(
+            f"{key} = {given!r}: {fault['msg'].removeprefix('Value error, ')}",
+            where=where,
+            remedy='The keys and their values are in the documentation, "Measured files".',
+        ) from None
     return {key: getattr(found, key) for key in found.model_fields_set}
 
 
@@ -225,7 +233,9 @@ def _value(key: str, text: str) -> Any:
         try:
             return json.loads(text)
         except json.JSONDecodeError:
-            raise InputError(f"{key}={text[:60]}", where="--record", expected="a value as in the project file") from None
+            raise InputError(
+                f"{key}={text[:60]}", where="--record", expected="a value as in the project file"
+            ) from None
     if key in lists and (key != "time" or "," in text):
         return [_number(part.strip()) if key == "missing" else part.strip() for part in text.split(",")]
     return text

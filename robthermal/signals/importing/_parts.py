@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ._options import ImportOptions
 from ._samples import Rows, nice
 from ._table import Action, Array, Table
 
+Flags = NDArray[np.bool_]
 _GAP = 1.5  # of the median step
 _NEGLIGIBLE = 1e-3  # of a step: stamps this close to the grid are on it
 _EPS = 1e-6
@@ -48,7 +50,7 @@ class Part:
     @property
     def grid(self) -> Array:
         """Times of the samples [s]."""
-        return self.start + self.sample_time * np.arange(self.samples)
+        return self.start + self.sample_time * np.arange(self.samples, dtype=np.float64)
 
     def linear(self, column: Array) -> Array:
         """Readings on the grid, linear between rows; missing ones in between are interpolated."""
@@ -66,8 +68,14 @@ class Part:
         return column[self.rows[np.clip(place, 0, len(self.rows) - 1)]]
 
 
-def parts_of(table: Table, pieces: list[tuple[Rows, Array]], driven: Array, read: Array, options: ImportOptions,
-             names: tuple[tuple[str, ...], tuple[str, ...]]) -> list[Part]:
+def parts_of(
+    table: Table,
+    pieces: list[tuple[Rows, Array]],
+    driven: Array,
+    read: Array,
+    options: ImportOptions,
+    names: tuple[tuple[str, ...], tuple[str, ...]],
+) -> list[Part]:
     """Uninterrupted parts of all runs of a file.
 
     Parameters
@@ -93,36 +101,53 @@ def parts_of(table: Table, pieces: list[tuple[Rows, Array]], driven: Array, read
         raise InputError(f"the file has {len(table.lines)} data row", where=table.where, expected="at least two")
     median = float(np.median(steps))
     if median <= 0.0:
-        raise InputError("more than half of the time stamps repeat", where=table.where, expected="time that increases",
-                         remedy="Write more digits of the time, or sample_time = … and another time column.")
+        raise InputError(
+            "more than half of the time stamps repeat",
+            where=table.where,
+            expected="time that increases",
+            remedy="Write more digits of the time, or sample_time = … and another time column.",
+        )
     threshold = median * (max(_GAP, 1.0 + options.jitter) + _EPS)
-    stop_here = np.isnan(driven).any(axis=1) if driven.shape[1] else np.zeros(len(table.lines), bool)
-    lacking = _unfillable(read, options) if read.shape[1] else np.zeros(len(table.lines), bool)
+    stop_here: Flags = np.asarray(np.isnan(driven).any(axis=1))
+    lacking = _unfillable(read, options)
     if options.gaps == "refuse":
         _refuse_missing(table, stop_here, lacking, driven, read, names)
     segments: list[tuple[Rows, Array]] = []
     for rows, stamps in pieces:
         segments += _segments(table, rows, stamps, stop_here | lacking, threshold, median, driven, options)
     _say_missing(table, stop_here, lacking, driven, read, names)
-    long = [(rows, stamps) for rows, stamps in segments
-            if len(rows) >= 2 and round((stamps[-1] - stamps[0]) / median) + 1 >= options.shortest]
+    long = [
+        (rows, stamps)
+        for rows, stamps in segments
+        if len(rows) >= 2 and round((stamps[-1] - stamps[0]) / median) + 1 >= options.shortest
+    ]
     short = [(rows, stamps) for rows, stamps in segments if len(rows) and not any(rows is r for r, _ in long)]
     if short:
         gone = sum(len(rows) for rows, _ in short)
-        table.actions.append(Action("left_out", len(short), f"{len(short)} parts shorter than {options.shortest} samples left out "
-                                    f"({gone} rows)", lines=[int(table.lines[rows[0]]) for rows, _ in short[:50]],
-                                    times=[float(stamps[0]) for _, stamps in short[:50]], rows=gone))
+        table.actions.append(
+            Action(
+                "left_out",
+                len(short),
+                f"{len(short)} parts shorter than {options.shortest} samples left out ({gone} rows)",
+                lines=[int(table.lines[rows[0]]) for rows, _ in short[:50]],
+                times=[float(stamps[0]) for _, stamps in short[:50]],
+                rows=gone,
+            )
+        )
     used = sum(len(rows) for rows, _ in long)
     if not long or 2 * used < len(table.lines):
-        raise InputError(f"{used} of {len(table.lines)} rows are left in {len(long)} parts of at least {options.shortest} samples",
-                         where=table.where, expected="at least half of the rows",
-                         remedy='Repair the file, lower shortest, or write gaps = "fill".')
+        raise InputError(
+            f"{used} of {len(table.lines)} rows are left in {len(long)} parts of at least {options.shortest} samples",
+            where=table.where,
+            expected="at least half of the rows",
+            remedy='Repair the file, lower shortest, or write gaps = "fill".',
+        )
     h = _step(long, median)
     _check_jitter(table, long, h, threshold, options)
     return [_part(rows, stamps, h) for rows, stamps in long]
 
 
-def _unfillable(read: Array, options: ImportOptions) -> Array:
+def _unfillable(read: Array, options: ImportOptions) -> Flags:
     """Rows with a missing reading that ends the part: all of them, or with "fill" those of long gaps."""
     missing = np.isnan(read)
     if options.gaps != "fill":
@@ -136,25 +161,49 @@ def _unfillable(read: Array, options: ImportOptions) -> Array:
     return out
 
 
-def _segments(table: Table, rows: Rows, stamps: Array, bad: Array, threshold: float, median: float, driven: Array,
-              options: ImportOptions) -> list[tuple[Rows, Array]]:
+def _segments(
+    table: Table,
+    rows: Rows,
+    stamps: Array,
+    bad: Flags,
+    threshold: float,
+    median: float,
+    driven: Array,
+    options: ImportOptions,
+) -> list[tuple[Rows, Array]]:
     """Runs of good rows without a gap in time between them."""
     good = ~bad[rows]
     cut = np.zeros(len(rows), bool)  # a new part begins at this row
     for k in np.flatnonzero(np.diff(stamps) > threshold).tolist():
         lost = round(float(stamps[k + 1] - stamps[k]) / median) - 1
-        lines, times = [int(table.lines[rows[k]]), int(table.lines[rows[k + 1]])], [float(stamps[k]), float(stamps[k + 1])]
+        lines, times = (
+            [int(table.lines[rows[k]]), int(table.lines[rows[k + 1]])],
+            [float(stamps[k]), float(stamps[k + 1])],
+        )
         if options.gaps == "refuse":
-            raise InputError(f"{lost} samples are missing after this row, {times[0]:.10g} s to {times[1]:.10g} s",
-                             where=table.place(int(rows[k])), expected=f"a row every {median:.6g} s",
-                             remedy='Write gaps = "split" or gaps = "fill".')
+            raise InputError(
+                f"{lost} samples are missing after this row, {times[0]:.10g} s to {times[1]:.10g} s",
+                where=table.place(int(rows[k])),
+                expected=f"a row every {median:.6g} s",
+                remedy='Write gaps = "split" or gaps = "fill".',
+            )
         same = bool(np.array_equal(driven[rows[k]], driven[rows[k + 1]]))
         if options.gaps == "fill" and lost <= options.fill_up_to and good[k] and good[k + 1] and same:
-            table.actions.append(Action("filled", lost, f"{lost} missing rows after {times[0]:.10g} s interpolated", "", lines, times))
+            table.actions.append(
+                Action("filled", lost, f"{lost} missing rows after {times[0]:.10g} s interpolated", "", lines, times)
+            )
             continue
         why = "" if options.gaps == "split" or same else "; inputs change across it, so that it is not filled"
-        table.actions.append(Action("split", lost, f"{lost} samples missing after {times[0]:.10g} s; a new part begins{why}", "",
-                                    lines, times))
+        table.actions.append(
+            Action(
+                "split",
+                lost,
+                f"{lost} samples missing after {times[0]:.10g} s; a new part begins{why}",
+                "",
+                lines,
+                times,
+            )
+        )
         cut[k + 1] = True
     label = np.cumsum(cut | np.concatenate([[True], good[1:] != good[:-1]]))
     found = []
@@ -164,19 +213,35 @@ def _segments(table: Table, rows: Rows, stamps: Array, bad: Array, threshold: fl
     return found
 
 
-def _refuse_missing(table: Table, stop_here: Array, lacking: Array, driven: Array, read: Array,
-                    names: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
+def _refuse_missing(
+    table: Table,
+    stop_here: Flags,
+    lacking: Flags,
+    driven: Array,
+    read: Array,
+    names: tuple[tuple[str, ...], tuple[str, ...]],
+) -> None:
     wrong = np.flatnonzero(stop_here | lacking)
     if wrong.size:
         row = int(wrong[0])
         values, headers = (driven, names[0]) if stop_here[row] else (read, names[1])
         column = headers[int(np.argmax(np.isnan(values[row])))]
-        raise InputError(f"nothing was measured ({wrong.size} such rows)", where=table.place(row, column),
-                         expected="a number in every cell", remedy='Write gaps = "split" or gaps = "fill".')
+        raise InputError(
+            f"nothing was measured ({wrong.size} such rows)",
+            where=table.place(row, column),
+            expected="a number in every cell",
+            remedy='Write gaps = "split" or gaps = "fill".',
+        )
 
 
-def _say_missing(table: Table, stop_here: Array, lacking: Array, driven: Array, read: Array,
-                 names: tuple[tuple[str, ...], tuple[str, ...]]) -> None:
+def _say_missing(
+    table: Table,
+    stop_here: Flags,
+    lacking: Flags,
+    driven: Array,
+    read: Array,
+    names: tuple[tuple[str, ...], tuple[str, ...]],
+) -> None:
     """One action per column whose missing cells end a part, or are interpolated."""
     told = np.zeros(len(table.lines), bool)
     for values, headers, ends in ((driven, names[0], stop_here), (read, names[1], lacking)):
@@ -184,13 +249,27 @@ def _say_missing(table: Table, stop_here: Array, lacking: Array, driven: Array, 
             missing = np.isnan(values[:, k])
             gone, kept = missing & ends, missing & ~(stop_here | lacking)
             if gone.any():
-                table.actions.append(Action("split", int(gone.sum()), f"{int(gone.sum())} rows without a value in {header!r} "
-                                            "end the part", header, [int(x) for x in table.lines[gone][:50]],
-                                            rows=int((gone & ~told).sum())))
+                table.actions.append(
+                    Action(
+                        "split",
+                        int(gone.sum()),
+                        f"{int(gone.sum())} rows without a value in {header!r} end the part",
+                        header,
+                        [int(x) for x in table.lines[gone][:50]],
+                        rows=int((gone & ~told).sum()),
+                    )
+                )
                 told |= gone
             if kept.any():
-                table.actions.append(Action("filled", int(kept.sum()), f"{int(kept.sum())} missing readings of {header!r} "
-                                            "interpolated", header, [int(x) for x in table.lines[kept][:50]]))
+                table.actions.append(
+                    Action(
+                        "filled",
+                        int(kept.sum()),
+                        f"{int(kept.sum())} missing readings of {header!r} interpolated",
+                        header,
+                        [int(x) for x in table.lines[kept][:50]],
+                    )
+                )
 
 
 def _step(long: list[tuple[Rows, Array]], median: float) -> float:
@@ -202,7 +281,9 @@ def _step(long: list[tuple[Rows, Array]], median: float) -> float:
     return nice(h, worst / duration)
 
 
-def _check_jitter(table: Table, long: list[tuple[Rows, Array]], h: float, threshold: float, options: ImportOptions) -> None:
+def _check_jitter(
+    table: Table, long: list[tuple[Rows, Array]], h: float, threshold: float, options: ImportOptions
+) -> None:
     """Refuse steps that deviate too far; say what is resampled."""
     worst, place, above, total = 0.0, 0, 0, 0
     for rows, stamps in long:
@@ -217,10 +298,13 @@ def _check_jitter(table: Table, long: list[tuple[Rows, Array]], h: float, thresh
             worst, place = float(deviation[k]), int(rows[k])
     if above:
         suggested = min(1.0, float(np.ceil(worst * 100) / 100))
-        raise InputError(f"the time steps deviate by up to {100 * worst:.3g} % of {h:.6g} s, worst after this row ({above} of "
-                         f"{total} steps above {100 * options.jitter:.3g} %)", where=table.place(place),
-                         expected=f"steps within {100 * options.jitter:.3g} % of their median",
-                         remedy=f"Allow it with jitter = {suggested:g}; the rows are then resampled.")
+        raise InputError(
+            f"the time steps deviate by up to {100 * worst:.3g} % of {h:.6g} s, worst after this row ({above} of "
+            f"{total} steps above {100 * options.jitter:.3g} %)",
+            where=table.place(place),
+            expected=f"steps within {100 * options.jitter:.3g} % of their median",
+            remedy=f"Allow it with jitter = {suggested:g}; the rows are then resampled.",
+        )
 
 
 def _part(rows: Rows, stamps: Array, h: float) -> Part:
@@ -247,8 +331,12 @@ def say_resampled(table: Table, parts: list[Part], columns: dict[str, Array]) ->
     for name, column in columns.items():
         bend = max(_bend(part.stamps, column[part.rows]) for part in moved)
         bounds.append(f"{name} {h * h / 8.0 * bend:.2g}")
-    text = (f"time steps deviate by up to {100 * worst:.3g} %; resampled to a uniform grid of {h:.10g} s (readings and ambients "
-            "linear, inputs and currents held)" + (f"; error bound h²/8·max|T″| [K]: {', '.join(bounds[:12])}" if bounds else ""))
+    text = (
+        f"time steps deviate by up to {100 * worst:.3g} %; resampled to a uniform grid of {h:.10g} s (readings and "
+        "ambients "
+        "linear, inputs and currents held)"
+        + (f"; error bound h²/8·max|T″| [K]: {', '.join(bounds[:12])}" if bounds else "")
+    )
     n = sum(len(part.rows) for part in moved)
     table.actions.append(Action("resampled", n, text, lines=[int(table.lines[row])]))
 

@@ -95,21 +95,47 @@ class Import:
         -------
         dict
         """
-        plain = {key: getattr(self, key) for key in ("file", "sha256", "encoding", "delimiter", "decimal", "header_line",
-                                                     "skipped_lines", "time", "sample_time", "rows")}
-        return {"format": FORMAT, **plain, "parts": list(self.parts), "columns": [vars(column) for column in self.columns],
-                "actions": list(self.actions), "absent": list(self.absent)}
+        plain = {
+            key: getattr(self, key)
+            for key in (
+                "file",
+                "sha256",
+                "encoding",
+                "delimiter",
+                "decimal",
+                "header_line",
+                "skipped_lines",
+                "time",
+                "sample_time",
+                "rows",
+            )
+        }
+        return {
+            "format": FORMAT,
+            **plain,
+            "parts": list(self.parts),
+            "columns": [vars(column) for column in self.columns],
+            "actions": list(self.actions),
+            "absent": list(self.absent),
+        }
 
     def __str__(self) -> str:
         table = [_HEADS, *(_row(column) for column in self.columns)]
         widths = [max(len(row[k]) for row in table) for k in range(len(_HEADS))]
         lines = [f"{self.file}"]
-        lines += ["  " + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in table]
-        lines.append(f"  rows: {self.rows['used']} of {self.rows['file']} used, in {_parts(self.parts, self.sample_time)}")
+        lines += [
+            "  " + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+            for row in table
+        ]
+        lines.append(
+            f"  rows: {self.rows['used']} of {self.rows['file']} used, in {_parts(self.parts, self.sample_time)}"
+        )
         if self.delimiter:
             delimiter = {"\t": "tab"}.get(self.delimiter, repr(self.delimiter))
-            lines.append(f"  text: {self.encoding}, delimiter {delimiter}, decimal {self.decimal!r}, header in line "
-                         f"{self.header_line}" + (f", {self.skipped_lines} lines skipped" if self.skipped_lines else ""))
+            lines.append(
+                f"  text: {self.encoding}, delimiter {delimiter}, decimal {self.decimal!r}, header in line "
+                f"{self.header_line}" + (f", {self.skipped_lines} lines skipped" if self.skipped_lines else "")
+            )
         zone = f", zone {self.time['timezone']}" if self.time.get("timezone") else ""
         origin = f", zero is {self.time['origin']}" if self.time.get("origin") else ""
         lines.append(f"  time: {', '.join(self.time['columns']) or 'counted'} as {self.time['format']}{zone}{origin}")
@@ -122,7 +148,15 @@ class Import:
 def _row(column: ImportedColumn) -> tuple[str, ...]:
     unit = column.unit_read if column.unit_read == column.unit else f"{column.unit_read or '-'} → {column.unit or '-'}"
     span = "" if column.min is None or column.max is None else f"{column.min:.6g} … {column.max:.6g}"
-    return (column.column or "(no name)", column.name or "-", column.role, unit or "-", span, str(column.missing), str(column.glitches))
+    return (
+        column.column or "(no name)",
+        column.name or "-",
+        column.role,
+        unit or "-",
+        span,
+        str(column.missing),
+        str(column.glitches),
+    )
 
 
 def _parts(parts: Sequence[dict[str, Any]], sample_time: float) -> str:

@@ -29,12 +29,23 @@ def runs(table: Table, clock: Clock, options: ImportOptions) -> list[Rows]:
     back = np.flatnonzero(np.diff(seconds) < 0.0) + 1
     if back.size and options.restarts == "refuse":
         k = int(back[0])
-        raise InputError(f"time runs backward, from {seconds[k - 1]:.10g} s to {seconds[k]:.10g} s"
-                         + (f" ({back.size} such places)" if back.size > 1 else ""), where=table.place(k),
-                         expected="time that increases", remedy='Two runs in one file? Write restarts = "split".')
+        raise InputError(
+            f"time runs backward, from {seconds[k - 1]:.10g} s to {seconds[k]:.10g} s"
+            + (f" ({back.size} such places)" if back.size > 1 else ""),
+            where=table.place(k),
+            expected="time that increases",
+            remedy='Two runs in one file? Write restarts = "split".',
+        )
     for k in back.tolist():
-        table.actions.append(Action("split", 1, f"time jumps back to {seconds[k]:.10g} s; a new part begins",
-                                    lines=[int(table.lines[k])], times=[float(seconds[k])]))
+        table.actions.append(
+            Action(
+                "split",
+                1,
+                f"time jumps back to {seconds[k]:.10g} s; a new part begins",
+                lines=[int(table.lines[k])],
+                times=[float(seconds[k])],
+            )
+        )
     return [np.asarray(part) for part in np.split(np.arange(len(seconds)), back)]
 
 
@@ -66,24 +77,51 @@ def single(table: Table, clock: Clock, rows: Rows, values: Array, options: Impor
     counted = _counted(seconds, steps)
     if counted is not None:
         h, unit = counted
-        table.actions.append(Action("counted", len(rows), f"time stamps are rounded to {unit:g} s; rows were counted on a uniform "
-                                    f"grid of {h:.10g} s", lines=[int(table.lines[rows[0]])]))
+        table.actions.append(
+            Action(
+                "counted",
+                len(rows),
+                f"time stamps are rounded to {unit:g} s; rows were counted on a uniform grid of {h:.10g} s",
+                lines=[int(table.lines[rows[0]])],
+            )
+        )
         return rows, seconds[0] + h * np.arange(len(rows))
     again = np.flatnonzero(steps == 0.0) + 1
     if not again.size:
         return rows, None
+    h = float(seconds[-1] - seconds[0]) / len(steps)
+    if options.jitter >= 1.0 and np.abs(seconds - seconds[0] - h * np.arange(len(rows))).max() <= (1.0 + _SLACK) * h:
+        h = nice(h, 1.0 / len(steps))
+        table.actions.append(
+            Action(
+                "counted",
+                len(rows),
+                f"time stamps repeat (rounded in the file); rows were counted on a uniform grid of {h:.10g} s",
+                lines=[int(table.lines[rows[again[0]]])],
+            )
+        )
+        return rows, seconds[0] + h * np.arange(len(rows))
     equal = np.array([_same(values[rows[k]], values[rows[k - 1]]) for k in again.tolist()])
     other = again[~equal]
     if other.size and options.duplicates == "refuse":
         k = int(other[0])
-        raise InputError(f"time {seconds[k]:.10g} s stands twice, with other values ({other.size} such rows)",
-                         where=table.place(int(rows[k])), expected="one row per time",
-                         remedy='Write duplicates = "first", "last" or "mean".')
+        raise InputError(
+            f"time {seconds[k]:.10g} s stands twice, with other values ({other.size} such rows)",
+            where=table.place(int(rows[k])),
+            expected="one row per time",
+            remedy='Write duplicates = "first", "last" or "mean".',
+        )
     lost = _lost(seconds, again, values, rows, options.duplicates)
-    table.actions.append(Action("duplicates", len(lost), f"{len(lost)} repeated rows dropped"
-                                + (f" ({options.duplicates} kept)" if other.size else " (identical)"),
-                                lines=[int(table.lines[rows[k]]) for k in lost[:50]],
-                                times=[float(seconds[k]) for k in lost[:50]], rows=len(lost)))
+    table.actions.append(
+        Action(
+            "duplicates",
+            len(lost),
+            f"{len(lost)} repeated rows dropped" + (f" ({options.duplicates} kept)" if other.size else " (identical)"),
+            lines=[int(table.lines[rows[k]]) for k in lost[:50]],
+            times=[float(seconds[k]) for k in lost[:50]],
+            rows=len(lost),
+        )
+    )
     keep = np.ones(len(rows), bool)
     keep[lost] = False
     return rows[keep], None

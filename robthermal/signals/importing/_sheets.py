@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError
+from ._frames import plain_column
 from ._options import ImportOptions
 from ._table import Action, Table
-from ._frames import plain_column
 from ._tokens import is_missing, is_value, short
 from ._units import unit_of
 
@@ -43,21 +43,31 @@ def read_workbook(path: Path, options: ImportOptions) -> Table:
     try:
         book = pd.ExcelFile(io.BytesIO(content), engine=engine)
     except ImportError:
-        raise InputError("workbooks need a package that is not installed", where=str(path),
-                         remedy="Install it with: pip install 'robthermal[excel]'") from None
+        raise InputError(
+            "workbooks need a package that is not installed",
+            where=str(path),
+            remedy="Install it with: pip install 'robthermal[excel]'",
+        ) from None
     except Exception as error:  # openpyxl and odfpy raise many kinds for damaged archives
         raise InputError(f"this is no workbook, or a damaged one ({short(error, 80)})", where=str(path)) from None
     names = [options.sheet] if options.sheet is not None else list(map(str, book.sheet_names))
     if options.sheet is not None and options.sheet not in book.sheet_names:
-        raise InputError(f"there is no sheet {options.sheet!r}", where=str(path),
-                         expected="one of " + ", ".join(map(repr, map(str, book.sheet_names[:10]))))
+        raise InputError(
+            f"there is no sheet {options.sheet!r}",
+            where=str(path),
+            expected="one of " + ", ".join(map(repr, map(str, book.sheet_names[:10]))),
+        )
     for name in names:
         cells = book.parse(name, header=None, dtype=object, keep_default_na=False, na_values=[])
         header = _header(cells, options)
         if header is not None:
             return _table(cells, header, path, name, hashlib.sha256(content).hexdigest(), options)
-    raise InputError("no sheet has a header row with rows of numbers below it", where=str(path),
-                     expected="column names, then a row per sample", remedy='Write sheet = "NAME" and header_line = N.')
+    raise InputError(
+        "no sheet has a header row with rows of numbers below it",
+        where=str(path),
+        expected="column names, then a row per sample",
+        remedy='Write sheet = "NAME" and header_line = N.',
+    )
 
 
 def _check_size(content: bytes, path: Path) -> None:
@@ -67,8 +77,12 @@ def _check_size(content: bytes, path: Path) -> None:
     except zipfile.BadZipFile:
         raise InputError("this is no workbook, or a damaged one", where=str(path)) from None
     if unpacked > _MOST_UNPACKED:
-        raise InputError(f"the workbook unpacks to {unpacked / 1e6:.0f} MB", where=str(path),
-                         expected=f"at most {_MOST_UNPACKED / 1e6:.0f} MB", remedy="Export the sheet as CSV.")
+        raise InputError(
+            f"the workbook unpacks to {unpacked / 1e6:.0f} MB",
+            where=str(path),
+            expected=f"at most {_MOST_UNPACKED / 1e6:.0f} MB",
+            remedy="Export the sheet as CSV.",
+        )
 
 
 def _header(cells: pd.DataFrame, options: ImportOptions) -> int | None:
@@ -77,10 +91,16 @@ def _header(cells: pd.DataFrame, options: ImportOptions) -> int | None:
         return options.header_line - 1 if options.header_line <= len(cells) else None
     for k in range(min(len(cells) - 1, _SEARCHED)):
         names = [cell for cell in cells.iloc[k] if not _empty(cell)]
-        if len(names) < 2 or not all(isinstance(cell, str) for cell in names) or sum(map(is_value, names)) * 2 >= len(names):
+        if (
+            len(names) < 2
+            or not all(isinstance(cell, str) for cell in names)
+            or sum(map(is_value, names)) * 2 >= len(names)
+        ):
             continue
         start = k + 2 if _units_row(cells, k + 1) else k + 1
-        rows = [[cell for cell in cells.iloc[j] if not _empty(cell)] for j in range(start, min(start + _ROWS, len(cells)))]
+        rows = [
+            [cell for cell in cells.iloc[j] if not _empty(cell)] for j in range(start, min(start + _ROWS, len(cells)))
+        ]
         if rows and all(row and 2 * sum(_is_value(cell) for cell in row) >= len(row) for row in rows):
             return k
     return None
@@ -106,14 +126,32 @@ def _table(cells: pd.DataFrame, header: int, path: Path, sheet: str, digest: str
     kept = ~body.map(_empty).all(axis=1).to_numpy()
     body = body[kept]
     if header:
-        actions.insert(0, Action("skipped", header, f"{header} rows before the header skipped", lines=list(range(1, header + 1))))
-    columns: list[Any] = [plain_column(body.iloc[:, k].map(lambda cell: None if _empty(cell) else cell)) for k in range(len(names))]
-    return Table(f"{path} [{sheet}]", names, columns, np.flatnonzero(kept) + start + 1, units, actions,
-                 {"sha256": digest, "header_line": header + 1, "skipped_lines": header, "rows": int(kept.sum())})
+        actions.insert(
+            0, Action("skipped", header, f"{header} rows before the header skipped", lines=list(range(1, header + 1)))
+        )
+    columns: list[Any] = [
+        plain_column(body.iloc[:, k].map(lambda cell: None if _empty(cell) else cell)) for k in range(len(names))
+    ]
+    return Table(
+        f"{path} [{sheet}]",
+        names,
+        columns,
+        np.flatnonzero(kept) + start + 1,
+        units,
+        actions,
+        {"sha256": digest, "header_line": header + 1, "skipped_lines": header, "rows": int(kept.sum())},
+    )
 
 
 def _empty(cell: Any) -> bool:
-    return cell is None or cell is pd.NaT or isinstance(cell, float) and cell != cell or isinstance(cell, str) and is_missing(cell)
+    return (
+        cell is None
+        or cell is pd.NaT
+        or isinstance(cell, float)
+        and cell != cell
+        or isinstance(cell, str)
+        and is_missing(cell)
+    )
 
 
 def _is_value(cell: Any) -> bool:

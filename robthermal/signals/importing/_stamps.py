@@ -22,7 +22,9 @@ _EPOCH_S, _EPOCH_MS = (1e9, 2e9), (1e12, 2e12)
 _ISO = re.compile(r"\d{4}-\d{1,2}-\d{1,2}([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?)?\s*(Z|[+-]\d{2}:?\d{2})?")
 _YMD = re.compile(r"\d{4}/\d{1,2}/\d{1,2}( \d{1,2}:\d{2}(:\d{2}(\.\d+)?)?)?")
 _DOTS = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}|\d{2})([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?)?")
-_SLASH = re.compile(r"(\d{1,2})([/-])(\d{1,2})\2(\d{4}|\d{2})([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)?")
+_SLASH = re.compile(
+    r"(\d{1,2})([/-])(\d{1,2})\2(\d{4}|\d{2})([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)?"
+)
 _CLOCK = re.compile(r"\d{1,5}:\d{2}(:\d{2}([.,]\d+)?)?")
 _DURATION = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([a-zA-Z]+)")
 _NUMERIC = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
@@ -92,16 +94,25 @@ def _numbers(table: Table, header: str, cells: Array, unit: str | None, options:
     found = _time_unit(table, header, unit)
     epoch = declared if declared in ("epoch_s", "epoch_ms") else None
     if epoch is None and declared is None and found is None and len(cells) > 1:
-        epoch = next((name for name, (low, high) in (("epoch_s", _EPOCH_S), ("epoch_ms", _EPOCH_MS))
-                      if low <= cells.min() and cells.max() <= high), None)
+        epoch = next(
+            (
+                name
+                for name, (low, high) in (("epoch_s", _EPOCH_S), ("epoch_ms", _EPOCH_MS))
+                if low <= cells.min() and cells.max() <= high
+            ),
+            None,
+        )
     if epoch is not None:
         scale = 1.0 if epoch == "epoch_s" else 1e-3
         start = float(cells[0])
         origin = pd.Timestamp(round(start * scale * 1e9), tz="UTC").isoformat()
         return Clock((cells - start) * scale, origin, epoch, 0.0)
     if declared is not None:
-        raise InputError(f"holds numbers and time_format is {declared!r}", where=f"{table.where}, column {header!r}",
-                         expected='a format of numbers: "s", "ms", "min", "h", "epoch_s", "epoch_ms" or "excel"')
+        raise InputError(
+            f"holds numbers and time_format is {declared!r}",
+            where=f"{table.where}, column {header!r}",
+            expected='a format of numbers: "s", "ms", "min", "h", "epoch_s", "epoch_ms" or "excel"',
+        )
     return Clock(cells if found is None else found.to_si(cells), None, found.name if found else "s", 0.0)
 
 
@@ -110,8 +121,12 @@ def _time_unit(table: Table, header: str, unit: str | None) -> Unit | None:
         return None
     found = unit_of(unit)
     if found is None or found.quantity != "time":
-        raise InputError(f"the time column {header!r} is in {short(unit)}", where=table.where,
-                         expected="s, ms, min or h", remedy='Declare what it is, for example time_format = "ms".')
+        raise InputError(
+            f"the time column {header!r} is in {short(unit)}",
+            where=table.where,
+            expected="s, ms, min or h",
+            remedy='Declare what it is, for example time_format = "ms".',
+        )
     return found
 
 
@@ -145,8 +160,8 @@ def _parsed(text: pd.Series[Any], pattern: str) -> pd.DatetimeIndex:
     """Dates of texts; not-a-time where one does not fit the pattern."""
     if pattern == "iso":
         cleaned = text.str.replace(",", ".", regex=False)
-        zoned = bool(text.str.contains(r"(?:Z|[+-]\d{2}:?\d{2})$", regex=True).any()
-                     and _ISO.fullmatch(text.iloc[0]) and _ISO.fullmatch(text.iloc[0])[4])  # type: ignore[index]
+        first = _ISO.fullmatch(text.iloc[0])
+        zoned = first is not None and first[4] is not None
         return pd.DatetimeIndex(pd.to_datetime(cleaned, format="ISO8601", errors="coerce", utc=zoned))
     if "%S.%f" in pattern:
         text = text.str.replace(r"(\d)[.,](\d+)(\s*[AaPp][Mm])?$", r"\1.\2\3", regex=True)
@@ -175,11 +190,18 @@ def _pattern(table: Table, header: str, text: pd.Series[Any]) -> str:
         options = [f"%d{sign}%m{sign}{year}{rest}", f"%m{sign}%d{sign}{year}{rest}"]
         if day_first != month_first:
             return options[0] if day_first else options[1]
-        raise InputError(f"{short(first)} can be day/month or month/day, and no day above 12 tells", where=table.place(0, header),
-                         expected="a declared order", remedy=f'Write time_format = "{options[0]}"  or  "{options[1]}".')
-    raise InputError(f"{short(first)} is no time that is known", where=table.place(0, header),
-                     expected="ISO 8601, dd.mm.yyyy hh:mm:ss, h:mm:ss, or numbers",
-                     remedy='Declare it, for example time_format = "%d-%b-%Y %H:%M:%S".')
+        raise InputError(
+            f"{short(first)} can be day/month or month/day, and no day above 12 tells",
+            where=table.place(0, header),
+            expected="a declared order",
+            remedy=f'Write time_format = "{options[0]}"  or  "{options[1]}".',
+        )
+    raise InputError(
+        f"{short(first)} is no time that is known",
+        where=table.place(0, header),
+        expected="ISO 8601, dd.mm.yyyy hh:mm:ss, h:mm:ss, or numbers",
+        remedy='Declare it, for example time_format = "%d-%b-%Y %H:%M:%S".',
+    )
 
 
 def _year(text: str) -> str:
@@ -204,8 +226,15 @@ def _clock_times(table: Table, header: str, text: pd.Series[Any], name: str) -> 
     seconds = (3600.0 * numbers[0] + 60.0 * numbers[1] + numbers[2]).to_numpy(float)
     wraps = np.diff(seconds, prepend=seconds[0]) < -0.5 * _DAY
     if wraps.any():
-        table.actions.append(Action("counted", int(wraps.sum()), "the time of day passes midnight; days are counted on",
-                                    header, [int(k) for k in table.lines[wraps][:50]]))
+        table.actions.append(
+            Action(
+                "counted",
+                int(wraps.sum()),
+                "the time of day passes midnight; days are counted on",
+                header,
+                [int(k) for k in table.lines[wraps][:50]],
+            )
+        )
         seconds = seconds + _DAY * np.cumsum(wraps)
     fraction = bool(text.str.contains("[.,]", regex=True).any())
     return Clock(seconds, None, name, 0.0 if fraction else 1.0)
@@ -221,8 +250,9 @@ def _durations(table: Table, header: str, text: pd.Series[Any]) -> Clock:
     return Clock(seconds, None, "duration", 0.0)
 
 
-def _dated(table: Table, header: str, stamps: pd.DatetimeIndex, name: str, options: ImportOptions,
-           fraction: bool = True) -> Clock:
+def _dated(
+    table: Table, header: str, stamps: pd.DatetimeIndex, name: str, options: ImportOptions, fraction: bool = True
+) -> Clock:
     """Dates as seconds since the first one."""
     _all_there(table, header, np.asarray(stamps.isna()))
     if stamps.tz is None and options.timezone is not None:
@@ -248,8 +278,12 @@ def _localized(table: Table, header: str, stamps: pd.DatetimeIndex, zone: str) -
         try:
             found = stamps.tz_localize(key, ambiguous=np.full(len(stamps), summer))
         except Exception as error:  # an hour that does not exist in this zone
-            raise InputError(f"the stamps do not fit the zone {zone}: {short(error, 80)}", where=f"{table.where}, column {header!r}",
-                             expected="stamps that exist in this zone", remedy="Correct timezone.") from None
+            raise InputError(
+                f"the stamps do not fit the zone {zone}: {short(error, 80)}",
+                where=f"{table.where}, column {header!r}",
+                expected="stamps that exist in this zone",
+                remedy="Correct timezone.",
+            ) from None
         if found.is_monotonic_increasing or not summer:
             return found
     return found
@@ -269,16 +303,23 @@ def _refuse_clock_change(table: Table, header: str, stamps: pd.DatetimeIndex) ->
     for found, what in ((back, "goes back by one hour"), (missing, "lacks exactly one hour")):
         if found.size:
             row = int(found[0]) + 1
-            raise InputError(f"the time {what} (from {stamps[row - 1]} to {stamps[row]})", where=table.place(row, header),
-                             expected="a declared zone: this looks like a change to or from summer time",
-                             remedy='Write timezone = "Europe/Berlin" (yours), or "UTC" if the clock did not change.')
+            raise InputError(
+                f"the time {what} (from {stamps[row - 1]} to {stamps[row]})",
+                where=table.place(row, header),
+                expected="a declared zone: this looks like a change to or from summer time",
+                remedy='Write timezone = "Europe/Berlin" (yours), or "UTC" if the clock did not change.',
+            )
 
 
 def _all_there(table: Table, header: str, gone: NDArray[np.bool_]) -> None:
     if gone.any():
         row = int(np.argmax(gone))
-        raise InputError(f"is empty or no time ({int(gone.sum())} of {len(gone)} rows)", where=table.place(row, header),
-                         expected="a time in every row", remedy="Repair or remove the line.")
+        raise InputError(
+            f"is empty or no time ({int(gone.sum())} of {len(gone)} rows)",
+            where=table.place(row, header),
+            expected="a time in every row",
+            remedy="Repair or remove the line.",
+        )
 
 
 def _refuse_first(table: Table, header: str, text: pd.Series[Any], wrong: Any, expected: str) -> None:
@@ -286,5 +327,9 @@ def _refuse_first(table: Table, header: str, text: pd.Series[Any], wrong: Any, e
     if wrong.any():
         row = int(np.argmax(wrong))
         more = f" ({int(wrong.sum())} such rows)" if wrong.sum() > 1 else ""
-        raise InputError(f"{short(text.iloc[row])} is no such time{more}", where=table.place(row, header), expected=expected,
-                         remedy="Correct time_format, or the line.")
+        raise InputError(
+            f"{short(text.iloc[row])} is no such time{more}",
+            where=table.place(row, header),
+            expected=expected,
+            remedy="Correct time_format, or the line.",
+        )

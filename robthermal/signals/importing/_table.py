@@ -44,8 +44,15 @@ class Action:
 
     def to_dict(self) -> dict[str, Any]:
         """As in a report."""
-        return {"what": self.what, "n": self.n, "column": self.column, "lines": self.lines[:50],
-                "times": self.times[:50], "text": self.text, "rows": self.rows}
+        return {
+            "what": self.what,
+            "n": self.n,
+            "column": self.column,
+            "lines": self.lines[:50],
+            "times": self.times[:50],
+            "text": self.text,
+            "rows": self.rows,
+        }
 
 
 @dataclass

@@ -22,6 +22,8 @@ from ._tokens import DECIMAL_COMMA, NUMBER, THOUSANDS, is_missing, na_values, sh
 _HEAD = 400_000  # characters in which the header is searched
 _LONGEST = 64 * 1024  # characters of a line
 _BLOCK = 16_000_000  # characters parsed at once
+# Before version 3 the parser rounds the last digit unless it is told not to; since then it is exact and says so.
+_EXACT: dict[str, Any] = {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
 @dataclass
@@ -48,12 +50,19 @@ def read_text(path: Path, options: ImportOptions) -> Table:
     InputError
         Binary files, no header, ragged rows, text in a column of numbers is left to the columns that are used.
     """
-    content = path.read_bytes()
+    with path.open("rb") as file:
+        head = file.read(_LONGEST)
+        if len(head) == _LONGEST and b"\n" not in head and b"\r" not in head and b"\0" not in head:
+            raise InputError(
+                f"the first line is longer than {_LONGEST // 1024} KiB",
+                where=str(path),
+                expected="a text file with a header row and one row per sample",
+            )
+        content = head + file.read()
     digest = hashlib.sha256(content).hexdigest()
     where = str(path)
     decoded = decode(content, where, options.encoding)
     del content
-    _check_lines(decoded.text, where)
     layout = find_layout(decoded.text[:_HEAD].split("\n"), options, where)
     left, columns, lines = _Left(), _Columns(layout, options), []
     for text, numbers in _blocks(decoded.text, layout, left, where):
@@ -61,18 +70,24 @@ def read_text(path: Path, options: ImportOptions) -> Table:
         lines.append(numbers)
     if not lines:
         raise InputError("the file has a header and no data rows", where=where, expected="a row per sample")
-    table = Table(where, layout.headers, columns.joined(), np.concatenate(lines), layout.units,
-                  _actions(decoded, layout, left),
-                  {"sha256": digest, "encoding": decoded.encoding, "delimiter": layout.delimiter, "decimal": layout.decimal,
-                   "header_line": layout.header_line, "skipped_lines": len(layout.skipped),
-                   "rows": sum(map(len, lines)) + len(left.incomplete)})
+    table = Table(
+        where,
+        layout.headers,
+        columns.joined(),
+        np.concatenate(lines),
+        layout.units,
+        _actions(decoded, layout, left),
+        {
+            "sha256": digest,
+            "encoding": decoded.encoding,
+            "delimiter": layout.delimiter,
+            "decimal": layout.decimal,
+            "header_line": layout.header_line,
+            "skipped_lines": len(layout.skipped),
+            "rows": sum(map(len, lines)) + len(left.incomplete),
+        },
+    )
     return table
-
-
-def _check_lines(text: str, where: str) -> None:
-    if len(text) > _LONGEST and "\n" not in text[:_LONGEST]:
-        raise InputError(f"the first line is longer than {_LONGEST // 1024} KiB", where=where,
-                         expected="a text file with a header row and one row per sample")
 
 
 def _blocks(text: str, layout: Layout, left: _Left, where: str) -> Iterator[tuple[str, Any]]:
@@ -96,8 +111,9 @@ def _blocks(text: str, layout: Layout, left: _Left, where: str) -> Iterator[tupl
         start = stop
 
 
-def _rows(part: str, rows: list[str], first: int, layout: Layout, left: _Left, where: str, *,
-          last: bool) -> tuple[list[str], Any]:
+def _rows(
+    part: str, rows: list[str], first: int, layout: Layout, left: _Left, where: str, *, last: bool
+) -> tuple[list[str], Any]:
     """The lines that are rows, and their numbers; ragged ones are refused. Most files have no other lines: be quick."""
     d, expected = layout.delimiter, len(layout.headers) - 1
     quoted = '"' in part
@@ -115,7 +131,7 @@ def _rows(part: str, rows: list[str], first: int, layout: Layout, left: _Left, w
             continue
         if not is_content(rows[k]) or [cell for cell in cells_of(rows[k], d)] == list(layout.headers):
             (left.repeated if is_content(rows[k]) else left.blank).append(first + k)
-        elif last and counts[k] < expected and not any(is_content(row) for row in rows[k + 1:]):
+        elif last and counts[k] < expected and not any(is_content(row) for row in rows[k + 1 :]):
             left.incomplete.append(first + k)
         else:
             raise _ragged(rows[k], first + k, int(counts[k]) + 1, layout, where)
@@ -133,8 +149,14 @@ def _header_text(rows: list[str], layout: Layout) -> str:
     first = layout.headers[0]
     if not first or NUMBER.fullmatch(first):
         return ""
-    return next((row for row in rows if row.lstrip('" \t').startswith(first)
-                 and cells_of(row, layout.delimiter) == list(layout.headers)), "")
+    return next(
+        (
+            row
+            for row in rows
+            if row.lstrip('" \t').startswith(first) and cells_of(row, layout.delimiter) == list(layout.headers)
+        ),
+        "",
+    )
 
 
 def _ragged(line: str, number: int, count: int, layout: Layout, where: str) -> InputError:
@@ -142,8 +164,12 @@ def _ragged(line: str, number: int, count: int, layout: Layout, where: str) -> I
     remedy = "Repair or remove the line."
     if layout.delimiter == "," and count in (2 * n, 2 * n - 1):
         remedy = 'Decimal commas between commas? Export with ";" between the cells, or with decimal points.'
-    return InputError(f"the row has {count} cells and the header has {n}: {short(line)}", where=f"{where}, line {number}",
-                      expected="as many cells as the header", remedy=remedy)
+    return InputError(
+        f"the row has {count} cells and the header has {n}: {short(line)}",
+        where=f"{where}, line {number}",
+        expected="as many cells as the header",
+        remedy=remedy,
+    )
 
 
 class _Columns:
@@ -157,13 +183,28 @@ class _Columns:
     def add(self, text: str, numbers: Any, where: str) -> None:
         layout = self._layout
         try:
-            frame = pd.read_csv(io.StringIO(text), sep=layout.delimiter, header=None, names=range(len(layout.headers)),
-                                decimal=layout.decimal, thousands=layout.thousands, na_values=self._missing,
-                                keep_default_na=False, skipinitialspace=True, engine="c", float_precision="round_trip",
-                                low_memory=False, index_col=False, skip_blank_lines=False)
+            frame = pd.read_csv(
+                io.StringIO(text),
+                sep=layout.delimiter,
+                header=None,
+                names=range(len(layout.headers)),
+                decimal=layout.decimal,
+                thousands=layout.thousands,
+                na_values=self._missing,
+                keep_default_na=False,
+                skipinitialspace=True,
+                engine="c",
+                low_memory=False,
+                **_EXACT,
+                index_col=False,
+                skip_blank_lines=False,
+            )
         except (pd.errors.ParserError, ValueError) as error:
-            raise InputError(f"the rows cannot be read: {short(error, 120)}", where=f"{where}, line {numbers[0]}",
-                             expected="one row per line") from None
+            raise InputError(
+                f"the rows cannot be read: {short(error, 120)}",
+                where=f"{where}, line {numbers[0]}",
+                expected="one row per line",
+            ) from None
         for k, part in enumerate(self._parts):
             part.append(_plain(frame[k], layout))
 
@@ -192,8 +233,13 @@ def _plain(column: pd.Series[Any], layout: Layout) -> Any:
     for k, cell in enumerate(text):
         if cell is None or is_missing(cell):
             continue
-        if layout.decimal == "." and DECIMAL_COMMA.fullmatch(cell) or layout.decimal == "," and "." in cell or (
-                THOUSANDS.fullmatch(cell)):
+        if (
+            layout.decimal == "."
+            and DECIMAL_COMMA.fullmatch(cell)
+            or layout.decimal == ","
+            and "." in cell
+            or (THOUSANDS.fullmatch(cell))
+        ):
             return np.array([np.nan if c is None else c for c in text], object)
         numbers[k] = float(cell.replace(layout.decimal, "."))
     return numbers
@@ -208,19 +254,44 @@ def _actions(decoded: Decoded, layout: Layout, left: _Left) -> list[Action]:
     if decoded.assumed:
         found.append(Action("decoded", 1, f"not UTF-8; read as {decoded.encoding}, which all its letters fit"))
     if layout.skipped:
-        found.append(Action("skipped", len(layout.skipped), f"{_count(len(layout.skipped), 'line')} before the header skipped",
-                            lines=list(layout.skipped)))
+        found.append(
+            Action(
+                "skipped",
+                len(layout.skipped),
+                f"{_count(len(layout.skipped), 'line')} before the header skipped",
+                lines=list(layout.skipped),
+            )
+        )
     if layout.units_line:
         found.append(Action("units_row", 1, f"line {layout.units_line} holds the units", lines=[layout.units_line]))
     if left.blank:
-        found.append(Action("skipped", len(left.blank), f"{_count(len(left.blank), 'blank or comment line')} skipped",
-                            lines=left.blank[:50]))
+        found.append(
+            Action(
+                "skipped",
+                len(left.blank),
+                f"{_count(len(left.blank), 'blank or comment line')} skipped",
+                lines=left.blank[:50],
+            )
+        )
     if left.repeated:
-        found.append(Action("skipped", len(left.repeated), f"the header is repeated {_count(len(left.repeated), 'time')}; skipped",
-                            lines=left.repeated[:50]))
+        found.append(
+            Action(
+                "skipped",
+                len(left.repeated),
+                f"the header is repeated {_count(len(left.repeated), 'time')}; skipped",
+                lines=left.repeated[:50],
+            )
+        )
     if left.incomplete:
-        found.append(Action("dropped_row", len(left.incomplete), f"the last row, line {left.incomplete[0]}, is incomplete; dropped",
-                            lines=left.incomplete, rows=len(left.incomplete)))
+        found.append(
+            Action(
+                "dropped_row",
+                len(left.incomplete),
+                f"the last row, line {left.incomplete[0]}, is incomplete; dropped",
+                lines=left.incomplete,
+                rows=len(left.incomplete),
+            )
+        )
     return found
 
 

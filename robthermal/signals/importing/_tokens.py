@@ -4,16 +4,53 @@ from __future__ import annotations
 
 import re
 
-MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "#div/0!", "#value!", "#ref!", "#num!", "#name?", "null", "none", "<na>",
-           "ol", "over", "overload", "err", "error", "fault", "open", "short", "---", "--", "-", "inf", "-inf", "+inf",
-           "infinity", "-infinity", "1.#inf", "1.#ind", "-1.#ind", "1.#qnan")
+MISSING = (
+    "",
+    "nan",
+    "-nan",
+    "na",
+    "n/a",
+    "#n/a",
+    "#div/0!",
+    "#value!",
+    "#ref!",
+    "#num!",
+    "#name?",
+    "null",
+    "none",
+    "<na>",
+    "ol",
+    "over",
+    "overload",
+    "err",
+    "error",
+    "fault",
+    "open",
+    "short",
+    "---",
+    "--",
+    "-",
+    "inf",
+    "-inf",
+    "+inf",
+    "infinity",
+    "-infinity",
+    "1.#inf",
+    "1.#ind",
+    "-1.#ind",
+    "1.#qnan",
+)
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 DECIMAL_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(([.]\d{3})+,\d+|(,\d{3})+[.]\d+)")
-STAMP = re.compile(r"(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)?"
-                   r"|\d{1,4}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)(\s*(Z|[+-]\d{2}:?\d{2}))?")
-DURATION = re.compile(r"[+-]?\d+([.,]\d+)?\s*(s|sec|secs|second|seconds|ms|min|mins|minute|minutes|h|hr|hrs|hour|hours)")
+STAMP = re.compile(
+    r"(\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T ]\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)?"
+    r"|\d{1,4}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp][Mm])?)(\s*(Z|[+-]\d{2}:?\d{2}))?"
+)
+DURATION = re.compile(
+    r"[+-]?\d+([.,]\d+)?\s*(s|sec|secs|second|seconds|ms|min|mins|minute|minutes|h|hr|hrs|hour|hours)"
+)
 
 
 def is_missing(cell: str) -> bool:
@@ -24,7 +61,9 @@ def is_missing(cell: str) -> bool:
 def is_value(cell: str) -> bool:
     """Whether a cell is a number, a time stamp or a duration."""
     text = cell.strip()
-    return bool(NUMBER.fullmatch(text) or STAMP.fullmatch(text) or DURATION.fullmatch(text) or THOUSANDS.fullmatch(text))
+    return bool(
+        NUMBER.fullmatch(text) or STAMP.fullmatch(text) or DURATION.fullmatch(text) or THOUSANDS.fullmatch(text)
+    )
 
 
 def short(text: object, most: int = 40) -> str:

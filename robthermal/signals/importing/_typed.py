@@ -17,6 +17,7 @@ from ._frames import frame_table
 from ._options import ImportOptions
 from ._table import Table
 from ._tokens import short
+from ._units import split_header
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -58,8 +59,12 @@ def read_mat(path: Path, options: ImportOptions, max_bytes: float | None) -> Tab
     """
     content = path.read_bytes()
     if content.startswith(b"MATLAB 7.3") or _HDF5 in content[:520]:
-        raise InputError("the file has the MATLAB format 7.3 (HDF5)", where=f"{path}", expected="format 4 to 7",
-                         remedy="Save it in MATLAB with save(..., '-v7').")
+        raise InputError(
+            "the file has the MATLAB format 7.3 (HDF5)",
+            where=f"{path}",
+            expected="format 4 to 7",
+            remedy="Save it in MATLAB with save(..., '-v7').",
+        )
     try:
         variables = read_matlab(content, memory_limit(max_bytes))
     except ValueError as error:
@@ -68,27 +73,43 @@ def read_mat(path: Path, options: ImportOptions, max_bytes: float | None) -> Tab
         refuse_large(path, np.inf, "bytes unpacked", max_bytes)
         raise
     found = _variables(variables, options, path)
-    columns = {name: _vector(name, value, path) for name, value in found.items() if _is_vector(value)}
+    columns = {name: _vector(value) for name, value in found.items() if _is_vector(value)}
+    left_out = {name: f"a {kind_of(value)}" for name, value in found.items() if name not in columns}
     if not columns:
         listed = ", ".join(f"{name} ({kind_of(value)})" for name, value in list(found.items())[:8])
-        raise InputError(f"there are no numeric vectors in it: {listed or 'nothing that can be read'}", where=f"{path}",
-                         expected="variables of one length, or a struct of them",
-                         remedy="Timetables, tables and timeseries are opaque outside MATLAB: writetimetable(tt, 'run.csv'), "
-                                "or save a struct made with table2struct(..., 'ToScalar', true).")
-    lengths = {name: len(column) for name, column in columns.items()}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name!r}: {n}" for name, n in list(lengths.items())[:8])
-        raise InputError(f"the variables differ in length ({told})", where=f"{path}", expected="one value per time",
-                         remedy='Name a struct with variable = "…", or save only the columns.')
-    return _with_hash(frame_table(pd.DataFrame(columns), f"{path}"), path)
+        raise InputError(
+            f"there are no numeric vectors in it: {listed or 'nothing that can be read'}",
+            where=f"{path}",
+            expected="variables of one length, or a struct of them",
+            remedy="Timetables, tables and timeseries are opaque outside MATLAB: writetimetable(tt, 'run.csv'), "
+            "or save a struct made with table2struct(..., 'ToScalar', true).",
+        )
+    return _with_hash(_equally_long(columns, left_out, path), path)
+
+
+def _equally_long(columns: dict[str, Any], left_out: dict[str, str], path: Path) -> Table:
+    """Table of the columns as long as the time, else as most of them; the others are remembered as left out."""
+    clock = next((name for name in columns if split_header(name)[0].lower() in ("time", "t")), None)
+    lengths = [len(column) for column in columns.values()]
+    n = len(columns[clock]) if clock is not None else max(set(lengths), key=lengths.count)
+    left_out |= {
+        name: f"of length {len(column)}, the time of length {n}" for name, column in columns.items() if len(column) != n
+    }
+    table = frame_table(pd.DataFrame({name: column for name, column in columns.items() if len(column) == n}), f"{path}")
+    table.facts["left_out"] = left_out
+    return table
 
 
 def _variables(variables: dict[str, Value], options: ImportOptions, path: Path) -> dict[str, Value]:
     if options.variable is not None:
         value = variables.get(options.variable)
         if not isinstance(value, dict):
-            raise InputError(f"variable = {options.variable!r}: " + ("there is none" if value is None else f"it is a {kind_of(value)}"),
-                             where=f"{path}", expected="a scalar struct: " + ", ".join(list(variables)[:10]))
+            raise InputError(
+                f"variable = {options.variable!r}: "
+                + ("there is none" if value is None else f"it is a {kind_of(value)}"),
+                where=f"{path}",
+                expected="a scalar struct: " + ", ".join(list(variables)[:10]),
+            )
         return value
     structs = [value for value in variables.values() if isinstance(value, dict)]
     if any(name.lower() in ("time", "t") for name in variables) or len(structs) != 1:
@@ -100,7 +121,7 @@ def _is_vector(value: Value) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.ndim == 2 and 1 in value.shape
 
 
-def _vector(name: str, value: Any, path: Path) -> Any:
+def _vector(value: Any) -> Any:
     return np.asarray(value.reshape(-1), float)
 
 
@@ -117,8 +138,8 @@ def read_tdms(path: Path, max_bytes: float | None) -> Table:
     from .._tdms import TdmsSource  # heavy, only for such files
 
     source = TdmsSource(path, max_bytes)
-    columns = source.read(source.headers)
-    table = frame_table(pd.DataFrame(columns), f"{path}")
+    columns, left_out = source.everything()
+    table = _equally_long(columns, left_out, path)
     if source.origin is not None:
         table.facts["origin"] = source.origin
     return _with_hash(table, path)

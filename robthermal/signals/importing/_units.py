@@ -42,14 +42,22 @@ class Unit:
 
 def _known() -> dict[str, Unit]:
     table = {
-        "s": ("time", 1.0, "s sec secs second seconds sek"), "ms": ("time", 1e-3, "ms msec millisecond milliseconds"),
-        "min": ("time", 60.0, "min mins minute minutes"), "h": ("time", 3600.0, "h hr hrs hour hours"),
-        "A": ("current", 1.0, "A amp amps ampere"), "mA": ("current", 1e-3, "mA"),
-        "V": ("voltage", 1.0, "V volt volts"), "mV": ("voltage", 1e-3, "mV"),
-        "W": ("power", 1.0, "W watt watts"), "mW": ("power", 1e-3, "mW"), "kW": ("power", 1e3, "kW"),
+        "s": ("time", 1.0, "s sec secs second seconds sek"),
+        "ms": ("time", 1e-3, "ms msec millisecond milliseconds"),
+        "min": ("time", 60.0, "min mins minute minutes"),
+        "h": ("time", 3600.0, "h hr hrs hour hours"),
+        "A": ("current", 1.0, "A amp amps ampere"),
+        "mA": ("current", 1e-3, "mA"),
+        "V": ("voltage", 1.0, "V volt volts"),
+        "mV": ("voltage", 1e-3, "mV"),
+        "W": ("power", 1.0, "W watt watts"),
+        "mW": ("power", 1e-3, "mW"),
+        "kW": ("power", 1e3, "kW"),
         "%": ("percent", 1.0, "% percent pct"),
-        "K": ("temperature", 1.0, "K kelvin"), "mK": ("temperature", 1e-3, "mK"),
-        "degC": ("temperature", 1.0, "°C ℃ degC deg_C C celsius Celsius"), "degF": ("temperature", 1.0, "°F ℉ degF deg_F F"),
+        "K": ("temperature", 1.0, "K kelvin"),
+        "mK": ("temperature", 1e-3, "mK"),
+        "degC": ("temperature", 1.0, "°C ℃ degC deg_C C celsius Celsius"),
+        "degF": ("temperature", 1.0, "°F ℉ degF deg_F F"),
         "ohm": ("resistance", 1.0, "Ω Ω ohm Ohm"),
     }
     found = {}
