@@ -13,7 +13,8 @@ import robthermal as rt
 SURFACE = {
     "robthermal": """
         Certificate Diverged FleetRun InputError Outcome Record System Verdict __version__ calibrate calibration
-        certify coupling design diagnose diagnosis errors fleet identify project read_record read_system report
+        certify coupling design diagnose diagnosis errors fleet identify project read_record read_records
+        read_system report
         signals systems thermal verification verify
     """,
     "calibration": """
@@ -66,8 +67,10 @@ SURFACE = {
         write_content write_html write_json write_junit
     """,
     "signals": """
-        DesignCheck Excitation Record celsius_to_kelvin crest_factor design_check find_glitches
-        kelvin_to_celsius median_filter multisine multisines noise prbs read_record staircase
+        Declared DesignCheck Excitation Import ImportOptions Record
+        celsius_to_kelvin crest_factor declared design_check find_glitches
+        inspect_file kelvin_to_celsius median_filter multisine multisines noise
+        options_from_text prbs read_record read_records staircase
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

@@ -261,7 +261,8 @@ def _lines(system: System) -> Iterator[str]:
             yield f"{_string(name)} = {_value(_shifted(fields, convert) if _is_temperature(name) else fields)}"
     for table in ("record", "columns"):
         if getattr(system, table):
-            yield from ("", f"[{table}]", *(f"{_key(key)} = {_value(value)}" for key, value in getattr(system, table).items()))
+            yield from ("", f"[{table}]")
+            yield from (f"{_key(key)} = {_value(value)}" for key, value in getattr(system, table).items())
 
 
 def _convert_key(fields: dict[str, Any], key: str, convert: Callable[[float], float]) -> None:

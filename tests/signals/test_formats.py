@@ -158,7 +158,7 @@ def test_matlab_refuses(tmp_path: Path) -> None:
     refused({"time": TIME, "u": U, "T": T + 1j}, "'T' is a complex matrix")
     refused({"time": TIME, "u": U, "T": np.ones((N, 2))}, r"column 'T' is a matrix")
     refused({"time": TIME, "u": U, "T": T[1:]}, "of length 11, the time of length 12")
-    refused({"time": TIME, "u": U, "T": np.append(np.nan, T[1:])}, "row 0, column .T.: nothing was measured", gaps="refuse")
+    refused({"time": TIME, "u": U, "T": np.append(np.nan, T[1:])}, "row 0, column .T.: nothing was", gaps="refuse")
     refused({"log": {"time": TIME, "u": U, "T": {"deep": T}}}, "'T' is a struct")
     refused({"u": U, "T": T}, "no column 'time'")
     path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + b"\x89HDF\r\n\x1a\n" + b"\0" * 100)

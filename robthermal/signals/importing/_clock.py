@@ -67,6 +67,8 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         if all(len(found) == 1 for found in both):
             return (both[0][0], both[1][0])
     found = [k for k in free if names[k] in _NAMES]
+    if len(found) > 1:  # "T" is a temperature where anything else can be the time
+        found = [k for k in found if split_header(table.headers[k])[0].strip() != "T"]
     if len(found) == 1:
         return (found[0],)
     if not found:

@@ -55,8 +55,8 @@ def read_records(
         Tables [record] and [columns] of a project file; they win over the system's, `options` over them.
     **options
         Keys of [record]: time, time_format, timezone, sample_time, delimiter, decimal, thousands, encoding,
-        header_line, units_line, sheet, variable, header, temperature_unit, missing, gaps, fill_up_to, shortest, jitter, duplicates,
-        restarts.
+        header_line, units_line, sheet, variable, header, temperature_unit, missing, gaps, fill_up_to,
+        shortest, jitter, duplicates, restarts.
 
     Returns
     -------
