@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -10,9 +11,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.io import savemat
 
 from ..errors import InputError
+from ._program import Program
 
 
 def by_suffix(path: str | Path, writers: Mapping[str, Callable[[], bytes]], remedy: str = "") -> None:
@@ -31,6 +34,50 @@ def by_suffix(path: str | Path, writers: Mapping[str, Callable[[], bytes]], reme
     if suffix not in writers:
         raise InputError(f'file type "{suffix}"', where=ascii(str(path)), expected=" or ".join(writers), remedy=remedy)
     write(path, writers[suffix]())
+
+
+def write_export(path: str | Path, document: Callable[[], Mapping[str, Any]], program: Callable[[], Program]) -> None:
+    """Write C99 (.c, .h), MATLAB (.mat) or JSON (.json), as the ending says.
+
+    Parameters
+    ----------
+    path : str or path
+        File to write, whole or not at all.
+    document : callable
+        Makes the content of the MATLAB and JSON files: plain values and arrays; in JSON numbers that are not finite
+        become null.
+    program : callable
+        Makes the C source.
+    """
+    def source() -> bytes:
+        return program().text().encode("ascii")
+
+    by_suffix(path, {".c": source, ".h": source, ".mat": lambda: matlab_bytes(document()),
+                     ".json": lambda: json_bytes(plain(document()))})
+
+
+def plain(content: Any) -> Any:
+    """Content of a JSON file: arrays as lists, numbers that are not finite as null.
+
+    Parameters
+    ----------
+    content : mapping, sequence, array, number or text
+        What is to be written, nested as it may be.
+
+    Examples
+    --------
+    >>> plain({"gain": np.array([1.0, np.inf]), "name": "K"})
+    {'gain': [1.0, None], 'name': 'K'}
+    """
+    if isinstance(content, Mapping):
+        return {key: plain(value) for key, value in content.items()}
+    if isinstance(content, np.ndarray):
+        return plain(content.tolist())
+    if isinstance(content, (list, tuple)):
+        return [plain(value) for value in content]
+    if isinstance(content, (float, np.floating)):
+        return float(content) if math.isfinite(content) else None
+    return content
 
 
 def json_bytes(content: Mapping[str, Any]) -> bytes:

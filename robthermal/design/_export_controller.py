@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import by_suffix, comment, identifier, json_bytes, matlab_bytes, number, self_test
+from .._export import Program, comment, identifier, number, write_export
 from ._matrices import Matrices, dot, matrices
 from ._modules import Array
 
@@ -19,25 +19,18 @@ if TYPE_CHECKING:
 FORMAT = "robthermal-controller/1"
 _TEST_SAMPLES = 64
 
-_TEXT = """\
-/* Outer control loop in heats (a {kind}), written by robthermal. C99, no allocation, no library but math.h.
- *
- * Sample time {h:.17g} s. Temperatures in kelvin, heats in watts into the cold faces (negative cools). In every sample:
- *
- *     {p}_init(&state, &seen, heat);                 once, with the heats in force: no bump
- *     {p}_heat(&state, &seen, wanted);               then currents from wanted, within their limits (the law),
- *     {p}_advance(&state, &seen, wanted, achieved);  and what the limits left of the heats: back-calculation
- *
-{members}
- * Coefficients are hexadecimal: exact. Sums run from the left.
- * Test: cc -std=c99 -ffp-contract=off -DCONTROLLER_TEST this.c -lm && ./a.out prints the largest difference from the
- * vector at the end, relative to the largest value: 0 without fused multiply-add. Exit status 1 above 1e-9.
- */
-#ifndef {p}_included
-#define {p}_included
+_ABOUT = """\
+Outer control loop in heats (a {kind}): no allocation, no library but math.h.
 
-#include <math.h>
+Sample time {h:.17g} s. Temperatures in kelvin, heats in watts into the cold faces (negative cools). In every sample:
 
+    {p}_init(&state, &seen, heat);                 once, with the heats in force: no bump
+    {p}_heat(&state, &seen, wanted);               then currents from wanted, within their limits,
+    {p}_advance(&state, &seen, wanted, achieved);  and what the limits left of the heats: back-calculation
+
+{members}"""
+
+_BODY = """\
 typedef struct {{
     double x[{states}];
 }} {p}_state;
@@ -66,46 +59,36 @@ static inline void {p}_advance({p}_state *s, const {p}_seen *e, const double wan
     for (int k = 0; k < {states}; k++)
         s->x[k] = next[k];
 }}
-
-{main}
-#endif
 """
 
 
 def export(controller: Controller, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
-    def content() -> dict[str, Any]:
-        return _document(controller, name)
-
-    def c() -> bytes:
-        return _source(matrices(controller), type(controller).__name__, name).encode("ascii")
-
-    by_suffix(path, {".c": c, ".h": c, ".mat": lambda: matlab_bytes(content()),
-                     ".json": lambda: json_bytes(_plain(content()))})
-
-
-def _document(controller: Controller, name: str) -> dict[str, Any]:
     M = matrices(controller)
-    return {"format": FORMAT, "name": name, "kind": type(controller).__name__, "sample_time": M.sample_time,
+    kind = type(controller).__name__
+    write_export(path, lambda: _document(M, kind, name), lambda: _program(M, kind, name))
+
+
+def _document(M: Matrices, kind: str, name: str) -> dict[str, Any]:
+    return {"format": FORMAT, "name": name, "kind": kind, "sample_time": M.sample_time,
             "modules": M.modules, "lumps": list(M.lumps), "indices": list(M.indices), "n_lumps": M.n_lumps,
             "around": list(M.around), "start": M.start, "heat": M.heat, "advance": M.advance}
 
 
-def _plain(content: dict[str, Any]) -> dict[str, Any]:
-    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in content.items()}
-
-
-def _source(M: Matrices, kind: str, name: str) -> str:
+def _program(M: Matrices, kind: str, name: str) -> Program:
     p, n, m = identifier(name, "controller"), len(M.start), M.modules
     own = [f"s->x[{i}]" for i in range(n)]
     seen = [f"e->{part}[{i}]" for part, size in M.sizes.items() for i in range(size)]
     wanted, achieved = ([f"{part}[{i}]" for i in range(m)] for part in ("wanted", "achieved"))
-    return _TEXT.format(
-        p=p, kind=kind, h=M.sample_time, m=m, states=max(n, 1), members=_members(M),
+    body = _BODY.format(
+        p=p, m=m, states=max(n, 1),
         seen="\n".join(f"    double {part}[{size}];" for part, size in M.sizes.items() if size),
         start=_sums("s->x", M.start, [*seen, *(f"heat[{i}]" for i in range(m))]),
         heat=_sums("heat", M.heat, [*own, *seen]),
-        advance=_sums("next", M.advance, [*own, *seen, *wanted, *achieved]), main=_main(p, M))
+        advance=_sums("next", M.advance, [*own, *seen, *wanted, *achieved]))
+    setup = f"    {p}_state state = {{{{0}}}};\n    {p}_seen seen;\n    double achieved[{m}];"
+    return Program(p, "CONTROLLER_TEST", _ABOUT.format(p=p, kind=kind, h=M.sample_time, members=_members(M)), body,
+                   list(_test_vector(M)), sum(M.sizes.values()) + m, setup, _test_call(p, M))
 
 
 def _members(M: Matrices) -> str:
@@ -115,7 +98,7 @@ def _members(M: Matrices) -> str:
         lines.append("temperatures: of the lumps " + ", ".join(M.lumps) + " [K]")
     if M.around:
         lines.append("around: " + ", ".join(M.around) + ", as measured")
-    return "\n".join(f" * {comment(line)}" for line in lines)
+    return "\n".join(comment(line) for line in lines)
 
 
 def _sums(target: str, matrix: Array, names: list[str]) -> str:
@@ -127,7 +110,7 @@ def _sums(target: str, matrix: Array, names: list[str]) -> str:
     return "\n".join(lines)
 
 
-def _main(p: str, M: Matrices) -> str:
+def _test_call(p: str, M: Matrices) -> str:
     """Inputs: what is seen, what the limits take away; outputs: wanted heats and the memory after the step."""
     ends = list(accumulate(M.sizes.values()))
     fill = [f"        for (int k = 0; k < {size}; k++) seen.{part}[k] = in[{end - size} + k];"
@@ -137,9 +120,7 @@ def _main(p: str, M: Matrices) -> str:
             f"        {p}_heat(&state, &seen, out);", f"        for (int k = 0; k < {m}; k++)",
             f"            achieved[k] = out[k] - in[{k} + k];", f"        {p}_advance(&state, &seen, out, achieved);",
             *([f"        for (int k = 0; k < {n}; k++) out[{m} + k] = state.x[k];"] if n else [])]
-    return self_test(p, "CONTROLLER_TEST", list(_test_vector(M)), k + m,
-                     f"    {p}_state state = {{{{0}}}};\n    {p}_seen seen;\n    double achieved[{m}];",
-                     "\n".join(call))
+    return "\n".join(call)
 
 
 def _test_vector(M: Matrices) -> Iterator[list[float]]:

@@ -1,4 +1,4 @@
-"""The linearising law for other programs: C99, MATLAB and JSON."""
+"""The linearizing feedback law for other programs: C99, MATLAB and JSON."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import by_suffix, comment, doubles, identifier, json_bytes, matlab_bytes, self_test
+from .._export import Program, comment, doubles, identifier, write_export
 
 if TYPE_CHECKING:
     from ._linearization import FeedbackLinearization
@@ -18,29 +18,20 @@ LIMITS = ("", "slew", "optimum", "voltage", "current", "fault")  # numbered as i
 _TEST_SAMPLES = 64
 _TEST_STEP = 0.5  # s, sample time of the test vector
 
-_TEXT = """\
-/* Feedback linearisation of thermoelectric modules (Evers 2021, (5.15)-(5.18), corrected), written by robthermal. C99.
- *
- * Modules, in this order: {names}. Positive current pumps heat from the cold to the hot face.
- *
- *     faults = {p}_step(wanted, hot, cold, previous, h, current, voltage, achieved, limit);
- *
- * wanted: heat into the cold faces [W], negative cools. hot, cold: temperatures of the faces [K], or their estimates.
- * previous: currents of the sample before [A], and h the time since then [s]; NULL if nothing limits the slew.
- * current [A], voltage [V]: one of them goes to the driver. achieved: heat with it [W], for the anti-windup.
- * limit: active limit, 0 none, 1 slew, 2 optimum (more current would cool less), 3 voltage, 4 current, 5 fault.
- * Fault: a number is not finite, a face is below 150 K, or S, R or K is not positive: then the module is switched off.
- *
- * Numbers are hexadecimal: exact. Test: cc -std=c99 -ffp-contract=off -DLAW_TEST this.c -lm && ./a.out prints the
- * largest difference from the vector at the end, relative to the largest value: 0 without fused multiply-add. Exit
- * status 1 above 1e-9.
- */
-#ifndef {p}_included
-#define {p}_included
+_ABOUT = """\
+Feedback linearization of thermoelectric modules (Evers 2021, (5.15)-(5.18), corrected).
 
-#include <math.h>
-#include <stddef.h>
+Modules, in this order: {names}. Positive current pumps heat from the cold to the hot face.
 
+    faults = {p}_step(wanted, hot, cold, previous, h, current, voltage, achieved, limit);
+
+wanted: heat into the cold faces [W], negative cools. hot, cold: temperatures of the faces [K], or their estimates.
+previous: currents of the sample before [A], and h the time since then [s]; NULL if nothing limits the slew.
+current [A], voltage [V]: one of them goes to the driver. achieved: heat with it [W], for the anti-windup.
+limit: active limit, 0 none, 1 slew, 2 optimum (more current would cool less), 3 voltage, 4 current, 5 fault.
+Fault: a number is not finite, a face is below 150 K, or S, R or K is not positive: then the module is switched off."""
+
+_BODY = """\
 /* Value at the reference temperature and slope of S [V/K], R [Ohm], K [W/K]; reference [K]; ranges [A], [V]; [A/s] */
 typedef struct {{
     double S, S_slope, R, R_slope, K, K_slope, T_ref, current_low, current_high, voltage_low, voltage_high, slew;
@@ -97,19 +88,12 @@ static inline int {p}_step(const double wanted[{m}], const double hot[{m}], cons
     }}
     return faults;
 }}
-
-{main}
-#endif
 """
 
 
 def export(law: FeedbackLinearization, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
-    def c() -> bytes:
-        return _source(law, name).encode("ascii")
-
-    by_suffix(path, {".c": c, ".h": c, ".mat": lambda: matlab_bytes(_document(law, name, np.inf)),
-                     ".json": lambda: json_bytes(_document(law, name, None))})
+    write_export(path, lambda: _document(law, name), lambda: _program(law, name))
 
 
 def _rows(law: FeedbackLinearization) -> dict[str, dict[str, float]]:
@@ -125,27 +109,21 @@ def _rows(law: FeedbackLinearization) -> dict[str, dict[str, float]]:
     return found
 
 
-def _document(law: FeedbackLinearization, name: str, endless: float | None) -> dict[str, Any]:
-    """Module after module; `endless` stands for the modulus of a limit that is not there."""
-    modules = [{"name": module, "hot": part.hot, "cold": part.cold,
-                **{key: value if np.isfinite(value) else None if endless is None else np.sign(value) * endless
-                   for key, value in row.items()}}
+def _document(law: FeedbackLinearization, name: str) -> dict[str, Any]:
+    """Module after module; a limit that is not there is infinite."""
+    modules = [{"name": module, "hot": part.hot, "cold": part.cold, **row}
                for (module, row), part in zip(_rows(law).items(), law.modules.parts, strict=True)]
     return {"format": FORMAT, "name": name, "modules": modules}
 
 
-def _source(law: FeedbackLinearization, name: str) -> str:
-    p = identifier(name, "law")
-    return _TEXT.format(p=p, names=comment(", ".join(law.names)), m=len(law.names), main=_main(p, law),
-                        modules=",\n".join("    " + doubles(row.values()) for row in _rows(law).values()))
-
-
-def _main(p: str, law: FeedbackLinearization) -> str:
-    """Inputs: wanted, hot, cold, previous; outputs: current, voltage, achieved, limit."""
-    m = len(law.names)
+def _program(law: FeedbackLinearization, name: str) -> Program:
+    """Inputs of the test: wanted, hot, cold, previous; outputs: current, voltage, achieved, limit."""
+    p, m = identifier(name, "law"), len(law.names)
+    body = _BODY.format(p=p, m=m, modules=",\n".join("    " + doubles(row.values()) for row in _rows(law).values()))
     call = (f"        {p}_step(in, in + {m}, in + {2 * m}, in + {3 * m}, {_TEST_STEP}, out, out + {m}, out + {2 * m}, "
             f"limit);\n        for (int k = 0; k < {m}; k++)\n            out[{3 * m} + k] = limit[k];")
-    return self_test(p, "LAW_TEST", list(_test_vector(law)), 4 * m, f"    int limit[{m}];", call)
+    return Program(p, "LAW_TEST", _ABOUT.format(p=p, names=comment(", ".join(law.names))), body,
+                   list(_test_vector(law)), 4 * m, f"    int limit[{m}];", call)
 
 
 def _test_vector(law: FeedbackLinearization) -> Iterator[list[float]]:

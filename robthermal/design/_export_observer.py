@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import by_suffix, comment, doubles, identifier, json_bytes, matlab_bytes, number, rows, self_test
+from .._export import Program, comment, doubles, identifier, number, rows, write_export
 from ..thermal import format_system
 from ._export_heats import DRIVE, HEATS, INTEGERS, Heat, Row
 from ._observer_recursion import ObserverRecursion
@@ -19,29 +19,21 @@ if TYPE_CHECKING:
 FORMAT = "robthermal-observer/1"
 _TEST_SAMPLES = 64
 
-_TEXT = """\
-/* Observer of all lumps ({method}), written by robthermal. C99, no allocation, no library but math.h.
- *
- * Sample time {h:.17g} s. All temperatures in kelvin. Once, with a first guess of the lumps, then in every sample:
- *
- *     {p}_init(&state, lumps);
- *     state.x is the estimate now;
- *     lost = {p}_step(&state, readings, inputs);  readings of this sample, inputs held until the next one
- *
- * lumps: {lumps}
- * readings: {sensors}
- * inputs: {inputs} (heaters in their unit, currents [A], ambients [K])
- * A reading that is not finite corrects nothing; the step returns how many there were. Inputs must be finite.
- *
- * Numbers are hexadecimal: exact. Sums run from the left. Test: cc -std=c99 -ffp-contract=off -DOBSERVER_TEST this.c
- * -lm && ./a.out prints the largest difference from the vector at the end, relative to the largest value: 0 without
- * fused multiply-add. Exit status 1 above 1e-9.
- */
-#ifndef {p}_included
-#define {p}_included
+_ABOUT = """\
+Observer of all lumps ({method}): no allocation, no library but math.h.
 
-#include <math.h>
+Sample time {h:.17g} s. All temperatures in kelvin. Once, with a first guess of the lumps, then in every sample:
 
+    {p}_init(&state, lumps);
+    state.x is the estimate now;
+    lost = {p}_step(&state, readings, inputs);  readings of this sample, inputs held until the next one
+
+lumps: {lumps}
+readings: {sensors}
+inputs: {inputs} (heaters in their unit, currents [A], ambients [K])
+A reading that is not finite corrects nothing; the step returns how many there were. Inputs must be finite."""
+
+_BODY = """\
 typedef struct {{
     double x[{n}];
 }} {p}_state;
@@ -114,23 +106,12 @@ static inline int {p}_step({p}_state *s, const double readings[{n_y}], const dou
         s->x[i] = next[i];
     return lost;
 }}
-
-{main}
-#endif
 """
 
 
 def export(observer: GainObserver, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
-    def c() -> bytes:
-        return _source(observer, name).encode("ascii")
-
-    def json_file() -> bytes:
-        content = _document(observer, name)
-        return json_bytes({key: value.tolist() if isinstance(value, np.ndarray) else value
-                           for key, value in content.items()})
-
-    by_suffix(path, {".c": c, ".h": c, ".mat": lambda: matlab_bytes(_document(observer, name)), ".json": json_file})
+    write_export(path, lambda: _document(observer, name), lambda: _program(observer, name))
 
 
 def _document(observer: GainObserver, name: str) -> dict[str, Any]:
@@ -142,22 +123,34 @@ def _document(observer: GainObserver, name: str) -> dict[str, Any]:
             "L": observer.gain, "system": format_system(model.system)}
 
 
-def _source(observer: GainObserver, name: str) -> str:
+def _program(observer: GainObserver, name: str) -> Program:
+    """Inputs of the test: readings, inputs; outputs: the estimate after the step."""
     p, system, recursion = identifier(name, "observer"), observer.model.system, ObserverRecursion.of(observer)
+    n, n_y, n_u = len(system.lumps), len(observer.sensors), len(system.exogenous_names)
+    about = _ABOUT.format(
+        p=p, method=observer.method, h=observer.sample_time, lumps=comment(", ".join(system.lump_names)),
+        sensors=comment(", ".join(observer.sensors)), inputs=comment(", ".join(system.exogenous_names)))
+    # the first row of the test starts at the readings' mean
+    call = (f"        if (t == 0)\n            for (int k = 0; k < {n}; k++)\n                state.x[k] = in[0];\n"
+            f"        {p}_step(&state, in, in + {n_y});\n        for (int k = 0; k < {n}; k++)\n"
+            f"            out[k] = state.x[k];")
+    return Program(p, "OBSERVER_TEST", about, _body(p, observer, recursion), list(_test_vector(observer, recursion)),
+                   n_y + n_u, f"    {p}_state state = {{{{0}}}};", call)
+
+
+def _body(p: str, observer: GainObserver, recursion: ObserverRecursion) -> str:
+    system = observer.model.system
     n, n_u = len(system.lumps), len(system.exogenous_names)
     kinds = [(HEATS[kind], kind.removesuffix("Term").lower(), table) for kind, table in recursion.heats.items()]
     shaped = [(DRIVE, "drive", recursion.drives)] if recursion.drives else []
-    return _TEXT.format(
-        p=p, method=observer.method, h=observer.sample_time, n=n, n_y=len(observer.sensors), n_u=n_u, n_w=n_u + 1,
+    return _BODY.format(
+        p=p, n=n, n_y=len(observer.sensors), n_u=n_u, n_w=n_u + 1,
         nodes=n + recursion.n_ambients, first_ambient=n_u - recursion.n_ambients, T_ref=number(recursion.T_ref),
-        lumps=comment(", ".join(system.lump_names)), sensors=comment(", ".join(observer.sensors)),
-        inputs=comment(", ".join(system.exogenous_names)),
         A=rows(recursion.A_d), G=rows(recursion.Gamma), L=rows(recursion.L), D=rows(recursion.D),
         sensor_rows=",\n".join(f"    {{{int(lump)}, {number(offset)}, {number(gain)}}}"
                                for lump, offset, gain in recursion.sensors),
         tables="".join(_table(p, *kind) for kind in [*shaped, *kinds]),
-        drives="".join(_loop(p, *kind) for kind in shaped), heats="".join(_loop(p, *kind) for kind in kinds),
-        main=_main(p, observer, recursion))
+        drives="".join(_loop(p, *kind) for kind in shaped), heats="".join(_loop(p, *kind) for kind in kinds))
 
 
 def _table(p: str, heat: Heat, kind: str, table: list[Row]) -> str:
@@ -173,17 +166,6 @@ def _loop(p: str, heat: Heat, kind: str, table: list[Row]) -> str:
     body = "\n".join(f"        {line}" for line in heat.c)
     return (f"    for (int k = 0; k < {len(table)}; k++) {{\n"
             f"        const struct {p}_{kind} *p = &{p}_{kind}_rows[k];\n{body}\n    }}\n")
-
-
-def _main(p: str, observer: GainObserver, recursion: ObserverRecursion) -> str:
-    """Inputs: readings, inputs; outputs: the estimate after the step. The first row starts at the readings' mean."""
-    n, n_y = len(recursion.A_d), len(observer.sensors)
-    n_in = n_y + len(recursion.D[0]) - 1
-    call = (f"        if (t == 0)\n            for (int k = 0; k < {n}; k++)\n                state.x[k] = in[0];\n"
-            f"        {p}_step(&state, in, in + {n_y});\n        for (int k = 0; k < {n}; k++)\n"
-            f"            out[k] = state.x[k];")
-    return self_test(p, "OBSERVER_TEST", list(_test_vector(observer, recursion)), n_in,
-                     f"    {p}_state state = {{{{0}}}};", call)
 
 
 def _test_vector(observer: GainObserver, recursion: ObserverRecursion) -> Iterator[list[float]]:

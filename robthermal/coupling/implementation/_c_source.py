@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._export import identifier, number, rows, self_test
+from ..._export import Program, identifier, number, rows
 from ._recursion import Recursion
 
 if TYPE_CHECKING:
@@ -16,28 +16,22 @@ if TYPE_CHECKING:
 _TEST_SAMPLES = 64
 _ON_UNTIL = 48  # the last samples of the test vector are with the coupling switched off
 
-_TEXT = """\
-/* Coupling filters between two control loops (Evers 2021, chapter 6), written by robthermal. C99.
- *
- * Sample time {dt:.17g} s. Verdict: {verdict}. Negative feedback, e = r - y. In every sample, with the errors e[2]:
- *
- *     {p}_step(&state, e, on, plus, add);
- *     u1 = output of C1 for the input plus[0], + add[0];
- *     u2 = output of C2 for the input plus[1], + add[1];
- *
- * state starts with zeros: {p}_state state = {{0}};
- * on = 0 cuts the inputs of the filters. They ring out, and C1, C2 see nothing of the switching. Keep calling the step.
- *
- * Sections in series, rows b0 b1 b2 a1 a2, transposed direct form II. X_hat drives Z1 (X = Z1 X_hat) and
- * Q1 (X/P1 = Q1 X_hat); Y_hat drives Z2 and Q2. Numbers are hexadecimal: exact.
- * Test: cc -std=c99 -ffp-contract=off -DCOUPLING_TEST this.c && ./a.out prints the largest difference from the vector
- * at the end, relative to the largest value: 0 without fused multiply-add. Exit status 1 above 1e-9.
- */
-#ifndef {p}_included
-#define {p}_included
+_ABOUT = """\
+Coupling filters between two control loops (Evers 2021, chapter 6).
 
-#include <math.h>
+Sample time {dt:.17g} s. Verdict: {verdict}. Negative feedback, e = r - y. In every sample, with the errors e[2]:
 
+    {p}_step(&state, e, on, plus, add);
+    u1 = output of C1 for the input plus[0], + add[0];
+    u2 = output of C2 for the input plus[1], + add[1];
+
+state starts with zeros: {p}_state state = {{0}};
+on = 0 cuts the inputs of the filters. They ring out, and C1, C2 see nothing of the switching. Keep calling the step.
+
+Sections in series, rows b0 b1 b2 a1 a2, transposed direct form II. X_hat drives Z1 (X = Z1 X_hat) and
+Q1 (X/P1 = Q1 X_hat); Y_hat drives Z2 and Q2."""
+
+_BODY = """\
 {tables}
 typedef struct {{
 {states}
@@ -77,14 +71,11 @@ static inline void {p}_step({p}_state *s, const double e[2], int on, double plus
     add[0] = {p}_run({nQ1}, {p}_Q1, s->Q1, x);
     add[1] = {p}_run({nQ2}, {p}_Q2, s->Q2, y);
 }}
-
-{main}
-#endif
 """
 
 
-def source(filters: Filters, name: str = "coupling") -> str:
-    """C99 source that stands for itself.
+def program(filters: Filters, name: str = "coupling") -> Program:
+    """C99 source that stands for itself; the test has inputs e1 e2 on and outputs plus[0] plus[1] add[0] add[1].
 
     Parameters
     ----------
@@ -93,23 +84,18 @@ def source(filters: Filters, name: str = "coupling") -> str:
     name : str
         Prefix of every identifier; characters that C does not allow become underscores.
     """
-    prefix = identifier(name, "coupling")
-    recursion = Recursion(filters)
+    p, recursion = identifier(name, "coupling"), Recursion(filters)
     chains = recursion.chains
     sizes = {key: len(chain.rows) for key, chain in chains.items()}
-    states = [f"    double {key}[{size}][2];" for key, size in sizes.items()]
-    tables = "".join(f"static const double {prefix}_{key}[{sizes[key]}][5] = {{\n{rows(chain.rows)}\n}};\n"
+    tables = "".join(f"static const double {p}_{key}[{sizes[key]}][5] = {{\n{rows(chain.rows)}\n}};\n"
                      for key, chain in chains.items())
-    return _TEXT.format(p=prefix, dt=filters.problem.dt, verdict=filters.verdict, tables=tables,
-                        states="\n".join(states), dx=number(recursion.direct[0]), dy=number(recursion.direct[1]),
-                        nX=sizes["X_hat"], nY=sizes["Y_hat"], nZ1=sizes["Z1"], nZ2=sizes["Z2"], nQ1=sizes["Q1"],
-                        nQ2=sizes["Q2"], main=_main(prefix, recursion))
-
-
-def _main(prefix: str, recursion: Recursion) -> str:
-    """Inputs e1 e2 on, then plus[0] plus[1] add[0] add[1]."""
-    return self_test(prefix, "COUPLING_TEST", list(_test_vector(recursion)), 3, f"    {prefix}_state state = {{0}};",
-                     f"        {prefix}_step(&state, in, in[2] != 0.0, out, out + 2);")
+    states = "\n".join(f"    double {key}[{size}][2];" for key, size in sizes.items())
+    body = _BODY.format(p=p, tables=tables, states=states, dx=number(recursion.direct[0]),
+                        dy=number(recursion.direct[1]), nX=sizes["X_hat"],
+                        nY=sizes["Y_hat"], nZ1=sizes["Z1"], nZ2=sizes["Z2"], nQ1=sizes["Q1"], nQ2=sizes["Q2"])
+    return Program(p, "COUPLING_TEST", _ABOUT.format(p=p, dt=filters.problem.dt, verdict=filters.verdict), body,
+                   list(_test_vector(recursion)), 3, f"    {p}_state state = {{0}};",
+                   f"        {p}_step(&state, in, in[2] != 0.0, out, out + 2);")
 
 
 def _test_vector(recursion: Recursion) -> Iterable[list[float]]:

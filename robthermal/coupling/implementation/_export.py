@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._export import by_suffix, matlab_bytes
-from ._c_source import source
+from ._c_source import program
 from ._files import document
 
 if TYPE_CHECKING:
@@ -45,4 +45,4 @@ def _mat(filters: Filters, name: str) -> bytes:
 
 
 def _c(filters: Filters, name: str) -> bytes:
-    return source(filters, name).encode("ascii")
+    return program(filters, name).text().encode("ascii")
