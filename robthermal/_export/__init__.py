@@ -10,8 +10,7 @@ from ._write import by_suffix as by_suffix
 from ._write import json_bytes as json_bytes
 from ._write import matlab_bytes as matlab_bytes
 from ._write import plain as plain
-from ._write import write as write
 from ._write import write_export as write_export
 
 __all__ = ["Program", "by_suffix", "comment", "doubles", "identifier", "json_bytes", "matlab_bytes", "number", "plain",
-           "rows", "write", "write_export"]
+           "rows", "write_export"]

@@ -1,11 +1,9 @@
-"""Files of exports: chosen by their ending, written whole or not at all."""
+"""Files of exports: chosen by their ending."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
 from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
+from .._write import write
 from ..errors import InputError
 from ._program import Program
 
@@ -102,28 +101,3 @@ def matlab_bytes(content: Mapping[str, Any]) -> bytes:
     file = BytesIO()
     savemat(file, dict(content), oned_as="row", long_field_names=True)
     return file.getvalue()
-
-
-def write(path: str | Path, content: bytes) -> None:
-    """Write any file whole, or not at all.
-
-    Parameters
-    ----------
-    path : str or path
-        File to write.
-    content : bytes
-        What it will hold.
-    """
-    target = Path(path)
-    try:
-        handle, part = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            os.chmod(part, 0o644)
-            os.replace(part, target)
-        except BaseException:
-            Path(part).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise InputError(f"cannot write: {error.strerror}", where=ascii(str(target))) from error

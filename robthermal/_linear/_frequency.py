@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import Array
 from ..errors import InputError
 from ..verification import Certificate, establish
 from ._response import largest, read_edges
-from ._systems import Array, Plant, made_by, read_plant, scaling
+from ._systems import Plant, made_by, read_plant, scaling
 
 
 def frequency_norm(system: Any, edges: ArrayLike, bounds: ArrayLike, *, left: Array | None = None,

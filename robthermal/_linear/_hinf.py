@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 
+from .._arrays import Array
 from ..errors import InputError
 from ..verification import Certificate, establish
 from ._bound import GainBound
 from ._levels import plant_norm
 from ._stability import coordinates
-from ._systems import Array, Plant, made_by, read_plant, scaling
+from ._systems import Plant, made_by, read_plant, scaling
 
 _LOSSES = (0.0, 0.02, 0.1)  # given up in turn where a proof fails
 _SHIFTS = (1e-4, 1e-7)  # of the strict Riccati equation, relative to the bound²

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from .._arrays import Array
 from ..errors import InputError
 from ._response import largest, responder
-from ._systems import Array, Plant, read_plant
+from ._systems import Plant, read_plant
 
 _STEP = 1e-6  # relative: levels this close to the largest value are not searched
 _ROUNDS = 60

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from .._arrays import Array
 from ..verification import Certificate, establish, not_certified
 from ._bound import GainBound
 from ._levels import plant_norm
 from ._stability import coordinates, solve
-from ._systems import Array, Plant, made_by, read_plant
+from ._systems import Plant, made_by, read_plant
 
 # share added to the ellipsoid, and floor of its coordinates, in turn, until the proof holds
 _SLACKS = ((1e-8, 1e-9), (1e-5, 1e-7), (1e-4, 1e-5), (1e-3, 1e-4), (1e-2, 1e-3))

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import schur
 
+from .._arrays import Array
 from ..errors import InputError
-from ._systems import Array, Plant
+from ._systems import Plant
 
 _GRID = 12  # points per interval beside those at the modes
 _AROUND = np.array([-3.0, -1.5, -0.8, -0.3, 0.0, 0.3, 0.8, 1.5, 3.0])  # half-widths around a mode

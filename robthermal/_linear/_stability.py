@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov
 
+from .._arrays import Array
 from ..errors import InputError
 from ..verification import Certificate, establish
-from ._systems import Array, Plant, made_by, read_plant
+from ._systems import Plant, made_by, read_plant
 
 _FLOOR = 1e-9  # relative: directions driven less than this are taken as driven this much, for the sake of rounding
 

@@ -9,11 +9,9 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Array
 from ..errors import InputError
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
@@ -16,8 +15,6 @@ from ._etfe import check_equal_lengths, least_squares_over
 from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
-
-Array = NDArray[Any]
 
 _FAINT = 1e-8  # power of a line relative to the strongest line, below which it is not excited
 _ABOVE_FLOOR = 20.0  # power of an excited line relative to the bins between the lines

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from .._arrays import Array
+
 Deferred = Callable[[slice], Array]  # the values of the bins in a slice, computed when they are asked for
 
 

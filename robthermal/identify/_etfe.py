@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
 from ._records import as_records, check_excitation, spectrum_of
 from ._response import FrequencyResponse
-
-Array = NDArray[Any]
 
 
 def etfe(record: Record | Sequence[Record]) -> FrequencyResponse:

@@ -13,16 +13,13 @@ import math
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import NDArray
 
+from .._arrays import Array
 from ._basis import LocalBasis
 from ._records import Spectrum
-
-Array = NDArray[Any]
 
 _scratch = threading.local()
 _DOUBTFUL = 1e-14  # remaining energy of a regressor relative to its input; below it `_windows` decides the rank

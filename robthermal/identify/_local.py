@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 
 from ._basis import LocalBasis
@@ -17,8 +17,6 @@ from ._kernel import Kernel
 from ._records import Spectrum
 from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
-
-Array = NDArray[Any]
 
 _CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
 _CHUNKS = 4  # that share the small computations at the end

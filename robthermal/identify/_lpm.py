@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
@@ -16,8 +15,6 @@ from ._local import LocalArrays, LocalEstimate
 from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
-
-Array = NDArray[Any]
 
 
 def lpm(record: Record | Sequence[Record], degree: int = 2, half_width: int = 8) -> FrequencyResponse:

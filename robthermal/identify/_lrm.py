@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
@@ -20,8 +19,6 @@ from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 from ._threads import run_all
 from ._windows import RANK_TOLERANCE, regression
-
-Array = NDArray[Any]
 
 _CHUNK = 256
 

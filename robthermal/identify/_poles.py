@@ -7,15 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 
 from ._basis import LocalBasis
 from ._records import Spectrum
 from ._windows import regression
-
-Array = NDArray[Any]
 
 _EXPECTED = "continuous-time poles [rad/s] with negative real part, 'auto', an rt.System or a python-control model"
 _GRID = 18  # candidate poles per search

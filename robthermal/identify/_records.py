@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
 from ._threads import run_all
-
-Array = NDArray[Any]
 
 _SILENT = 1e-12  # standard deviation relative to the largest value, below which a signal is constant to rounding
 _LINE_SILENT = 1e3  # a bin is excited when it exceeds this many times the rounding error of its signal

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
-
-Array = NDArray[Any]
 
 
 def quantile(p: float, q: Array) -> Array:

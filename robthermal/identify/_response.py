@@ -10,15 +10,14 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError, Outcome
 
 from . import _response_files, _response_plots, _response_text
 from ._deferred import Deferred, fixed, narrow, part_of
 from ._regions import quantile, shared_data
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robthermal._arrays import Array
 from robthermal._checks import excerpt, quoted
 from robthermal.errors import InputError
 
-Array = NDArray[Any]
 _ONE = ("frequency", "real", "imag")
 _FOUR = ("frequency", *(f"{part}{row}{column}" for row, column in product("12", "12") for part in ("re", "im")))
 _ALIAS = {"freq": "frequency", "f": "frequency", "re": "real", "im": "imag"}

@@ -20,6 +20,7 @@ from scipy import io
 
 from robthermal._checks import excerpt, quoted
 from robthermal._matfile import kind_of, read_matlab
+from robthermal._write import whole_file
 from robthermal.errors import InputError
 
 from ._response_csv import is_table, read_table
@@ -64,15 +65,17 @@ def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
     arrays = {name: getattr(result, name) for name in _ARRAYS if getattr(result, name) is not None}
     texts = {name: list(getattr(result, name)) for name in _LISTS}
     scalars = {name: getattr(result, name) for name in _SCALARS}
-    if path.suffix == ".json":
-        content = {"format": FORMAT, **scalars, **texts, **{name: _to_json(a) for name, a in arrays.items()}}
-        path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
-    elif path.suffix == ".npz":
-        lists = {name: np.array(value, dtype=str) for name, value in texts.items()}
-        np.savez_compressed(path, allow_pickle=False, format=FORMAT, **scalars, **lists, **arrays)
-    else:
-        cells = {name: np.array(value, dtype=object) for name, value in texts.items()}
-        io.savemat(path, {"format": FORMAT, **scalars, **cells, **arrays}, long_field_names=True)
+    head = {"format": FORMAT, **scalars}
+    with whole_file(path) as part:
+        if path.suffix == ".json":
+            content = {**head, **texts, **{name: _to_json(a) for name, a in arrays.items()}}
+            part.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
+        elif path.suffix == ".npz":
+            lists = {name: np.array(value, dtype=str) for name, value in texts.items()}
+            np.savez_compressed(part, allow_pickle=False, **head, **lists, **arrays)
+        else:
+            cells = {name: np.array(value, dtype=object) for name, value in texts.items()}
+            io.savemat(part, {**head, **cells, **arrays}, long_field_names=True)
 
 
 def format_of(path: Path) -> str:

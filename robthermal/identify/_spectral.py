@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, signal
 
+from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
@@ -16,8 +15,6 @@ from ._etfe import least_squares_over
 from ._lpm import undetermined_inputs
 from ._records import as_records, check_excitation, rounding_level, whole_number
 from ._response import FrequencyResponse
-
-Array = NDArray[Any]
 
 WINDOWS = ("hann", "rectangular")
 

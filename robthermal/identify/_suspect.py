@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy import stats
 
+from .._arrays import Array
 from ._threads import run_all
-
-Array = NDArray[Any]
 
 _LEVEL = 2e-3  # chance of a false alarm in one output of one bin, before the estimation error of the reference
 _SIDE_BY_SIDE = (25_000, 1_000_000)  # bins between which outputs are compared together: time against memory

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Array
 from ._basis import LocalBasis, window_starts
 from ._records import Spectrum
-
-Array = NDArray[Any]
 
 RANK_TOLERANCE = 1e-8  # part of a column that must remain after removing the other columns, relative to the column
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
+from .._write import whole_file
 from ..errors import InputError
 from ._checks import channel_names
 from ._names import suggestion
@@ -55,14 +55,8 @@ def write(record: Record, path: Path, temperature_unit: str, temperatures: Seque
             f"the file name ends in {path.suffix!r}", where=f"{path}", expected=f"one of {', '.join(_WRITERS)}"
         )
     table = _in_unit(record, frame(record), temperature_unit, temperatures)
-    part = path.with_name(path.name + ".part")
-    try:
-        writer(table, part)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror or error})", where=f"{path}") from None
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(path) as part:
+        writer(table, part, path)
 
 
 def _in_unit(record: Record, table: pd.DataFrame, unit: str, temperatures: Sequence[str] | None) -> pd.DataFrame:
@@ -92,7 +86,7 @@ def _in_unit(record: Record, table: pd.DataFrame, unit: str, temperatures: Seque
     return table
 
 
-def _write_csv(table: pd.DataFrame, path: Path) -> None:
+def _write_csv(table: pd.DataFrame, part: Path, path: Path) -> None:
     for name in table.columns:
         if name != name.strip() or any(sign in name for sign in ',;\t"\r\n#[]'):
             raise InputError(
@@ -100,16 +94,16 @@ def _write_csv(table: pd.DataFrame, path: Path) -> None:
                 where=f"{path}",
                 remedy="Rename it: no separators, quotes, '#', brackets or outer spaces.",
             )
-    table.to_csv(path, index=False, lineterminator="\n", encoding="utf-8")
+    table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
 
 
-def _write_parquet(table: pd.DataFrame, path: Path) -> None:
+def _write_parquet(table: pd.DataFrame, part: Path, path: Path) -> None:
     pyarrow, parquet = require_pyarrow()
     arrow = pyarrow.table({name: table[name].to_numpy() for name in table.columns})
-    parquet.write_table(arrow, path)
+    parquet.write_table(arrow, part)
 
 
-def _write_matlab(table: pd.DataFrame, path: Path) -> None:
+def _write_matlab(table: pd.DataFrame, part: Path, path: Path) -> None:
     for name in table.columns:
         if not (name.isidentifier() and name.isascii() and name[0] != "_" and len(name) <= 63):
             raise InputError(
@@ -118,7 +112,7 @@ def _write_matlab(table: pd.DataFrame, path: Path) -> None:
                 remedy="Use letters, digits and underscores, or save as .csv.",
             )
     columns = {name: table[name].to_numpy() for name in table.columns}
-    with path.open("wb") as file:
+    with part.open("wb") as file:
         savemat(file, columns, do_compression=True, oned_as="column", long_field_names=True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .._export import write
+from .._write import write
 from ._modelica_text import Text
 from ._parts import Drive, Input, Link, Module, Sensor
 from ._system import System, equations

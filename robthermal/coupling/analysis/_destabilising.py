@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..evaluation import Filters
 from ..problem import Problem, radius
 from ..systems import Zpk, realise, siso
 
-Array = NDArray[Any]
 _GRID_POINTS, _FINER = 2500, 400
 _FAR = 1e8  # roots this far out or in count as infinite or zero
 

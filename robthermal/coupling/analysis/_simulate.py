@@ -7,15 +7,14 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError
 from ...signals import Record
 from ..evaluation import Filters
 from ..problem import Performance, Problem, drivers
 from ..systems import apart, realise
 
-Array = NDArray[Any]
 _SAMPLES = 2500
 
 

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..evaluation import Filters
 from ..problem import Problem
 from ..systems import siso
 
-Array = NDArray[Any]
 _GRID_POINTS = 2000
 
 

@@ -9,16 +9,14 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import Outcome
 from ...verification import Certificate
 from ..implementation import FixedPoint, export, fixed_point, save_filters, sections
 from ..problem import NORMS, Performance, Problem
 from ._reduce import reduce
 from ._spectra import spectra
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

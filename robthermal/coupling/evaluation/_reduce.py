@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
 
+from ..._arrays import Array
 from ...errors import InputError, Outcome
 from ..systems import Zpk, realise, series
 
 if TYPE_CHECKING:
     from ._filters import Filters
-
-Array = NDArray[Any]
 
 
 def reduce(filters: Filters, order: int | None = None, tolerance: float = 0.01) -> Filters:

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ..problem import Problem, youla_parameter
 from ..systems import Response, siso
 from . import _plots
 
 if TYPE_CHECKING:
     from ._filters import Filters
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,14 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..._arrays import Array
 from ..._linear import hinf
 from ...errors import InputError
 from ...verification import Certificate
 from ..systems import Response, Zpk, apart, diagonal, minus_identity, natural, realise, sample_time_of, series
 from ._loop import Loop, close
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,11 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError
 from ...identify import FrequencyResponse
 
-Array = NDArray[Any]
 Measured = Any  # control.FrequencyResponseData or identify.FrequencyResponse, 2x2, or a list of them
 
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import buttap
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import LTI, Zpk, on_boundary, realise, sample_time_of, stable, zpk_of
 
-Array = NDArray[Any]
 _FASTER = 10.0  # default cut-off over the fastest pole or zero
 _SAME_ZERO = 1e-6  # how well a given Z must hold a wrong-side zero of P
 

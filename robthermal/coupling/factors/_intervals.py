@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ._uncertainty import Uncertainty
 
-Array = NDArray[Any]
 _SLACK = 0.9  # intervals are merged as long as the wider ones stay below this part of the largest value
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import LTI, Zpk, constant, expect_stable, natural, paired, realise, stable, zpk_of
 from ._inner import inner_zpk, inverse_times
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,11 @@ from typing import Any, Literal
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are, solve_discrete_lyapunov
 
+from ..._arrays import Array
 from ...errors import InputError
 
-Array = NDArray[Any]
 _SIDES = ("right", "left")
 
 

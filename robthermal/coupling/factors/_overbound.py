@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import Zpk, paired, realise
 from ._uncertainty import Uncertainty
-
-Array = NDArray[Any]
 
 
 def overbound(uncertainty: Uncertainty, row: int, column: int, order: int = 8) -> control.StateSpace:

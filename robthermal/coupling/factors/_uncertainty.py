@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import natural
 from ._coprime import CoprimeFactors, coprime
 from ._frf import Measured, read_plants
 from ._loop import Loop
 
-Array = NDArray[Any]
 _RESONANT = 1 / np.sqrt(2)  # damping ratio below which a mode has a peak
 _TURN = 0.9 * np.pi  # phase step between two frequencies beyond which turns cannot be counted
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import control
 import numpy as np
 
-from ..._export import json_bytes, write
+from ..._export import json_bytes
+from ..._write import write
 from ...errors import InputError, Outcome
 from ._sections import sections
 

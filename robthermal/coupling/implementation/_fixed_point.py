@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import sosfilt
 
+from ..._arrays import Array
 from ...errors import InputError
 from ._sections import paths, sections
 
 if TYPE_CHECKING:
     from ..evaluation import Filters
 
-Array = NDArray[Any]
 _LONGEST = 2**21  # samples of an impulse response
 _TAIL = 1e-6  # share of the second half of the impulse response below which it is long enough
 _SPARE = 1 + 1e-4  # for that tail and for rounding

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import sosfreqz
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import Zpk, grouped, siso, zpk_of
 
 if TYPE_CHECKING:
     from ..evaluation import Filters
 
-Array = NDArray[Any]
 _ACCURACY = 1e-3
 _QUIET = 1e-3  # of the largest magnitude: below, errors count against this
 

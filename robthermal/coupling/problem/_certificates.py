@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ..._linear import frequency_radius, hinf, hinf_norm, interval_norms, interval_radii, stability
 from ...verification import Certificate
 from ..factors import Intervals
 from ..systems import Response, connected
 from ._norms import NORMS
 
-Array = NDArray[Any]
 _ROOM = (1.002, 1.01, 1.04)  # first asked for; then, where the proof fails, backed off
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
+from ..._arrays import Array
 from ..systems import plus_one, realise, series
 from ._problem import Problem, Subsystem
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

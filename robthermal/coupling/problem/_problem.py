@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..factors import CoprimeFactors, Loop, Uncertainty, check_cutoff, close, corner_grid, from_factors
 from ..systems import LTI, Zpk, constant, sample_time_of, stable, zpk_of
 
-Array = NDArray[Any]
 _OTHER_PLANT = 1e-6  # relative difference of responses beyond which an uncertainty belongs to other plants
 
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..factors import feedback_matrix
 from ..systems import apart, expect_stable, realise, series
 from ._problem import Problem, Subsystem
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,16 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import null_space, solve_continuous_lyapunov, solve_discrete_lyapunov
 
+from ..._arrays import Array
 from ...errors import InputError
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ..problem import Problem, radius
 from ..systems import Response, Zpk, natural, realise
 from ._basis import Basis
 from ._moments import moments, square_root
 from ._program import Demands, Responses
 
-Array = NDArray[Any]
 _GRID_POINTS = 2500
 _WHOLE = 1e-6  # share of the whole variance beside the moving average: what the average does not see stays bounded
 _FASTER = 3.0  # default pole over the bandwidth

@@ -6,18 +6,14 @@ variance is [1, c] G [1, c]ᵀ. G comes from one Lyapunov equation, not from a f
 
 from __future__ import annotations
 
-from typing import Any
-
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
+from ..._arrays import Array
 from ...errors import InputError
 from ..systems import series
 from ._basis import Basis
-
-Array = NDArray[Any]
 
 
 def moments(signal: control.StateSpace, factor: control.StateSpace, basis: Basis, samples: int) -> tuple[Array, Array]:

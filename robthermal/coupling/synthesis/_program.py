@@ -9,15 +9,14 @@ those where a bound is broken. The caller proves what comes out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ..._conic import NormBounds, smallest_bound
 from ..problem import radius
 
-Array = NDArray[Any]
 _ROUNDS = 12
 _TIGHT = 2e-3  # asked for more than needed, so that frequencies in between may be a little worse
 _NONE = 1e-12  # uncertainty that counts as none

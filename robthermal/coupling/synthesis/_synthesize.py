@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError, Outcome
 from ..evaluation import Filters, finish, refused
 from ..factors import Uncertainty
@@ -19,7 +19,6 @@ from ._basis import make_basis
 from ._design import Design, Limits, default_pole
 from ._program import solve
 
-Array = NDArray[Any]
 _FIELDS = {key: norm.limit for key, norm in NORMS.items() if norm.limit} | {"msd": "msd"}  # of `Limits`
 _MARGINS = {key: norm.proof_margin for key, norm in NORMS.items()}
 _ATTEMPTS = 6

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ._zpk import Zpk
 
-Array = NDArray[Any]
 Matrices = tuple[Array, Array, Array, Array]
 
 

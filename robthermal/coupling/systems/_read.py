@@ -7,14 +7,13 @@ from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from ..._arrays import Array
 from ...errors import InputError
 from ._cascade import realise
 from ._roots import paired, snapped, zeros_and_gain
 from ._zpk import Zpk, constant, stable
 
-Array = NDArray[Any]
 LTI = Any  # control.StateSpace, control.TransferFunction or a number
 
 

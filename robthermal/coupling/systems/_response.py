@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import schur
 
+from ..._arrays import Array
 from ._zpk import from_origin
-
-Array = NDArray[Any]
 
 
 class Response:

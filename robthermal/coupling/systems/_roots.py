@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
-Array = NDArray[Any]
+from ..._arrays import Array
+
 _ROUNDING = 1e-13  # relative size below which a Markov parameter is none
 # A k-fold root scatters by about rounding**(1/k), evenly round its place: nearest roots at most this far from 1 (or,
 # relative to the largest, from 0) whose mean is much nearer are one multiple root. Slow poles lie on one side of it.
