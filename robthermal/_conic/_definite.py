@@ -40,7 +40,7 @@ class Candidate:
     Parameters
     ----------
     matrix : ndarray, shape (n, n)
-        Q, symmetric.
+        The symmetric matrix Q found.
     margin : float
         t for which the solver claims every form >= t I; nan where it returned nothing.
     status : str

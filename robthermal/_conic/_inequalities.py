@@ -19,7 +19,7 @@ class Inequality:
     Parameters
     ----------
     constant : ndarray, shape (s, s)
-        Symmetric.
+        Constant part, a symmetric matrix.
     slopes : ndarray, shape (n, s, s)
         Symmetric, one per coefficient.
     margin : float

@@ -18,11 +18,11 @@ class NormBounds:
     Parameters
     ----------
     matrix : ndarray, shape (n_k, d, n)
-        M_k.
+        Matrices M_k of the norms.
     offset : ndarray, shape (n_k, d)
-        m_k.
+        Constant parts m_k.
     bound : ndarray, shape (n_k,)
-        b_k.
+        Bounds b_k of the norms.
     slope : float
         c_k, the same for all: 0 for a plain constraint, 1 where t bounds the norm.
     """

@@ -59,15 +59,15 @@ def solved(cost: Array, A: csc_matrix, offset: Array, cones: Sequence[Any], *, q
     Parameters
     ----------
     cost : ndarray, shape (n,)
-        Linear.
+        Linear part of the objective.
     A : csc_matrix, shape (m, n)
         Rows of all cones.
     offset : ndarray, shape (m,)
-        b.
+        Right-hand side b.
     cones : sequence
         In the order of the rows.
     quadratic : ndarray, shape (n, n), optional
-        P, symmetric.
+        Quadratic part P of the objective, symmetric.
     tolerance : float, optional
         Of gap and feasibility; default the solver's own.
 

@@ -18,13 +18,13 @@ def group_sparse(G: Array, c: Array, groups: Sequence[NDArray[np.intp]], weights
     Parameters
     ----------
     G : ndarray, shape (n, n)
-        Positive semidefinite.
+        Matrix of the quadratic form, positive semidefinite.
     c : ndarray, shape (n,)
-        Linear.
+        Linear part of the objective.
     groups : sequence of ndarray of int
         A partition of the coefficients; |.| is Euclidean.
     weights : ndarray, shape (n_groups,)
-        w_g >= 0.
+        Weights w_g of the groups, zero or above.
     lower, upper : ndarray, shape (n,)
         Bounds; infinite ones bound nothing.
 

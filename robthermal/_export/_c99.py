@@ -45,7 +45,7 @@ def number(value: float) -> str:
     Parameters
     ----------
     value : float
-        Not NaN.
+        Number to write, not NaN.
     """
     if math.isinf(value):
         return "INFINITY" if value > 0 else "-INFINITY"
@@ -58,7 +58,7 @@ def doubles(values: Iterable[float]) -> str:
     Parameters
     ----------
     values : iterable of float
-        Its entries.
+        Entries of the array.
     """
     return "{" + ", ".join(number(value) for value in values) + "}"
 
@@ -69,7 +69,7 @@ def rows(table: Iterable[Sequence[float]]) -> str:
     Parameters
     ----------
     table : iterable of sequence of float
-        Its rows.
+        Rows of the table.
     """
     return ",\n".join("    " + doubles(row) for row in table)
 

@@ -40,7 +40,7 @@ def key_of(case: Any) -> str:
     Parameters
     ----------
     case : Any
-        Plain values.
+        One case, of plain values.
     """
     return hashlib.sha256(_text(case, "a case", "argument cases", sort_keys=True).encode()).hexdigest()[:32]
 

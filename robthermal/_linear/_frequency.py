@@ -25,7 +25,7 @@ def frequency_norm(system: Any, edges: ArrayLike, bounds: ArrayLike, *, left: Ar
     edges : array_like, shape (n_intervals + 1,)
         From 0 to infinity, or to the Nyquist frequency (infinity stands for it too) [rad/s].
     bounds : array_like, shape (n_intervals,) or ()
-        β [output unit per input unit].
+        Bounds β of the intervals [output unit per input unit].
     left, right : ndarray, shape ([n_intervals,] p, p), ([n_intervals,] m, m), optional
         Regular scalings L, R, real or complex.
     blocks : list, optional
@@ -76,7 +76,7 @@ def frequency_radius(system: Any, edges: ArrayLike, envelopes: ArrayLike, bound:
     envelopes : array_like, shape (n_intervals, m, p) or (m, p)
         R, not negative.
     bound : float
-        β.
+        Bound β to be proven.
 
     Returns
     -------

@@ -25,7 +25,7 @@ def hinf_norm(system: Any) -> tuple[float, float]:
     Parameters
     ----------
     system : control.StateSpace or control.TransferFunction
-        Stable.
+        A stable system.
 
     Returns
     -------

@@ -30,7 +30,7 @@ class FrequencyResponse:
     Parameters
     ----------
     frequencies : array_like, shape (n_f,)
-        Frequencies [Hz], increasing.
+        Frequencies of the bins [Hz], increasing.
     response : array_like, shape (n_y, n_u, n_f)
         G [output unit / input unit]; NaN where the data do not determine it.
     noise_covariance : array_like or callable, shape (n_y, n_y, n_f)
@@ -57,7 +57,7 @@ class FrequencyResponse:
     input_names, output_names : sequence of str
         Names of the channels.
     sample_time : float
-        Sample time [s].
+        Sample time of the records [s].
     n_samples : int
         Samples in the longest record [-].
     method : str
@@ -297,7 +297,7 @@ class FrequencyResponse:
         Parameters
         ----------
         low, high : float
-            Frequencies [Hz].
+            Lowest and highest frequency [Hz].
 
         Returns
         -------

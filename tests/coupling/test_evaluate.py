@@ -253,7 +253,7 @@ def test_sections_and_file(pair: Pair, tmp_path: Path) -> None:
     np.testing.assert_array_equal(content["filters"]["controller"]["A"], f.controller.A)
     assert set(content["sections"]) == {"X", "Y", "X_input", "Y_input"}
     assert content["performance"]["ma_after"] == f.performance.ma_after
-    with pytest.raises(rt.InputError, match="cannot write"):
+    with pytest.raises(rt.InputError, match="cannot be written"):
         f.save(tmp_path / "missing" / "coupling.json")
 
 

@@ -117,7 +117,7 @@ def test_the_step_in_the_loop_is_the_simulated_coupling(which: str, request: pyt
 def test_refusals(filters: rt.coupling.Filters, tmp_path: Path) -> None:
     with pytest.raises(rt.InputError, match=r'file type ".json".*save'):
         filters.export(tmp_path / "c.json")
-    with pytest.raises(rt.InputError, match="cannot write"):
+    with pytest.raises(rt.InputError, match="cannot be written"):
         filters.export(tmp_path / "none" / "c.c")
     P, C = control.tf([1], [1, 1, 0], 0), control.tf([1.0], [1], 0)
     continuous = rt.coupling.evaluate(P, P, C, C, X_hat=-0.1)

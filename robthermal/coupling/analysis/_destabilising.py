@@ -25,7 +25,7 @@ class Destabilising:
     Parameters
     ----------
     omega : float
-        Frequency [rad/s].
+        Frequency of the pole [rad/s].
     delta : ndarray, shape (2, 2)
         Delta_p there (complex).
     scale : float

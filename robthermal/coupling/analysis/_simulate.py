@@ -25,9 +25,9 @@ class Simulation:
     Parameters
     ----------
     time : ndarray, shape (n,)
-        [s].
+        Time of every sample [s].
     before, after : ndarray, shape (n,)
-        e12 [m].
+        Synchronization error e12 without and with coupling [m].
     samples : int
         In the exposure window; 0 without one.
     ma_before, ma_after, msd_before, msd_after : ndarray, shape (n - samples + 1,)

@@ -34,7 +34,7 @@ class WorstCase:
     Parameters
     ----------
     omega : ndarray, shape (n_f,)
-        Frequencies [rad/s].
+        Frequencies of the responses [rad/s].
     before, after : ndarray, shape (n_plants, n_f)
         Size of weight e12 per unit of white noise, without and with coupling, for each measured plant.
     bound_before, bound_after : ndarray, shape (n_f,)

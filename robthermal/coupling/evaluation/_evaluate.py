@@ -29,7 +29,7 @@ def evaluate(P1: LTI, P2: LTI, C1: LTI, C2: LTI, *, X_hat: LTI = 0, Y_hat: LTI =
     Z1, Z2 : LTI or float, optional
         Factors with P⁻¹Z stable and proper; None: constructed, as :func:`inner_factor`.
     uncertainty : Uncertainty, 2x2 frequency response, or list of them, optional
-        Measured plants.
+        Measured plants, for the robust number.
     disturbances : pair of LTI or float
         Shaping filters of v1, v2: white noise of variance 1 per sample (continuous: PSD 1) to output [m].
     weight : LTI or float
@@ -76,7 +76,7 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
     problem : Problem
         What was designed for.
     X_hat, Y_hat : StateSpace
-        The filters.
+        The free stable filters.
     basis : str
         Where they come from.
     order : int
@@ -128,7 +128,7 @@ def refused(problem: Problem, outcome: Outcome, *, basis: str, order: int, solve
     basis : str
         Basis that was tried.
     order : int
-        Its order.
+        Order of the basis.
     solve_time : float
         Time of the solver [s].
     requested : mapping, optional

@@ -32,7 +32,7 @@ class Filters:
     X_hat, Y_hat : StateSpace
         The free stable filters.
     Z1, Z2 : StateSpace
-        All-pass factors.
+        All-pass factors of the plants.
     X_input, Y_input : StateSpace
         P1⁻¹X to u1 and P2⁻¹Y to u2.
     controller : StateSpace
@@ -67,7 +67,7 @@ class Filters:
     basis : str
         Basis of the filters.
     order : int
-        Its order.
+        Order of the basis.
     solve_time : float
         Time of the solver [s].
     problem : Problem

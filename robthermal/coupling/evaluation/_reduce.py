@@ -22,7 +22,7 @@ def reduce(filters: Filters, order: int | None = None, tolerance: float = 0.01) 
     Parameters
     ----------
     filters : Filters
-        A design.
+        Design to be shortened.
     order : int, optional
         Order of each filter; None: the smallest that keeps everything within the tolerance.
     tolerance : float
@@ -75,7 +75,7 @@ def objective(filters: Filters) -> float:
     Parameters
     ----------
     filters : Filters
-        A design.
+        Design to be shortened.
     """
     if filters.problem.samples:
         return filters.performance.ma_after

@@ -24,7 +24,7 @@ class Spectra:
     Parameters
     ----------
     frequency : ndarray, shape (n_f,)
-        Frequencies [Hz].
+        Frequencies of the curves [Hz].
     sensitivity_before, sensitivity_after : ndarray, shape (2, n_f)
         \\|S1\\|, \\|S2\\|, and \\|(1+Y) S1\\|, \\|(1+X) S2\\| [-].
     improvement : ndarray, shape (2, n_f)
@@ -69,7 +69,7 @@ class Spectra:
         Parameters
         ----------
         panels : sequence of str
-            Which ones.
+            Names of the panels to draw.
 
         Returns
         -------

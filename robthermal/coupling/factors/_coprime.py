@@ -108,7 +108,7 @@ class CoprimeFactors:
         Parameters
         ----------
         omega : array_like, shape (n_f,)
-            Frequencies [rad/s].
+            Frequencies of the responses [rad/s].
 
         Returns
         -------
@@ -175,7 +175,7 @@ def check_cutoff(cutoff: float | None) -> None:
     Parameters
     ----------
     cutoff : float or None
-        [rad/s].
+        Corner of the low-pass [rad/s].
     """
     if cutoff is not None and not (np.isfinite(cutoff) and cutoff > 0):
         raise InputError(f"{cutoff!r} rad/s", where="cutoff", expected="a positive frequency [rad/s]")

@@ -60,7 +60,7 @@ def inner_zpk(plant: Zpk, where: str, cutoff: float | None, other_corners: Array
     Parameters
     ----------
     plant : Zpk
-        P.
+        Plant P to be factored.
     where : str
         Its name, for messages.
     cutoff : float or None
@@ -115,9 +115,9 @@ def expect_invertible(plant: Zpk, where: str) -> None:
     Parameters
     ----------
     plant : Zpk
-        P.
+        Plant P to be factored.
     where : str
-        Its name.
+        Name of the plant, for messages.
     """
     if plant.gain == 0.0:
         raise InputError("the plant is zero", where=where, expected="a plant that passes its input")

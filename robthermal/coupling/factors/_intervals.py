@@ -33,9 +33,9 @@ class Intervals:
         Parameters
         ----------
         index : int
-            Which interval.
+            Number of the interval.
         count : int
-            How many.
+            Number of points in it.
         """
         low, high = self.edges[index], self.edges[index + 1]
         if np.isfinite(high):
@@ -61,7 +61,7 @@ class Intervals:
         radii : ndarray, shape (K,)
             Value attained on each interval.
         worst : float
-            Their maximum.
+            Largest of the radii.
         """
         starts, current, size = [0], self.envelopes[0], radii[0]
         envelopes = []
@@ -97,9 +97,9 @@ def intervals_of(uncertainty: Uncertainty, dt: float) -> Intervals:
     Parameters
     ----------
     uncertainty : Uncertainty
-        Measured envelope.
+        Envelope of the measured plants.
     dt : float
-        Sample time [s].
+        Sample time of the loop [s].
     """
     last = np.pi / dt if dt else np.inf
     omega, R = uncertainty.omega, np.moveaxis(uncertainty.envelope, -1, 0)

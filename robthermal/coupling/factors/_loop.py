@@ -42,7 +42,7 @@ def close(P: LTI, C: LTI, number: int, dt: float, Z: LTI | None = None, cutoff: 
     number : int
         1 or 2, for messages.
     dt : float
-        Sample time [s].
+        Sample time of the loop [s].
     Z : LTI, optional
         All-pass factor; None: constructed.
     cutoff : float, optional

@@ -21,7 +21,7 @@ def overbound(uncertainty: Uncertainty, row: int, column: int, order: int = 8) -
     Parameters
     ----------
     uncertainty : Uncertainty
-        Measured envelope.
+        Envelope of the measured plants.
     row, column : int
         Entry, from 0.
     order : int

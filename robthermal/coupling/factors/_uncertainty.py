@@ -29,7 +29,7 @@ class Uncertainty:
     Parameters
     ----------
     omega : ndarray, shape (n_f,)
-        Frequencies [rad/s].
+        Frequencies of the responses [rad/s].
     samples : ndarray, shape (n_plants, 2, 2, n_f)
         Delta_p of each measured plant (complex).
     envelope : ndarray, shape (2, 2, n_f)
@@ -66,7 +66,7 @@ class Uncertainty:
         Parameters
         ----------
         omega : array_like, shape (n_f,)
-            Frequencies [rad/s].
+            Frequencies of the responses [rad/s].
 
         Returns
         -------

@@ -25,7 +25,7 @@ def sections(filters: Filters) -> dict[str, Array]:
     Parameters
     ----------
     filters : Filters
-        Discrete time.
+        Filters in discrete time.
     """
     if not filters.problem.dt:
         raise InputError("continuous-time filters have no sections", where="sections", expected="discrete time",
@@ -44,7 +44,7 @@ def paths(filters: Filters) -> dict[str, tuple[Array, Array]]:
     Parameters
     ----------
     filters : Filters
-        Discrete time.
+        Filters in discrete time.
     """
     one, two = filters.problem.one, filters.problem.two
     free = {hat: _rows(zpk_of(getattr(filters, hat), hat, filters.problem.dt)) for hat in ("X_hat", "Y_hat")}

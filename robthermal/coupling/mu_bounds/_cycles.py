@@ -43,7 +43,7 @@ def cycles(M: Complex, structure: Structure) -> tuple[NDArray[np.bool_], NDArray
     Parameters
     ----------
     M : ndarray, shape (n_f, p, m)
-        Matrices.
+        Matrices of all frequencies.
     structure : Structure
         Blocks of Delta.
 

@@ -31,7 +31,7 @@ class Samples:
     Parameters
     ----------
     system : control.StateSpace
-        Stable.
+        Stable system M(s) or M(z).
     structure : Structure
         Blocks of Delta.
     """
@@ -112,7 +112,7 @@ class Partition:
     edges : ndarray, shape (K + 1,)
         From 0 to the last frequency [rad/s].
     left, right : ndarray, shape (K, p, p) and (K, m, m)
-        Scalings.
+        Scalings of every interval.
     bound : float
         sigma_max(left M right⁻¹) stays below it on every interval, as far as floating point can tell.
     """
@@ -139,7 +139,7 @@ def cover(samples: Samples, factor: float) -> Partition:
     samples : Samples
         Of the system; every centre of an interval is added, so that a peak found late raises the bound.
     factor : float
-        Above 1.
+        Growth of the bound, above 1.
 
     Returns
     -------

@@ -29,7 +29,7 @@ def worst_perturbation(M: Complex, structure: Structure, upper: Real, dual: Comp
     Parameters
     ----------
     M : ndarray, shape (n_f, p, m)
-        Matrices.
+        Matrices of all frequencies.
     structure : Structure
         Blocks of Delta.
     upper : ndarray, shape (n_f,)

@@ -51,7 +51,7 @@ def best_scaling(M: Complex, structure: Structure, enough: float = 0.0) -> Scali
     Parameters
     ----------
     M : ndarray, shape (n_f, p, m)
-        Matrices.
+        Matrices of all frequencies.
     structure : Structure
         Blocks of Delta.
     enough : float

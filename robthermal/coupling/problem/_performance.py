@@ -48,7 +48,7 @@ def variances(problem: Problem, X: control.StateSpace, Y: control.StateSpace) ->
     problem : Problem
         What disturbs the loops.
     X, Y : StateSpace
-        Coupling filters.
+        Coupling filters, in closed form.
     """
     if not problem.samples:
         return Performance(*[float("nan")] * 4)
@@ -65,9 +65,9 @@ def coupled(problem: Problem, X: control.StateSpace, Y: control.StateSpace, fiel
     Parameters
     ----------
     problem : Problem
-        The subsystems.
+        The two subsystems with their disturbances.
     X, Y : StateSpace
-        Coupling filters.
+        Coupling filters, in closed form.
     field : str
         Which signal: "S", "SW" or "signal" (weight S W).
     """

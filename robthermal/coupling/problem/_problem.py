@@ -57,11 +57,11 @@ class Problem:
     Parameters
     ----------
     one, two : Subsystem
-        The subsystems.
+        The two controlled subsystems.
     weight : Zpk
         Performance filter on e12.
     window : float or None
-        Exposure [s].
+        Length of the exposure [s].
     samples : int
         Samples in the window; 0 without.
     uncertainty : Uncertainty or None
@@ -86,7 +86,7 @@ class Problem:
         Parameters
         ----------
         omega : array_like, shape (n_f,)
-            Frequencies [rad/s].
+            Frequencies of the responses [rad/s].
 
         Returns
         -------
@@ -123,7 +123,7 @@ def prepare(P1: LTI, P2: LTI, C1: LTI, C2: LTI, *, Z1: LTI | None = None, Z2: LT
     Z1, Z2 : LTI, optional
         All-pass factors; None: constructed.
     uncertainty : Uncertainty, 2x2 frequency response or list of them, optional
-        Measured plants.
+        Measured plants, or their envelope.
     disturbances : pair of LTI
         Shaping filters of v1, v2.
     weight : LTI

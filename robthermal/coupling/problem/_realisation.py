@@ -46,7 +46,7 @@ def realisation(problem: Problem, X_hat: control.StateSpace, Y_hat: control.Stat
     Parameters
     ----------
     problem : Problem
-        The subsystems.
+        The two controlled subsystems.
     X_hat, Y_hat : StateSpace
         Stable, one input and one output.
     """
@@ -74,7 +74,7 @@ def drivers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpa
     Parameters
     ----------
     problem : Problem
-        The subsystems.
+        The two controlled subsystems.
     X_hat, Y_hat : StateSpace
         Stable, one input and one output.
     """
@@ -89,7 +89,7 @@ def youla_parameter(problem: Problem, X_hat: control.StateSpace, Y_hat: control.
     Parameters
     ----------
     problem : Problem
-        The subsystems.
+        The two controlled subsystems.
     X_hat, Y_hat : StateSpace
         Stable, one input and one output.
     """

@@ -26,7 +26,7 @@ def moments(signal: control.StateSpace, factor: control.StateSpace, basis: Basis
     factor : StateSpace
         Z of that filter.
     basis : Basis
-        f_k.
+        Basis functions f_k of the filters.
     samples : int
         Length N of the moving average; 1 for none.
 

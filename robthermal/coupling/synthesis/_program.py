@@ -32,7 +32,7 @@ class Responses:
     basis : ndarray, shape (n, n_f)
         Basis functions, the constant first.
     factor : ndarray, shape (2, n_f)
-        Z1, Z2.
+        Responses of Z1 and Z2.
     signal : ndarray, shape (2, n_f)
         What 1 + X and 1 + Y multiply in weight e12: weight S2 W2, weight S1 W1 [m].
     block : ndarray, shape (2, n_f)
@@ -98,7 +98,7 @@ def solve(responses: Responses, demands: Demands, start: Array | None = None) ->
     Parameters
     ----------
     responses : Responses
-        The maps.
+        Maps from coefficients to responses.
     demands : Demands
         What of them.
     start : ndarray, shape (2, n), optional

@@ -38,7 +38,7 @@ def grouped(system: Zpk) -> list[tuple[list[complex], list[complex]]]:
     Parameters
     ----------
     system : Zpk
-        Proper.
+        A proper system.
     """
     groups = _pole_groups(system.poles)
     return list(zip(groups, _shared_zeros(groups, system.zeros), strict=True))

@@ -26,7 +26,7 @@ def apart(first: control.StateSpace, second: control.StateSpace) -> control.Stat
     Parameters
     ----------
     first, second : StateSpace
-        Any.
+        The two systems, of any sizes.
     """
     return control.StateSpace(*(block_diag(getattr(first, key), getattr(second, key)) for key in "ABCD"), first.dt,
                               remove_useless_states=False)

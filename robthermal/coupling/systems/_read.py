@@ -83,11 +83,11 @@ def expect_stable(poles: Array, where: str, dt: float, what: str = "is unstable"
     Parameters
     ----------
     poles : ndarray of complex
-        Its poles.
+        Poles of the system.
     where : str
         Name of the argument.
     dt : float
-        Sample time [s].
+        Sample time of the loop [s].
     what : str
         Words for the message.
     remedy : str
@@ -134,7 +134,7 @@ def connected(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, Arr
     Parameters
     ----------
     A, B, C, D : ndarray
-        State space.
+        Matrices of the state space.
     """
     keep = _linked(A, B, C)
     return A[np.ix_(keep, keep)], B[keep], C[:, keep], D

@@ -36,7 +36,7 @@ class Response:
         Parameters
         ----------
         omega : array_like, shape (n_f,)
-            Frequencies [rad/s].
+            Frequencies of the responses [rad/s].
 
         Returns
         -------
@@ -62,7 +62,7 @@ def siso(system: control.StateSpace, omega: ArrayLike) -> Array:
     system : StateSpace
         One input, one output.
     omega : array_like
-        Frequencies [rad/s].
+        Frequencies of the responses [rad/s].
     """
     return Response(system)(np.atleast_1d(np.asarray(omega, dtype=float)))[0, 0]
 
@@ -101,6 +101,6 @@ def negative(system: control.StateSpace) -> control.StateSpace:
     Parameters
     ----------
     system : StateSpace
-        Any.
+        System of any size.
     """
     return control.StateSpace(system.A, system.B, -system.C, -system.D, system.dt, remove_useless_states=False)

@@ -21,7 +21,7 @@ class Zpk:
     zeros, poles : ndarray of complex
         Finite roots, in conjugate pairs.
     gain : float
-        Leading coefficient.
+        Leading coefficient of the numerator.
     dt : float
         Sample time [s]; 0 in continuous time.
     """
@@ -96,9 +96,9 @@ def constant(value: float, dt: float) -> Zpk:
     Parameters
     ----------
     value : float
-        The gain.
+        The constant gain.
     dt : float
-        Sample time [s].
+        Sample time of the loop [s].
     """
     return Zpk(np.array([], dtype=complex), np.array([], dtype=complex), float(value), dt)
 
@@ -109,7 +109,7 @@ def from_origin(omega: Array, dt: float) -> tuple[Array, float]:
     Parameters
     ----------
     omega : ndarray
-        Frequencies [rad/s].
+        Frequencies of the responses [rad/s].
     dt : float
         Sample time [s]; 0 in continuous time.
     """
