@@ -28,8 +28,8 @@ SURFACE = {
         thesis_bounds usable_current
     """,
     "coupling": """
-        NORMS CoprimeFactors Destabilising Filters FixedPoint Joint MuBound Norm NormalizedFactors Performance
-        ScaledPath Simulation Spectra Uncertainty WorstCase coprime destabilising discretize dual_youla evaluate
+        NORMS CoprimeFactors Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors Performance
+        ScaledPath Simulation Spectra Uncertainty WorstCase coprime destabilizing discretize dual_youla evaluate
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """

@@ -35,7 +35,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Candidate:
-    """What the solver returned, believed by nobody.
+    """What the solver returned, which nobody has to believe.
 
     Parameters
     ----------

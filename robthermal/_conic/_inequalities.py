@@ -39,7 +39,7 @@ def inside(inequalities: Sequence[Inequality], cost: Array | None = None) -> Poi
     inequalities : sequence of Inequality
         Their margins bound t when no cost is given.
     cost : ndarray, shape (n,), optional
-        Minimises costᵀx instead.
+        Minimizes costᵀx instead.
 
     Returns
     -------

@@ -17,7 +17,7 @@ LOOSE = 1e-7  # looser than the solver's own: a matrix well inside is wanted, no
 
 @dataclass(frozen=True)
 class Point:
-    """Coefficients the solver returned, believed by nobody.
+    """Coefficients the solver returned, which nobody has to believe.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def semidefinite(side: int) -> Any:
 
 def solved(cost: Array, A: csc_matrix, offset: Array, cones: Sequence[Any], *, quadratic: Array | None = None,
            tolerance: float | None = None) -> Point:
-    """Minimise y'Py/2 + cost'y with offset - A y in the cones.
+    """Minimize y'Py/2 + cost'y with offset - A y in the cones.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from ._solver import Array, Point, nonnegative, second_order, solved
 
 def group_sparse(G: Array, c: Array, groups: Sequence[NDArray[np.intp]], weights: Array, lower: Array,
                  upper: Array) -> Point:
-    """Minimise x'Gx/2 - c'x + Σ_g w_g |x_g| with lower <= x <= upper.
+    """Minimize x'Gx/2 - c'x + Σ_g w_g |x_g| with lower <= x <= upper.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Linear time-invariant systems: candidates in floats for certificates that the checker proves. No conic solver.
 
-Shared by the rooms certify and coupling; public through `robthermal.certify`.
+Shared by the packages certify and coupling; public through `robthermal.certify`.
 """
 
 from ._bound import GainBound as GainBound

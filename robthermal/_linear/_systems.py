@@ -55,7 +55,7 @@ def read_plant(system: Any, where: str = "argument system") -> Plant:
     try:
         found = control.ss(system)
     except (control.ControlMIMONotImplemented, ValueError) as error:
-        raise InputError(f"a transfer function that cannot be realised here: {error}", where=where,
+        raise InputError(f"a transfer function that cannot be realized here: {error}", where=where,
                          expected="a StateSpace, or a proper transfer function with one input and output") from None
     n, m, p = found.nstates, found.ninputs, found.noutputs
     arrays = (np.asarray(found.A, float).reshape(n, n), np.asarray(found.B, float).reshape(n, m),

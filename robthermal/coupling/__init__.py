@@ -1,9 +1,9 @@
 """Coupling filters between two controlled subsystems: Youla factors, measured uncertainty, proven robust stability."""
 
-from .analysis import Destabilising as Destabilising
+from .analysis import Destabilizing as Destabilizing
 from .analysis import Simulation as Simulation
 from .analysis import WorstCase as WorstCase
-from .analysis import destabilising as destabilising
+from .analysis import destabilizing as destabilizing
 from .analysis import simulate as simulate
 from .analysis import worst_case as worst_case
 from .evaluation import Filters as Filters
@@ -31,8 +31,8 @@ from .problem import Norm as Norm
 from .problem import Performance as Performance
 from .synthesis import synthesize as synthesize
 
-__all__ = ["NORMS", "CoprimeFactors", "Destabilising", "Filters", "FixedPoint", "Joint", "MuBound", "Norm",
+__all__ = ["NORMS", "CoprimeFactors", "Destabilizing", "Filters", "FixedPoint", "Joint", "MuBound", "Norm",
            "NormalizedFactors",
            "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime",
-           "destabilising", "discretize", "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound",
+           "destabilizing", "discretize", "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound",
            "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]

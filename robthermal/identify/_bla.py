@@ -21,16 +21,16 @@ _ABOVE_FLOOR = 20.0  # power of an excited line relative to the bins between the
 
 
 def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_width: int = 8) -> FrequencyResponse:
-    """Best linear approximation from several realisations of a random-phase multisine, several periods of each.
+    """Best linear approximation from several realizations of a random-phase multisine, several periods of each.
 
     The noise is seen between the lines, where a periodic input and a time-invariant system leave nothing but noise and
     transient; the transient is a local polynomial there and is removed from the lines. What then varies from one
-    realisation to the next beyond the noise is nonlinear distortion: more realisations average it, more periods do not.
+    realization to the next beyond the noise is nonlinear distortion: more realizations average it, more periods do not.
 
     Parameters
     ----------
     records : sequence of Record
-        One record per realisation of the phases, of equal length; at least one more than inputs.
+        One record per realization of the phases, of equal length; at least one more than inputs.
     period : int
         Samples in a period [-]. Samples before the last whole number of periods are left out.
     degree : int
@@ -42,13 +42,13 @@ def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_w
     -------
     FrequencyResponse
         At the excited lines. `noise_covariance` is that of the noise, per sample; `nonlinear_covariance` is
-        E[Y_S Y_S^H] of one period, DFT normalised by 1/sqrt(period); `covariance` contains both.
-        Degrees of freedom = realisations - inputs.
+        E[Y_S Y_S^H] of one period, DFT normalized by 1/sqrt(period); `covariance` contains both.
+        Degrees of freedom = realizations - inputs.
 
     Raises
     ------
     InputError
-        For a period that is not positive or does not fit twice into the records, too few realisations, or no line.
+        For a period that is not positive or does not fit twice into the records, too few realizations, or no line.
 
     References
     ----------
@@ -105,7 +105,7 @@ def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_w
         output_names=first.output_names,
         sample_time=first.sample_time,
         n_samples=n,
-        method=f"bla, {len(records)} realisations, {n_periods} periods of {period} samples",
+        method=f"bla, {len(records)} realizations, {n_periods} periods of {period} samples",
         notes=[_advice(distortion * n_periods, between.noise)],
     )
 
@@ -119,10 +119,10 @@ def _check_counts(n_records: int, n_u: int, n_periods: int, period: int, n_sampl
         )
     if n_records < n_u + 1:
         raise InputError(
-            f"{n_records} realisation(s) for {n_u} input(s)",
+            f"{n_records} realization(s) for {n_u} input(s)",
             where="records",
             expected=f"at least {n_u + 1} records with different random phases",
-            remedy="Record more realisations, or use lpm, which does not tell noise from nonlinear distortion.",
+            remedy="Record more realizations, or use lpm, which does not tell noise from nonlinear distortion.",
         )
 
 
@@ -190,8 +190,8 @@ def _positive_part(matrices: Array) -> Array:
 
 
 def _advice(distortion: Array, noise: Array) -> str:
-    """Which of the two dominates the variance of one realisation, over all lines and outputs."""
+    """Which of the two dominates the variance of one realization, over all lines and outputs."""
     part, rest = (np.einsum("oof->o", matrix).real for matrix in (distortion, noise))
     if np.any(part > rest):
-        return "Nonlinear distortion dominates: take more realisations (more periods do not help), or excite less."
-    return "Noise dominates: take more periods or more realisations, or excite more."
+        return "Nonlinear distortion dominates: take more realizations (more periods do not help), or excite less."
+    return "Noise dominates: take more periods or more realizations, or excite more."

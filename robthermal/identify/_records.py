@@ -113,7 +113,7 @@ def whole_number(value: Any, name: str, *, least: int) -> int:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """DFT of one record, normalised by 1/sqrt(N), bins 1 ... (N-1)//2: Evers (4.2). Bin 0 and Nyquist are left out."""
+    """DFT of one record, normalized by 1/sqrt(N), bins 1 ... (N-1)//2: Evers (4.2). Bin 0 and Nyquist are left out."""
 
     U: Array  # (n_u, F)
     Y: Array  # (n_y, F)

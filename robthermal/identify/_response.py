@@ -34,7 +34,7 @@ class FrequencyResponse:
     response : array_like, shape (n_y, n_u, n_f)
         G [output unit / input unit]; NaN where the data do not determine it.
     noise_covariance : array_like or callable, shape (n_y, n_y, n_f)
-        E[V_o V_p*] [output unit squared], DFT normalised by 1/sqrt(N): white noise of standard deviation s gives s^2.
+        E[V_o V_p*] [output unit squared], DFT normalized by 1/sqrt(N): white noise of standard deviation s gives s^2.
     degrees_of_freedom : array_like, shape (n_f,)
         q of the noise covariance: points used minus rank of the regressors [-].
     covariance : array_like or callable, shape (n_y n_u, n_y n_u, n_f), optional

@@ -86,7 +86,7 @@ def time_figure(run: Simulation) -> Figure:
         axes = run.plot()
         moving = ", its moving average and moving standard deviation" if run.samples else ""
         return Figure.draw(axes[0].figure, alt=f"e12{moving} over time, without and with coupling.",
-                           caption=f"e12{moving}, simulated with one realisation of the disturbances.")
+                           caption=f"e12{moving}, simulated with one realization of the disturbances.")
 
 
 def _drawn(found: Spectra, panel: str, alt: str, caption: str) -> Figure:

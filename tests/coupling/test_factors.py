@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.coupling.systems import Response, Zpk, realise, zpk_of
+from robthermal.coupling.systems import Response, Zpk, realize, zpk_of
 
 from .conftest import DT, Pair, at
 
@@ -65,12 +65,12 @@ def test_cascade_realises_what_it_is_given(seed: int) -> None:
     zeros = np.concatenate([pairs[:2] * 1.3, pairs[:2].conj() * 1.3, rng.uniform(-2, 2, seed % 4)])
     poles = np.concatenate([pairs, pairs.conj(), rng.uniform(-0.9, 0.9, 3), [1.0, 1.0]])
     system = Zpk(zeros.astype(complex), poles.astype(complex), 3e-7, DT)
-    realised = realise(system)
-    assert realised.nstates == len(poles)
+    realized = realize(system)
+    assert realized.nstates == len(poles)
     z = np.exp(1j * W * DT)
     direct = 3e-7 * np.prod(z[:, None] - zeros, axis=1) / np.prod(z[:, None] - poles, axis=1)
     np.testing.assert_allclose(system.at(W)[100:], direct[100:], rtol=1e-6)  # direct loses digits near z = 1
-    np.testing.assert_allclose(Response(realised)(W)[0, 0], system.at(W), rtol=1e-8)
+    np.testing.assert_allclose(Response(realized)(W)[0, 0], system.at(W), rtol=1e-8)
 
 
 def test_responses_of_a_state_space_with_repeated_poles() -> None:

@@ -1,4 +1,4 @@
-"""Normalised coprime factors against their definition and published margins; sampled filters."""
+"""Normalized coprime factors against their definition and published margins; sampled filters."""
 
 import control
 import numpy as np

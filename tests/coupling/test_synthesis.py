@@ -401,8 +401,8 @@ def test_bound_of_worst_case_holds_for_every_phase_and_is_not_far_off(robust):
     assert np.all(largest <= bound) and np.all(largest > 0.75 * bound)
 
 
-def test_a_perturbation_of_the_size_of_the_bound_destabilises(machine, robust):
-    found = rt.coupling.destabilising(robust)
+def test_a_perturbation_of_the_size_of_the_bound_destabilizes(machine, robust):
+    found = rt.coupling.destabilizing(robust)
     assert found.scale == pytest.approx(1 / robust.norms["robust"], rel=0.05) and found.scale > 1
     problem, omega = robust.problem, np.array([found.omega])
     envelope = problem.envelope(omega)[:, :, 0]
@@ -417,14 +417,14 @@ def test_a_perturbation_of_the_size_of_the_bound_destabilises(machine, robust):
         assert (np.abs(poles).max() < 1) == stable
 
 
-def test_filters_that_are_not_robust_have_a_destabilising_perturbation_inside_the_envelope(machine):
+def test_filters_that_are_not_robust_have_a_destabilizing_perturbation_inside_the_envelope(machine):
     bold = rt.coupling.evaluate(machine.P1, machine.P2, machine.C1, machine.C2, X_hat=-1, Y_hat=0.5,
                                 uncertainty=list(machine.frf))
-    assert not bold.robustly_stable and rt.coupling.destabilising(bold).scale < 1
+    assert not bold.robustly_stable and rt.coupling.destabilizing(bold).scale < 1
 
 
 def test_worst_case_needs_an_uncertainty(nominal):
     with pytest.raises(rt.InputError, match="without an uncertainty"):
         rt.coupling.worst_case(nominal)
     with pytest.raises(rt.InputError, match="no perturbation"):
-        rt.coupling.destabilising(nominal)
+        rt.coupling.destabilizing(nominal)

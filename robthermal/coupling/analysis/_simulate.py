@@ -13,14 +13,14 @@ from ...errors import InputError
 from ...signals import Record
 from ..evaluation import Filters
 from ..problem import Performance, Problem, drivers
-from ..systems import apart, realise
+from ..systems import apart, realize
 
 _SAMPLES = 2500
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """e12 under one realisation of the disturbances, without and with coupling.
+    """e12 under one realization of the disturbances, without and with coupling.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _disturbances(problem: Problem, samples: int | None, seed: int, given: Any) 
     if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
         raise InputError(f"samples = {n!r}", where="simulate", expected="a positive number of samples")
     white = np.random.default_rng(seed).standard_normal((2, 2 * n))
-    return _run(apart(realise(problem.one.W), realise(problem.two.W)), white), n
+    return _run(apart(realize(problem.one.W), realize(problem.two.W)), white), n
 
 
 def _given(disturbances: Any, dt: float) -> Array:
@@ -224,7 +224,7 @@ def _gate(on: Any, n: int) -> Array:
 
 def _alone(problem: Problem) -> control.StateSpace:
     """C1 and C2 apart: e to (u, e)."""
-    own = apart(realise(problem.one.C), realise(problem.two.C))
+    own = apart(realize(problem.one.C), realize(problem.two.C))
     return control.StateSpace(own.A, own.B, np.vstack([own.C, np.zeros(own.C.shape)]), np.vstack([own.D, np.eye(2)]),
                               problem.dt, remove_useless_states=False)
 
@@ -232,7 +232,7 @@ def _alone(problem: Problem) -> control.StateSpace:
 def _loops(problem: Problem, controllers: tuple[control.StateSpace, ...], gate: Array, v: Array
            ) -> tuple[Array, Array]:
     """e and e+ (2, n) of u = K e, e = -y, y = v + P u, with the second controller where the gate is on."""
-    P = apart(realise(problem.one.P), realise(problem.two.P))
+    P = apart(realize(problem.one.P), realize(problem.two.P))
     x, k = np.zeros(P.nstates), np.zeros(controllers[0].nstates)
     direct = [np.linalg.inv(np.eye(2) + P.D @ K.D[:2]) for K in controllers]
     e, seen = np.empty(v.shape), np.empty(v.shape)

@@ -1,6 +1,6 @@
-"""Worst-case performance over the uncertainty, frequency by frequency; and a perturbation that destabilises.
+"""Worst-case performance over the uncertainty, frequency by frequency; and a perturbation that destabilizes.
 
-With the factors normalised to Dp Dk + Np Nk = 1 (which turns Delta_k into F and Delta_p into E = U Delta_p below), the
+With the factors normalized to Dp Dk + Np Nk = 1 (which turns Delta_k into F and Delta_p into E = U Delta_p below), the
 coupled loop with the plant of Delta_p has
 
     e12 = [nominal - row (I + E F)⁻¹ E G] v,   F = Delta_k in those factors,

@@ -10,8 +10,8 @@ import control
 
 from ...errors import Outcome
 from ..factors import intervals_of
-from ..problem import NORMS, Problem, Proofs, Realisation, coupled, h2, prepare, realisation, variances, youla_parameter
-from ..systems import LTI, beside, negative, plus_one, realise, series, state_space_of
+from ..problem import NORMS, Problem, Proofs, Realization, coupled, h2, prepare, realization, variances, youla_parameter
+from ..systems import LTI, beside, negative, plus_one, realize, series, state_space_of
 from ._filters import Filters
 
 
@@ -90,7 +90,7 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
     prove : bool
         False: numbers only; the result does not hold.
     """
-    parts = realisation(problem, X_hat, Y_hat)
+    parts = realization(problem, X_hat, Y_hat)
     proofs = Proofs(prove)
     norms = _norms(problem, parts, proofs)
     robust, where = _robust_numbers(problem, X_hat, Y_hat, proofs)
@@ -105,7 +105,7 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
     outcome = _outcome(problem, nominal, robustly, broken, proofs)
     row = coupled(problem, parts.X, parts.Y, "S")
     return Filters(
-        X=parts.X, Y=parts.Y, X_hat=X_hat, Y_hat=Y_hat, Z1=realise(problem.one.Z), Z2=realise(problem.two.Z),
+        X=parts.X, Y=parts.Y, X_hat=X_hat, Y_hat=Y_hat, Z1=realize(problem.one.Z), Z2=realize(problem.two.Z),
         X_input=parts.X_input, Y_input=parts.Y_input, controller=parts.controller,
         improvement_1=plus_one(parts.Y), improvement_2=plus_one(parts.X), e12=beside(negative(row[0]), row[1]),
         norms=norms, performance=performance, nominally_stable=nominal, robustly_stable=robustly,
@@ -139,9 +139,9 @@ def refused(problem: Problem, outcome: Outcome, *, basis: str, order: int, solve
     return result.with_outcome(outcome)
 
 
-def _norms(problem: Problem, parts: Realisation, proofs: Proofs) -> dict[str, float]:
+def _norms(problem: Problem, parts: Realization, proofs: Proofs) -> dict[str, float]:
     signals = coupled(problem, parts.X, parts.Y)
-    alone = realise(problem.one.signal), realise(problem.two.signal)
+    alone = realize(problem.one.signal), realize(problem.two.signal)
     systems = {"X": parts.X, "Y": parts.Y, "XY": series(parts.X, parts.Y), "improvement_1": plus_one(parts.Y),
                "improvement_2": plus_one(parts.X), "hinf": beside(*signals), "hinf_uncoupled": beside(*alone)}
     proven = {key: proofs.norm(system, NORMS[key].proof) for key, system in systems.items()}

@@ -10,7 +10,7 @@ from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lya
 
 from ..._arrays import Array
 from ...errors import InputError, Outcome
-from ..systems import Zpk, realise, series
+from ..systems import Zpk, realize, series
 
 if TYPE_CHECKING:
     from ._filters import Filters
@@ -70,7 +70,7 @@ def _keeps(short: Filters, long: Filters, tolerance: float) -> bool:
 
 
 def objective(filters: Filters) -> float:
-    """What a design minimises: moving average with a window, else h2 where it is finite, else hinf.
+    """What a design minimizes: moving average with a window, else h2 where it is finite, else hinf.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _truncated(hat: control.StateSpace, signal: Zpk, order: int) -> control.Stat
     n = hat.nstates
     if order >= n:
         return hat
-    weighted = series(hat, realise(signal)) if signal.gain else hat
+    weighted = series(hat, realize(signal)) if signal.gain else hat
     first = weighted.nstates - n
     own, shaped = _gramian(hat.A, hat.B, hat.dt), _gramian(weighted.A, weighted.B, hat.dt)[first:, first:]
     inputs = shaped / max(np.trace(shaped), 1e-300) + 1e-6 * own / np.trace(own)

@@ -14,7 +14,7 @@ from ..._arrays import Array
 from ..._linear import hinf
 from ...errors import InputError
 from ...verification import Certificate
-from ..systems import Response, Zpk, apart, diagonal, minus_identity, natural, realise, sample_time_of, series
+from ..systems import Response, Zpk, apart, diagonal, minus_identity, natural, realize, sample_time_of, series
 from ._loop import Loop, close
 
 
@@ -22,7 +22,7 @@ from ._loop import Loop, close
 class CoprimeFactors:
     """P0 = Np Dp⁻¹ and K0 = Nk Dk⁻¹, stable and coprime; diagonal, so right factors are left factors too.
 
-    Normalised for use: \\|Np\\| = 1 (below the cut-off), \\|Dk\\| = 1 away from integrators.
+    Normalized for use: \\|Np\\| = 1 (below the cut-off), \\|Dk\\| = 1 away from integrators.
 
     Parameters
     ----------
@@ -78,16 +78,16 @@ class CoprimeFactors:
 
     @property
     def residual(self) -> float:
-        """Largest \\|L Np + W Dp - 1\\| of the realised factors over 2000 frequencies and their corners [-]."""
+        """Largest \\|L Np + W Dp - 1\\| of the realized factors over 2000 frequencies and their corners [-]."""
         omega = corner_grid([root for loop in self.loops for root in (loop.P, loop.C, loop.S)], 2000)
         L, N, W, D = (Response(system)(omega) for system in (self.L, self.Np, self.W, self.Dp))
         product = np.einsum("ijf,jkf->ikf", L, N) + np.einsum("ijf,jkf->ikf", W, D)
         return float(np.max(np.abs(product - np.eye(len(self.loops))[:, :, None])))
 
     def bezout(self, bound: float = 1e-6) -> Certificate:
-        """Certificate that the realised factors satisfy L Np + W Dp = I + E with a norm of E below the bound.
+        """Certificate that the realized factors satisfy L Np + W Dp = I + E with a norm of E below the bound.
 
-        Below 1, I + E has a stable inverse, so the realised Np and Dp are coprime.
+        Below 1, I + E has a stable inverse, so the realized Np and Dp are coprime.
 
         Parameters
         ----------
@@ -217,4 +217,4 @@ def _unit_inverse(loop: Loop) -> Zpk:
 
 
 def _both(channels: Any) -> control.StateSpace:
-    return reduce(apart, [realise(channel) for channel in channels])
+    return reduce(apart, [realize(channel) for channel in channels])

@@ -8,7 +8,7 @@ from scipy.signal import buttap
 
 from ..._arrays import Array
 from ...errors import InputError
-from ..systems import LTI, Zpk, on_boundary, realise, sample_time_of, stable, zpk_of
+from ..systems import LTI, Zpk, on_boundary, realize, sample_time_of, stable, zpk_of
 
 _FASTER = 10.0  # default cut-off over the fastest pole or zero
 _SAME_ZERO = 1e-6  # how well a given Z must hold a wrong-side zero of P
@@ -51,7 +51,7 @@ def inner_factor(P: LTI, cutoff: float | None = None) -> tuple[control.StateSpac
     """
     plant = zpk_of(P, "P", sample_time_of({"P": P}))
     Z = inner_zpk(plant, "P", cutoff)
-    return realise(Z), realise(inverse_times(plant, Z, "Z", "P"))
+    return realize(Z), realize(inverse_times(plant, Z, "Z", "P"))
 
 
 def inner_zpk(plant: Zpk, where: str, cutoff: float | None, other_corners: Array | None = None) -> Zpk:

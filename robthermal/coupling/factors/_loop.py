@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...errors import InputError
-from ..systems import LTI, Zpk, constant, expect_stable, natural, paired, realise, stable, zpk_of
+from ..systems import LTI, Zpk, constant, expect_stable, natural, paired, realize, stable, zpk_of
 from ._inner import inner_zpk, inverse_times
 
 
@@ -71,7 +71,7 @@ def _closed_loop_poles(plant: Zpk, controller: Zpk, names: tuple[str, str, str])
     if abs(direct) < 1e-12:
         raise InputError("1 + P(∞) C(∞) = 0: the loop is not well posed", where=where,
                          expected="a well-posed loop", remedy="Add a delay or a low-pass filter to the controller.")
-    poles = paired(np.linalg.eigvals(feedback_matrix(realise(plant), realise(controller))))
+    poles = paired(np.linalg.eigvals(feedback_matrix(realize(plant), realize(controller))))
     expect_stable(poles, where, plant.dt, "the loop of plant and controller is unstable",
                   "The controllers must stabilise their own plants (negative feedback, e = r - y).")
     return _polished(poles, plant, controller)

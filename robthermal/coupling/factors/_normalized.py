@@ -1,4 +1,4 @@
-"""Normalised coprime factors: P = N M⁻¹ (right) or M⁻¹ N (left) with [N; M] inner, [N M] co-inner."""
+"""Normalized coprime factors: P = N M⁻¹ (right) or M⁻¹ N (left) with [N; M] inner, [N M] co-inner."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SIDES = ("right", "left")
 
 @dataclass(frozen=True)
 class NormalizedFactors:
-    """Normalised coprime factors of a plant.
+    """Normalized coprime factors of a plant.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class NormalizedFactors:
 
 
 def normalized(P: Any, side: Literal["right", "left"] = "right") -> NormalizedFactors:
-    """Normalised coprime factors of a plant, N~N + M~M = 1 on the axis or the unit circle (left: N N~ + M M~ = 1).
+    """Normalized coprime factors of a plant, N~N + M~M = 1 on the axis or the unit circle (left: N N~ + M M~ = 1).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def normalized(P: Any, side: Literal["right", "left"] = "right") -> NormalizedFa
     except np.linalg.LinAlgError:
         raise InputError("the Riccati equation has no stabilising solution", where="argument P",
                          expected="a plant whose unstable modes and modes on the boundary are all reached and seen",
-                         remedy="Take a minimal realisation (control.minreal).") from None
+                         remedy="Take a minimal realization (control.minreal).") from None
     rows = {"N": (C + D @ F, D @ root), "M": (F, root)}
     parts = {name: (A + B @ F, B @ root, output, through) for name, (output, through) in rows.items()}
     if side == "left":

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from ..._arrays import Array
 from ...errors import InputError
-from ..systems import Zpk, paired, realise
+from ..systems import Zpk, paired, realize
 from ._uncertainty import Uncertainty
 
 
@@ -63,7 +63,7 @@ def overbound(uncertainty: Uncertainty, row: int, column: int, order: int = 8) -
     corners = np.geomspace(positive[0], positive[-1], order)
     spectra = np.column_stack([np.ones(len(x)), 1 / (1 + x[:, None] / corners)])
     weights = _smallest_above(spectra, target)
-    return realise(_factor(weights, corners, dt))
+    return realize(_factor(weights, corners, dt))
 
 
 def _warped(omega: Array, dt: float) -> Array:

@@ -134,7 +134,7 @@ def _climb(M: Complex, structure: Structure, Delta: Complex, upper: Real) -> Com
         a, w = _eigenvectors(M[todo][:, None] @ Delta[todo])
         goal = _perturbation(structure, a, w @ M[todo].conj())
         steps = _STEPS[:, None, None]
-        tried = _normalised(structure, Delta[todo][:, :, None] + steps * (goal - Delta[todo])[:, :, None])
+        tried = _normalized(structure, Delta[todo][:, :, None] + steps * (goal - Delta[todo])[:, :, None])
         found = _radius(M[todo][:, None, None] @ tried)
         which = found.argmax(2)
         new = np.take_along_axis(found, which[:, :, None], 2)[:, :, 0]
@@ -149,7 +149,7 @@ def _climb(M: Complex, structure: Structure, Delta: Complex, upper: Real) -> Com
     return Delta
 
 
-def _normalised(structure: Structure, Delta: Complex) -> Complex:
+def _normalized(structure: Structure, Delta: Complex) -> Complex:
     """Blocks divided by their norms: |eigenvalue| may only grow with each of them at a maximum."""
     out = np.zeros_like(Delta)
     for block in structure.blocks:

@@ -139,14 +139,14 @@ def _centre(M: Complex, structure: Structure, enough2: Real) -> tuple[Real, Comp
         best[better], Z[todo] = x[better], dual
         gain2[todo] = np.minimum(gain2[todo], new)
         kept = np.minimum(new, gamma2[todo])
-        room = gamma2[todo] - kept
-        gamma2[todo] = np.maximum(kept + _BACK_OFF * room, enough2[todo])
-        todo = todo[(room > _STALLED * kept) & (kept > _SMALLEST) & ~last]
+        gap = gamma2[todo] - kept
+        gamma2[todo] = np.maximum(kept + _BACK_OFF * gap, enough2[todo])
+        todo = todo[(gap > _STALLED * kept) & (kept > _SMALLEST) & ~last]
     return best, Z
 
 
 def _newton(x: Real, G: Complex, weight: Real) -> Real:
-    """Centre of F = sum x G > 0: minimise −log det F + weight x (the weight fixes the free size of X)."""
+    """Centre of F = sum x G > 0: minimize −log det F + weight x (the weight fixes the free size of X)."""
     n_f, count = x.shape
     for _ in range(_NEWTON_STEPS):
         s, U = np.linalg.eigh(_sum(x, G))
@@ -166,7 +166,7 @@ def _newton(x: Real, G: Complex, weight: Real) -> Real:
 
 
 def _length(rates: Real, slope: Real, decrement: Real) -> Real:
-    """Step length: minimise −sum log(1 + t rates) + t slope over t, exactly enough, and stay inside."""
+    """Step length: minimize −sum log(1 + t rates) + t slope over t, exactly enough, and stay inside."""
     furthest = np.where(rates[:, 0] < 0, -0.99 / np.minimum(rates[:, 0], -1e-9), 1e3)
     t = np.minimum(1 / (1 + decrement), furthest)
     for _ in range(4):

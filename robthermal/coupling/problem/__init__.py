@@ -11,10 +11,10 @@ from ._problem import Problem as Problem
 from ._problem import Subsystem as Subsystem
 from ._problem import prepare as prepare
 from ._radius import radius as radius
-from ._realisation import Realisation as Realisation
-from ._realisation import drivers as drivers
-from ._realisation import realisation as realisation
-from ._realisation import youla_parameter as youla_parameter
+from ._realization import Realization as Realization
+from ._realization import drivers as drivers
+from ._realization import realization as realization
+from ._realization import youla_parameter as youla_parameter
 
-__all__ = ["NORMS", "Norm", "Performance", "Problem", "Proofs", "Realisation", "Subsystem", "coupled", "drivers", "h2",
-           "prepare", "radius", "realisation", "variances", "youla_parameter"]
+__all__ = ["NORMS", "Norm", "Performance", "Problem", "Proofs", "Realization", "Subsystem", "coupled", "drivers", "h2",
+           "prepare", "radius", "realization", "variances", "youla_parameter"]

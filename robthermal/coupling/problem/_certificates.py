@@ -14,7 +14,7 @@ from ..factors import Intervals
 from ..systems import Response, connected
 from ._norms import NORMS
 
-_ROOM = (1.002, 1.01, 1.04)  # first asked for; then, where the proof fails, backed off
+_PROOF_MARGINS = (1.002, 1.01, 1.04)  # first asked for; then, where the proof fails, backed off
 
 
 @dataclass
@@ -70,8 +70,8 @@ class Proofs:
             proof = frequency_radius(system, intervals.edges[[0, -1]], intervals.widest(), 1e-6)
             return (0.0 if self._kept(proof, NORMS["robust"].proof) else float("inf")), where
         merged = intervals.merged(radii, worst)
-        for room in _ROOM:
-            bound = worst * room if worst >= 1.0 else min(worst * room, 0.5 * (1.0 + worst))
+        for margin in _PROOF_MARGINS:
+            bound = worst * margin if worst >= 1.0 else min(worst * margin, 0.5 * (1.0 + worst))
             certificate = frequency_radius(system, merged.edges, merged.envelopes, bound)
             if certificate.holds:
                 break
@@ -83,7 +83,7 @@ class Proofs:
             return 0.0
         floor = np.max(weights) * 1e-12
         scalings = np.maximum(weights, floor)[:, None, None] * np.eye(2)
-        return float(np.max(interval_norms(system, intervals.edges, left=scalings))) * _ROOM[0]
+        return float(np.max(interval_norms(system, intervals.edges, left=scalings))) * _PROOF_MARGINS[0]
 
     def _kept(self, certificate: Certificate, what: str) -> bool:
         if certificate.holds:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from ..._arrays import Array
-from ..systems import plus_one, realise, series
+from ..systems import plus_one, realize, series
 from ._problem import Problem, Subsystem
 
 
@@ -52,7 +52,7 @@ def variances(problem: Problem, X: control.StateSpace, Y: control.StateSpace) ->
     """
     if not problem.samples:
         return Performance(*[float("nan")] * 4)
-    before = [_moving(realise(half.SW), problem.samples) for half in (problem.one, problem.two)]
+    before = [_moving(realize(half.SW), problem.samples) for half in (problem.one, problem.two)]
     after = [_moving(channel, problem.samples) for channel in coupled(problem, X, Y, "SW")]
     values = [3 * float(np.sqrt(sum(part[kind] for part in parts))) for kind in (0, 1) for parts in (before, after)]
     return Performance(*values)
@@ -86,7 +86,7 @@ def h2(systems: tuple[control.StateSpace, ...]) -> float:
 
 
 def _improved(half: Subsystem, coupling: control.StateSpace, field: str) -> control.StateSpace:
-    return series(plus_one(coupling), realise(getattr(half, field)))
+    return series(plus_one(coupling), realize(getattr(half, field)))
 
 
 def _variance(system: control.StateSpace) -> float:

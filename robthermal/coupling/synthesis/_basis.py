@@ -1,6 +1,6 @@
 """Stable bases for coupling filters: FIR, Laguerre, prescribed poles. A filter is c[0] + c[1] f_1 + c[2] f_2 + ...
 
-The functions f_k are the states of a cascade of all-pass sections, one per pole. Each section is realised
+The functions f_k are the states of a cascade of all-pass sections, one per pole. Each section is realized
 input-balanced, so the f_k are orthonormal in H2 whatever the poles; equal poles make Laguerre functions, poles at zero
 the delays of an FIR filter (Heuberger, Van den Hof and Wahlberg 2005, Modelling and Identification with Rational
 Orthogonal Basis Functions, chapter 2).
@@ -29,7 +29,7 @@ class Basis:
     name : str
         "fir", "laguerre" or "poles".
     A, B : ndarray, shapes (n - 1, n - 1) and (n - 1, 1)
-        Realisation, real, stable.
+        Realization, real, stable.
     sample_time : float
         [s]; 0 for continuous time.
     """
@@ -131,7 +131,7 @@ def _cascade(poles: Array, sample_time: float) -> tuple[Array, Array]:
 
 
 def _section(p: complex, sample_time: float) -> tuple[Array, Array, Array, Array]:
-    """All-pass function with pole p (and its conjugate), realised with controllability Gramian I."""
+    """All-pass function with pole p (and its conjugate), realized with controllability Gramian I."""
     if p.imag == 0:
         A, B = np.array([[p.real]]), np.ones((1, 1))
     else:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ..problem import Problem, radius
-from ..systems import Response, Zpk, natural, realise
+from ..systems import Response, Zpk, natural, realize
 from ._basis import Basis
 from ._moments import moments, square_root
 from ._program import Demands, Responses
@@ -46,7 +46,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Design:
-    """One synthesis: the problem, the basis, what is minimised and which filters may act.
+    """One synthesis: the problem, the basis, what is minimized and which filters may act.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Design:
         samples = max(self.problem.samples, 1)
         scaled = (Zpk(s.zeros, s.poles, s.gain / self.size, s.dt) for s in self.coloured)
         factors = (self.problem.one.Z, self.problem.two.Z)
-        return [moments(realise(signal), realise(Z), self.basis, samples)
+        return [moments(realize(signal), realize(Z), self.basis, samples)
                 for signal, Z in zip(scaled, factors, strict=True)]
 
     def demands(self, limits: Limits) -> Demands:

@@ -55,7 +55,7 @@ class Responses:
 
 @dataclass(frozen=True)
 class Demands:
-    """What is minimised, and below which bounds everything else stays; None: no bound.
+    """What is minimized, and below which bounds everything else stays; None: no bound.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Solution:
 
 
 def solve(responses: Responses, demands: Demands, start: Array | None = None) -> Solution:
-    """Minimise the objective; frequencies and ellipses are refined until nothing changes.
+    """Minimize the objective; frequencies and ellipses are refined until nothing changes.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ def synthesize(
     weight : LTI or number
         Filter on e12. Not together with `window`.
     window : float, optional
-        Exposure time [s], discrete only: the moving average of e12 over round(window/dt) samples is minimised.
+        Exposure time [s], discrete only: the moving average of e12 over round(window/dt) samples is minimized.
     msd_limit : float, optional
         With `window`: largest moving standard deviation, relative to the uncoupled one [-].
     objective : {"h2", "hinf", "mixed"}
@@ -149,7 +149,7 @@ def _prove_or_back_off(design: Design, start: Array | None, limits: Limits, star
             break
         requested, start = design.values(solution.coefficients), solution.coefficients
         excess = _excess(requested | design.relative_spread(solution.coefficients), asked, _MARGINS)
-        if all(ratio <= 1 for ratio in excess.values()):  # proofs take longest: only where there is room for them
+        if all(ratio <= 1 for ratio in excess.values()):  # proofs take longest: only where they can succeed
             X_hat, Y_hat = (design.basis.filter(c) for c in solution.coefficients)
             filters = finish(design.problem, X_hat, Y_hat, basis=design.basis.name, order=design.basis.size,
                              requested=requested, asked=asked, solve_time=time.perf_counter() - started)
@@ -171,9 +171,9 @@ def _asked(design: Design, limits: Limits) -> dict[str, float]:
     return {name: bound for name, bound in named.items() if bound is not None}
 
 
-def _excess(reached: dict[str, float], asked: dict[str, float], room: dict[str, float]) -> dict[str, float]:
-    """What was reached, with the room its proof needs, over what was asked."""
-    return {name: reached[name] * room.get(name, 1.0) / bound for name, bound in asked.items()}
+def _excess(reached: dict[str, float], asked: dict[str, float], margins: dict[str, float]) -> dict[str, float]:
+    """What was reached, with the margin its proof needs, over what was asked."""
+    return {name: reached[name] * margins.get(name, 1.0) / bound for name, bound in asked.items()}
 
 
 def _tightened(limits: Limits, excess: dict[str, float]) -> Limits:

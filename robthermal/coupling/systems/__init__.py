@@ -1,7 +1,7 @@
 """Linear systems as zeros, poles and gain, as state spaces, and as responses at frequencies."""
 
 from ._cascade import grouped as grouped
-from ._cascade import realise as realise
+from ._cascade import realize as realize
 from ._joined import apart as apart
 from ._joined import beside as beside
 from ._joined import minus_identity as minus_identity
@@ -25,5 +25,5 @@ from ._zpk import on_boundary as on_boundary
 from ._zpk import stable as stable
 
 __all__ = ["LTI", "Response", "Zpk", "apart", "beside", "connected", "constant", "diagonal", "expect_stable", "grouped",
-           "minus_identity", "natural", "negative", "on_boundary", "paired", "plus_one", "realise", "sample_time_of",
+           "minus_identity", "natural", "negative", "on_boundary", "paired", "plus_one", "realize", "sample_time_of",
            "series", "siso", "stable", "state_space_of", "zpk_of"]

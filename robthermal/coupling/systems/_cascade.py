@@ -11,7 +11,7 @@ from ._zpk import Zpk
 Matrices = tuple[Array, Array, Array, Array]
 
 
-def realise(system: Zpk) -> control.StateSpace:
+def realize(system: Zpk) -> control.StateSpace:
     """State space of order len(poles), block triangular: its eigenvalues are the given poles.
 
     Parameters

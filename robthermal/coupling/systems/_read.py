@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...errors import InputError
-from ._cascade import realise
+from ._cascade import realize
 from ._roots import paired, snapped, zeros_and_gain
 from ._zpk import Zpk, constant, stable
 
@@ -74,7 +74,7 @@ def state_space_of(system: LTI, where: str, dt: float) -> control.StateSpace:
         _expect_siso(system, where, dt)
         A, B, C, D = _without_idle_states(system, where, dt)
         return control.StateSpace(A, B, C, D, dt, remove_useless_states=False)
-    return realise(zpk_of(system, where, dt))
+    return realize(zpk_of(system, where, dt))
 
 
 def expect_stable(poles: Array, where: str, dt: float, what: str = "is unstable", remedy: str = "") -> None:

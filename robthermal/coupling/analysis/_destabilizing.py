@@ -12,14 +12,14 @@ from ..._arrays import Array
 from ...errors import InputError
 from ..evaluation import Filters
 from ..problem import Problem, radius
-from ..systems import Zpk, realise, siso
+from ..systems import Zpk, realize, siso
 
 _GRID_POINTS, _FINER = 2500, 400
 _FAR = 1e8  # roots this far out or in count as infinite or zero
 
 
 @dataclass(frozen=True, eq=False)
-class Destabilising:
+class Destabilizing:
     """Delta_p with det(I + Delta_p Delta_k) = 0 at one frequency, `scale` times the envelope there.
 
     Parameters
@@ -40,8 +40,8 @@ class Destabilising:
     system: control.StateSpace
 
 
-def destabilising(filters: Filters, width: float = 1e-3) -> Destabilising:
-    """Show that the robust number is tight: a perturbation 1/robust times the envelope that destabilises.
+def destabilizing(filters: Filters, width: float = 1e-3) -> Destabilizing:
+    """Show that the robust number is tight: a perturbation 1/robust times the envelope that destabilizes.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def destabilising(filters: Filters, width: float = 1e-3) -> Destabilising:
 
     Returns
     -------
-    Destabilising
+    Destabilizing
 
     Raises
     ------
     InputError
-        If no perturbation under any multiple of the envelope destabilises: no uncertainty, or one-way coupling.
+        If no perturbation under any multiple of the envelope destabilizes: no uncertainty, or one-way coupling.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def destabilising(filters: Filters, width: float = 1e-3) -> Destabilising:
     >>> machine = rt.systems.scanner()
     >>> filters = rt.coupling.evaluate(machine.P1, machine.P2, machine.C1, machine.C2, X_hat=-1, Y_hat=1,
     ...                                uncertainty=list(machine.frf))
-    >>> found = rt.coupling.destabilising(filters)
+    >>> found = rt.coupling.destabilizing(filters)
     >>> filters.robustly_stable, found.scale < 1  # not robust: a plant inside the envelope is not stabilised
     (False, True)
     """
@@ -74,12 +74,12 @@ def destabilising(filters: Filters, width: float = 1e-3) -> Destabilising:
     R = problem.envelope(np.array([omega]))[:, :, 0]
     size = float(radius(R, abs(a), abs(b)))
     if not size > 0:
-        raise InputError("no perturbation under any multiple of the envelope destabilises this loop",
-                         where="destabilising", expected="filters with uncertainty that couple both ways")
+        raise InputError("no perturbation under any multiple of the envelope destabilizes this loop",
+                         where="destabilizing", expected="filters with uncertainty that couple both ways")
     # Delta_k Delta_p = -|Delta_k| R / size then has the eigenvalue -1.
     phases = -np.exp(-1j * np.angle([b, a]))
     delta = phases[:, None] * R / size
-    return Destabilising(omega, delta, 1 / size, _through(delta, omega, width, problem))
+    return Destabilizing(omega, delta, 1 / size, _through(delta, omega, width, problem))
 
 
 def _youla(filters: Filters, omega: Array) -> tuple[Array, Array]:
@@ -128,4 +128,4 @@ def _entry(value: complex, omega: float, width: float, dt: float) -> control.Sta
     if dt:
         zeros, poles = np.append((1 + zeros) / (1 - zeros), -1.0), (1 + poles) / (1 - poles)
     shape = Zpk(zeros, poles, 1.0, dt)
-    return realise(replace(shape, gain=float(np.real(value / shape.at(np.array([omega]))[0]))))
+    return realize(replace(shape, gain=float(np.real(value / shape.at(np.array([omega]))[0]))))

@@ -11,12 +11,12 @@ from scipy.linalg import block_diag
 from ..._arrays import Array
 from ...errors import InputError
 from ..factors import feedback_matrix
-from ..systems import apart, expect_stable, realise, series
+from ..systems import apart, expect_stable, realize, series
 from ._problem import Problem, Subsystem
 
 
 @dataclass(frozen=True, eq=False)
-class Realisation:
+class Realization:
     """The coupling as state spaces.
 
     Parameters
@@ -40,7 +40,7 @@ class Realisation:
     loop_matrix: Array
 
 
-def realisation(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace) -> Realisation:
+def realization(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace) -> Realization:
     """Build K_Delta = [[C1, P1⁻¹X], [P2⁻¹Y, C2]] [[1, -X], [-Y, 1]]⁻¹, Evers (6.12).
 
     Parameters
@@ -57,12 +57,12 @@ def realisation(problem: Problem, X_hat: control.StateSpace, Y_hat: control.Stat
     if abs(1.0 - direct) < 1e-9:
         raise InputError("1 - X(∞)Y(∞) = 0: the coupling controller is not well posed", where="X_hat, Y_hat",
                          expected="X(∞)Y(∞) other than 1", remedy="Let one of the filters roll off.")
-    own = [realise(problem.one.C), realise(problem.two.C)]
+    own = [realize(problem.one.C), realize(problem.two.C)]
     driver, coupling = _assembled(both, own, problem.dt)
     controller = control.StateSpace(driver.A, driver.B, driver.C[:2], driver.D[:2], problem.dt,
                                     remove_useless_states=False)
-    plants = apart(realise(problem.one.P), realise(problem.two.P))
-    return Realisation(X=_output(both[0], 0), Y=_output(both[1], 0), X_input=_output(both[0], 1),
+    plants = apart(realize(problem.one.P), realize(problem.two.P))
+    return Realization(X=_output(both[0], 0), Y=_output(both[1], 0), X_input=_output(both[0], 1),
                        Y_input=_output(both[1], 1), controller=controller, coupling_matrix=coupling,
                        loop_matrix=feedback_matrix(plants, controller))
 
@@ -79,7 +79,7 @@ def drivers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpa
         Stable, one input and one output.
     """
     both = [_two_outputs(problem.one, X_hat), _two_outputs(problem.two, Y_hat)]
-    own = [realise(problem.one.C), realise(problem.two.C)]
+    own = [realize(problem.one.C), realize(problem.two.C)]
     return _assembled(both, own, problem.dt)[0], _assembled(both, own, problem.dt, connected=0.0)[0]
 
 
@@ -93,8 +93,8 @@ def youla_parameter(problem: Problem, X_hat: control.StateSpace, Y_hat: control.
     X_hat, Y_hat : StateSpace
         Stable, one input and one output.
     """
-    upper = _trimmed(X_hat, series(X_hat, realise(problem.two.Dk)))
-    lower = _trimmed(Y_hat, series(Y_hat, realise(problem.one.Dk)))
+    upper = _trimmed(X_hat, series(X_hat, realize(problem.two.Dk)))
+    lower = _trimmed(Y_hat, series(Y_hat, realize(problem.one.Dk)))
     zero = np.zeros((1, 1))
     return control.StateSpace(
         block_diag(upper.A, lower.A),
@@ -122,7 +122,7 @@ def _two_outputs(half: Subsystem, filter: control.StateSpace) -> control.StateSp
     """[Z; Q] times the filter: the coupling signal and the plant input that makes it, sharing the filter's states."""
     if is_zero(filter):
         return control.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.zeros((2, 1)), half.P.dt)
-    Z, Q = realise(half.Z), realise(half.Q)
+    Z, Q = realize(half.Z), realize(half.Q)
     A = np.block([[filter.A, np.zeros((filter.nstates, Z.nstates + Q.nstates))],
                   [Z.B @ filter.C, Z.A, np.zeros((Z.nstates, Q.nstates))],
                   [Q.B @ filter.C, np.zeros((Q.nstates, Z.nstates)), Q.A]])
