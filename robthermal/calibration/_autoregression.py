@@ -59,11 +59,11 @@ class Correlation:
     def bias(self, psi: Array) -> float:
         """Factor by which the autoregression's spectral density at frequency zero is too small on average.
 
-        Its pole φ comes out too small by 2φ/n (Marriott and Pope, 1954), hence S(0) by a part 2/n_e of itself, with n_e
-        independent samples per sensor; nothing of white residuals.
+        Where a level is fitted too, as by start temperatures, its pole φ comes out too small by (1 + 3φ)/n (Kendall,
+        1954), hence S(0) by a part 4/n_e of itself, with n_e independent samples per sensor; nothing of white residuals.
         """
         share = self.share(psi)
-        return 1.0 + 2.0 * (1.0 - share) / max(share * len(psi), 1.0)
+        return 1.0 + 4.0 * (1.0 - share) / max(share * len(psi), 1.0)
 
 
 def correlation_of(segments: list[Array]) -> Correlation:

@@ -130,6 +130,9 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
     ...                                              "links.bar-room.conductance": (0.1, 5.0)})
     >>> round(fit.parameters["lumps.bar.capacity"]), fit.outcome.code
     (100, 'converged')
+    >>> low, high = fit.ranges(0.95)["lumps.bar.capacity"]
+    >>> low < 100.0 < high < 101.0
+    True
     """
     _check_options(system, initial, loss, max_iterations, method)
     if isinstance(data, FrequencyResponse):

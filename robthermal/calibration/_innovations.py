@@ -20,10 +20,10 @@ _STEADY = 1e-12  # relative change of the state covariance at which the gain cou
 class Whitener:
     """Maps free-run residuals to innovations of unit covariance: z = L⁻¹ r, linear in r.
 
-    With the machine's deviation from the model δx(k+1) = A δx(k) + w, cov w = `Q`, and residual (measured − modelled)
-    r = C δx + v, cov v = diag(noise²), the
-    innovations e = r - C δx̂ of the filter started at δx̂ = 0, P = 0 (the start is a parameter of the fit) are white; z
-    divides them by the root of their covariance. The gain varies until P has settled, then stays.
+    With the machine's deviation from the model δx(k+1) = A δx(k) + w, cov w = `Q`, and the residual r = measured −
+    modelled = C δx + v, cov v = diag(noise²), the innovations e = r - C δx̂, measured − predicted, of the filter started
+    at δx̂ = 0, P = 0 (the start is a parameter of the fit) are white; z divides them by the root of their covariance.
+    The gain varies until P has settled, then stays.
 
     Parameters
     ----------

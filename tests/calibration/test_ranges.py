@@ -58,6 +58,7 @@ def test_white_noise() -> None:
     fits = [calibrated(seed) for seed in range(REPEATS)]
     assert hits(fits) >= LEAST
     assert hits(fits, "box") >= LEAST
+    assert sum(fit.covariance_scale > 1.5 for fit in fits) <= 8  # blocks of white noise: 1 % of repetitions, if that
 
 
 def test_coloured_noise() -> None:
@@ -66,6 +67,7 @@ def test_coloured_noise() -> None:
     single = sum(all(abs(fit.parameters[name] - TRUTH[name]) < 1.96 * std for name, std in fit.std.items())
                  for fit in fits)
     assert hits(fits) >= LEAST > single
+    assert sum(fit.covariance_scale > 2.0 for fit in fits) <= 8
 
 
 def test_one_undetermined_direction() -> None:
