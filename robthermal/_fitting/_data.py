@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..signals import Record
 from ..thermal import System
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class Data:
     record: Record
     sensors: tuple[str, ...]
     columns: NDArray[np.intp]
-    readings: Array
+    readings: Floats
     missing: NDArray[np.bool_] | None = None
 
     @property

@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from .._arrays import Floats
 from ..thermal import System
 from ._data import Data
 from ._problem import Problem, scaled
 from ._ranges import NONE
 from ._start import Start, initial_of
 
-Array = NDArray[np.float64]
 _HEAD = 0.1  # part of a validation record that may be used for its initial temperatures
 
 
@@ -34,16 +33,16 @@ class FreeRun:
     """
 
     one: Data
-    initial_temperatures: Array
-    residual: Array
+    initial_temperatures: Floats
+    residual: Floats
 
     @property
-    def modelled(self) -> Array:
+    def modelled(self) -> Floats:
         """What the model reads, (n, n_sensors) [K]."""
         return self.one.readings - self.residual
 
     @property
-    def by_sensor(self) -> dict[str, Array]:
+    def by_sensor(self) -> dict[str, Floats]:
         """Residual (n,) of every sensor [K]."""
         return {name: self.residual[:, i] for i, name in enumerate(self.one.sensors)}
 

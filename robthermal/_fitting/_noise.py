@@ -7,13 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..thermal import System
 from ._data import Data
 
-Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber"]
 LOSSES = ("linear", "soft_l1", "huber")
 SMALLEST = 1e-4  # K: the simulation's own truncation; nothing is known better
@@ -47,7 +46,7 @@ def _given(used: list[str], noise: Mapping[str, float] | float | None) -> dict[s
     return given
 
 
-def quantum(readings: Array) -> float:
+def quantum(readings: Floats) -> float:
     """Step of a quantised reading [K], 0 if it is not quantised."""
     levels = np.unique(np.round(readings, 9))
     if levels.size < 2 or 4 * levels.size > readings.size:
@@ -61,7 +60,7 @@ def floor(data: list[Data], name: str) -> float:
     return max(max(steps) / math.sqrt(12.0), SMALLEST)
 
 
-def estimated_noise(data: list[Data], residuals: list[Array], name: str, loss: Loss) -> float:
+def estimated_noise(data: list[Data], residuals: list[Floats], name: str, loss: Loss) -> float:
     """Noise of a sensor from its residuals [K]: root mean square, or its robust equivalent under a robust loss."""
     own = [r[:, one.sensors.index(name)] for one, r in zip(data, residuals, strict=True) if name in one.sensors]
     e = np.concatenate(own)
@@ -69,7 +68,7 @@ def estimated_noise(data: list[Data], residuals: list[Array], name: str, loss: L
     return max(scale, floor(data, name))
 
 
-def score(e: Array, loss: Loss) -> Array:
+def score(e: Floats, loss: Loss) -> Floats:
     """Derivative ψ of the loss at weighted residuals."""
     if loss == "linear":
         return e
@@ -78,7 +77,7 @@ def score(e: Array, loss: Loss) -> Array:
     return e / np.sqrt(1.0 + (e / _TUNING) ** 2)
 
 
-def score_slope(e: Array, loss: Loss) -> Array:
+def score_slope(e: Floats, loss: Loss) -> Floats:
     """Derivative of `score`."""
     if loss == "linear":
         return np.ones_like(e)
@@ -87,12 +86,12 @@ def score_slope(e: Array, loss: Loss) -> Array:
     return (1.0 + (e / _TUNING) ** 2) ** -1.5
 
 
-def scipy_loss(loss: Loss, n_readings: int) -> str | Callable[[Array], Array]:
+def scipy_loss(loss: Loss, n_readings: int) -> str | Callable[[Floats], Floats]:
     """Loss for `scipy.optimize.least_squares` that leaves the priors, which follow the readings, quadratic."""
     if loss == "linear":
         return "linear"
 
-    def rho(z: Array) -> Array:
+    def rho(z: Floats) -> Floats:
         out = np.array([z, np.ones_like(z), np.zeros_like(z)])
         y = z[:n_readings] / _TUNING**2
         root = np.sqrt(1.0 + y) if loss == "soft_l1" else np.sqrt(np.maximum(y, 1.0))

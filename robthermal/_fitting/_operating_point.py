@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import Diverged, InputError
 from ..thermal import Equations, System, steady_state
 
-Array = NDArray[np.float64]
 _NEWTON = 20
 _AT_REST = 1e-9  # K
 
@@ -30,9 +29,9 @@ class OperatingPoint:
     """
 
     inputs: Mapping[str, float]
-    last: Array | None = None
+    last: Floats | None = None
 
-    def temperatures(self, system: System) -> Array | None:
+    def temperatures(self, system: System) -> Floats | None:
         """Of all lumps [K]; None for a linear network, whose linearisation is the same everywhere."""
         eq = Equations(system)
         if not eq.terms:
@@ -48,7 +47,7 @@ class OperatingPoint:
         self.last = here
         return here
 
-    def _near(self, eq: Equations, x: Array) -> Array:
+    def _near(self, eq: Equations, x: Floats) -> Floats:
         u = eq.nominal()
         for name, value in self.inputs.items():
             u[eq.system.exogenous_names.index(name)] = value

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import Diverged
 from ..thermal import System, trajectory
 from ._data import Data
@@ -15,8 +15,7 @@ from ._ranges import Ranges
 from ._residual import residual
 from ._start import REACH, Initial, start_values
 
-Array = NDArray[np.float64]
-Weigh = Callable[[Array], Array]  # (n, n_sensors, ...) in kelvin to weighted, linear
+Weigh = Callable[[Floats], Floats]  # (n, n_sensors, ...) in kelvin to weighted, linear
 
 
 @dataclass(frozen=True)
@@ -26,9 +25,9 @@ class Run:
     By the parameters (n, n_sensors, p), by the initial temperatures (n, n_sensors, n_free).
     """
 
-    residual: Array
-    by_parameter: Array
-    by_start: Array
+    residual: Floats
+    by_parameter: Floats
+    by_start: Floats
 
 
 @dataclass
@@ -61,23 +60,23 @@ class Problem:
         return sum(one.readings.size for one in self.data)
 
     @property
-    def v0(self) -> Array:
+    def v0(self) -> Floats:
         """Starting point."""
         n_free = sum(s.n_free for s in self.starts)
         return np.concatenate([self.ranges.coordinates(self.ranges.start), np.zeros(n_free)])
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the unknowns."""
         reach = np.full(sum(s.n_free for s in self.starts), REACH)
         q = self.ranges.coordinates
         return np.concatenate([q(self.ranges.lower), -reach]), np.concatenate([q(self.ranges.upper), reach])
 
-    def parameters(self, v: Array) -> Array:
+    def parameters(self, v: Floats) -> Floats:
         """Parameter values."""
         return self.ranges.values(v[:len(self.ranges.names)])
 
-    def temperatures(self, v: Array) -> list[Array]:
+    def temperatures(self, v: Floats) -> list[Floats]:
         """Initial lump temperatures of every record [K]."""
         out, at = [], len(self.ranges.names)
         for start in self.starts:
@@ -85,17 +84,17 @@ class Problem:
             at += start.n_free
         return out
 
-    def systems(self, v: Array) -> list[System]:
+    def systems(self, v: Floats) -> list[System]:
         """System of every record: the parameters, and its own initial temperatures."""
         values = self.ranges.assigned(self.parameters(v))
         return [self.system.with_parameters({**start_values(self.system, T), **values}) for T in self.temperatures(v)]
 
-    def residuals(self, v: Array) -> list[Array]:
+    def residuals(self, v: Floats) -> list[Floats]:
         """Measured − modelled of every record, (n, n_sensors) [K]."""
         return [residual(one.readings, trajectory(system, one.record).readings[:, one.columns])
                 for system, one in zip(self.systems(v), self.data, strict=True)]
 
-    def runs(self, v: Array) -> list[Run]:
+    def runs(self, v: Floats) -> list[Run]:
         """Residuals of all records with their derivatives in the coordinates [K]."""
         slopes = self.ranges.slopes(self.parameters(v))
         out = []
@@ -103,13 +102,13 @@ class Problem:
             free = list(start_values(system, start.mean)) if start.n_free else []
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
-            J: Array = np.asarray(run.sensitivity[:, one.columns], np.float64)
-            by_start: Array = np.multiply(J[..., len(flat):], -start.sigma)
-            by_parameter: Array = np.multiply(self.ranges.joined(J[..., :len(flat)]), -slopes)
+            J: Floats = np.asarray(run.sensitivity[:, one.columns], np.float64)
+            by_start: Floats = np.multiply(J[..., len(flat):], -start.sigma)
+            by_parameter: Floats = np.multiply(self.ranges.joined(J[..., :len(flat)]), -slopes)
             out.append(Run(residual(one.readings, run.readings[:, one.columns]), by_parameter, by_start))
         return out
 
-    def vector(self, v: Array) -> Array:
+    def vector(self, v: Floats) -> Floats:
         """Weighted residuals of all readings, then the priors; infinite where the model runs away (a rejected step)."""
         try:
             parts = [weigh(r).ravel() for weigh, r in zip(self.weigh, self.residuals(v), strict=True)]
@@ -117,7 +116,7 @@ class Problem:
             return np.full(self.n_readings + self._prior(v).size, np.inf)
         return np.concatenate([*parts, self._prior(v)])
 
-    def jacobian(self, v: Array) -> Array:
+    def jacobian(self, v: Floats) -> Floats:
         """Derivative of `vector`."""
         p, known = len(self.ranges.names), np.isfinite(self.ranges.sigma)
         J = np.zeros((self.n_readings + int(known.sum()) + v.size - p, v.size))
@@ -131,10 +130,10 @@ class Problem:
         J[row + int(known.sum()):, p:] = np.eye(v.size - p)
         return J
 
-    def _prior(self, v: Array) -> Array:
+    def _prior(self, v: Floats) -> Floats:
         return np.concatenate([self.ranges.prior(self.parameters(v)), v[len(self.ranges.names):]])
 
 
-def scaled(noise: Array) -> Weigh:
+def scaled(noise: Floats) -> Weigh:
     """Weight that divides every sensor's column by its noise [K]."""
     return lambda r: r / noise.reshape(1, -1, *[1] * (r.ndim - 2))

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..thermal import FitRange, System
 
-Array = NDArray[np.float64]
 Key = str | tuple[str, ...]
 Limits = tuple[float, float] | FitRange
 Choice = Iterable[str] | Mapping[Key, Limits] | Mapping[str, Limits] | None
@@ -38,21 +38,21 @@ class Ranges:
 
     names: tuple[str, ...]
     members: tuple[tuple[str, ...], ...]
-    start: Array
-    lower: Array
-    upper: Array
-    sigma: Array
+    start: Floats
+    lower: Floats
+    upper: Floats
+    sigma: Floats
     logarithmic: NDArray[np.bool_]
 
-    def coordinates(self, values: Array) -> Array:
+    def coordinates(self, values: Floats) -> Floats:
         """Optimiser's coordinates of parameter values."""
         return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
 
-    def values(self, coordinates: Array) -> Array:
+    def values(self, coordinates: Floats) -> Floats:
         """Parameter values at optimiser's coordinates."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates)
 
-    def slopes(self, values: Array) -> Array:
+    def slopes(self, values: Floats) -> Floats:
         """Derivative of the values with respect to the coordinates."""
         return np.where(self.logarithmic, values, 1.0)
 
@@ -61,35 +61,35 @@ class Ranges:
         """The system's parameters, in order."""
         return [name for group in self.members for name in group]
 
-    def assigned(self, values: Array) -> dict[str, float]:
+    def assigned(self, values: Floats) -> dict[str, float]:
         """What the system's parameters become."""
         return {name: float(value) for group, value in zip(self.members, values, strict=True) for name in group}
 
-    def joined(self, sensitivity: Array) -> Array:
+    def joined(self, sensitivity: Floats) -> Floats:
         """Derivative (..., p) by each estimated value, from that (..., len(flat)) by every member."""
         owner = np.repeat(np.arange(len(self.members)), [len(group) for group in self.members])
         return sensitivity @ (owner[:, None] == np.arange(len(self.members))).astype(float)
 
-    def prior(self, values: Array) -> Array:
+    def prior(self, values: Floats) -> Floats:
         """Distance from the priors' centres, of the parameters that have one, in standard deviations."""
         known = np.isfinite(self.sigma)
         return (values - self.start)[known] / self.sigma[known]
 
-    def prior_slopes(self, values: Array) -> Array:
+    def prior_slopes(self, values: Floats) -> Floats:
         """Derivative of `prior` by the coordinates, (p,); 0 without a prior."""
         return self.slopes(values) / self.sigma
 
     @property
-    def unit(self) -> Array:
+    def unit(self) -> Floats:
         """What counts as one plausible step of each coordinate: a factor e, or a uniform spread over the bounds."""
         return np.where(self.logarithmic, 1.0, self.spread)
 
     @property
-    def spread(self) -> Array:
+    def spread(self) -> Floats:
         """Standard deviation of each coordinate if it were uniform between its bounds."""
         return (self.coordinates(self.upper) - self.coordinates(self.lower)) / math.sqrt(12.0)
 
-    def at_bound(self, values: Array) -> NDArray[np.bool_]:
+    def at_bound(self, values: Floats) -> NDArray[np.bool_]:
         """Whether each value has run into a bound (within 1e-4 of the range, in coordinates)."""
         q, low, high = (self.coordinates(v) for v in (values, self.lower, self.upper))
         near = 1e-4 * (high - low)

@@ -9,12 +9,11 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from .._arrays import Complex, Floats
 
 
 @overload
-def residual(measured: NDArray[np.floating[Any]], modelled: NDArray[np.floating[Any]]) -> Array: ...
+def residual(measured: NDArray[np.floating[Any]], modelled: NDArray[np.floating[Any]]) -> Floats: ...
 
 
 @overload
@@ -34,7 +33,7 @@ def residual(measured: NDArray[Any], modelled: NDArray[Any]) -> NDArray[Any]:
     return measured - modelled
 
 
-def rmse(residuals: Iterable[Array]) -> float:
+def rmse(residuals: Iterable[Floats]) -> float:
     """Root mean square [K] over all readings of one residual or several; infinite where a model ran away (NaN).
 
     Parameters
@@ -47,7 +46,7 @@ def rmse(residuals: Iterable[Array]) -> float:
     return math.inf if math.isnan(mean_square) else math.sqrt(mean_square)
 
 
-def rmse_by_sensor(records: Iterable[Mapping[str, Array]]) -> dict[str, float]:
+def rmse_by_sensor(records: Iterable[Mapping[str, Floats]]) -> dict[str, float]:
     """Root mean square residual of every sensor over all records that hold it [K].
 
     Parameters
@@ -55,7 +54,7 @@ def rmse_by_sensor(records: Iterable[Mapping[str, Array]]) -> dict[str, float]:
     records : iterable of mapping
         One {sensor: residual (n,) [K]} per record.
     """
-    pooled: dict[str, list[Array]] = {}
+    pooled: dict[str, list[Floats]] = {}
     for record in records:
         for name, values in record.items():
             pooled.setdefault(name, []).append(values)

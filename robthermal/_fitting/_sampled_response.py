@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Complex, Floats
 from ..thermal import System, linearize
 from ._operating_point import OperatingPoint
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 _CHUNK = 1000  # bins at once
 _ROUNDING = 1e-9  # of a sample: less of a delay is none
 
 
-def sampled_response(system: System, frequencies: Array, sample_time: float, operating_point: OperatingPoint,
+def sampled_response(system: System, frequencies: Floats, sample_time: float, operating_point: OperatingPoint,
                      outputs: tuple[str, ...], inputs: tuple[str, ...]) -> Complex:
     """Response (n_f, n_y, n_u) of the linearisation, inputs held over each sample, delays included.
 
@@ -42,7 +40,7 @@ def sampled_response(system: System, frequencies: Array, sample_time: float, ope
     return out
 
 
-def _delays(system: System, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> Array:
+def _delays(system: System, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> Floats:
     """Delay from every input to every output [s], (n_y, n_u)."""
     read = np.array([system.sensors[name].delay if name in system.sensors else 0.0 for name in outputs])
     drives = {name: part.drive for table in (system.inputs, system.modules) for name, part in table.items()}

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..thermal import System, trajectory
 from ._data import Data
 
-Array = NDArray[np.float64]
 Start = Literal["free", "measured", "system"]
 STARTS = ("free", "measured", "system")
 SIGMA = 5.0  # K: how far a lump may be from its nearest sensor when nobody says anything
@@ -30,7 +29,7 @@ class Initial:
         Standard deviation of the prior of every lump [K]; 0 if fixed.
     """
 
-    mean: Array
+    mean: Floats
     sigma: float
 
     @property
@@ -52,12 +51,12 @@ def initial_of(system: System, one: Data, start: Start) -> Initial:
     return Initial(mean, max(SIGMA, float(np.ptp(one.readings[0]))))
 
 
-def first_temperatures(system: System, one: Data) -> Array:
+def first_temperatures(system: System, one: Data) -> Floats:
     """Default start of the simulator [K]."""
     return trajectory(system, one.record[:2]).lumps[0]
 
 
-def start_values(system: System, temperatures: Array) -> dict[str, float]:
+def start_values(system: System, temperatures: Floats) -> dict[str, float]:
     """Initial temperatures as named parameters."""
     return {f"lumps.{name}.initial": float(T) for name, T in zip(system.lump_names, temperatures, strict=True)}
 

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from .._arrays import Floats
+
 _LONGEST = 30
 
 
@@ -25,10 +25,10 @@ class Correlation:
         Covariance of the innovations.
     """
 
-    polynomials: tuple[Array, ...]
-    innovation: Array
+    polynomials: tuple[Floats, ...]
+    innovation: Floats
 
-    def meat(self, J: Array) -> Array:
+    def meat(self, J: Floats) -> Floats:
         """Jᵀ Cov(e) J for J of shape (n, n_sensors, p), by filtering J backwards in time.
 
         Zeros before the first sample let the innovations before it count too: e was stationary when it began.
@@ -37,7 +37,7 @@ class Correlation:
         back = np.stack([lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)], axis=1)
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
 
-    def share(self, psi: Array) -> float:
+    def share(self, psi: Floats) -> float:
         """Independent samples in the slow part of residuals (n, n_sensors), as a part of all samples [-].
 
         γ₀/S(0), not above 1, with γ₀ the variance and S(0) the spectral density of the autoregression at frequency
@@ -46,7 +46,7 @@ class Correlation:
         density = np.diag(self.innovation) / np.array([a.sum() for a in self.polynomials]) ** 2
         return float(np.minimum(np.mean(psi**2, axis=0) / np.where(density > 0, density, np.inf), 1.0).mean())
 
-    def independent(self, psi: Array) -> float:
+    def independent(self, psi: Floats) -> float:
         """How many independent samples the slow part of residuals (n, n_sensors) amounts to.
 
         `share` of all readings, times S/‖R‖² for S sensors whose innovations have the correlation R (S, S).
@@ -56,17 +56,18 @@ class Correlation:
         R = self.innovation / np.outer(deviation, deviation)
         return psi.size * self.share(psi) * len(R) / max(float(np.sum(R**2)), len(R))
 
-    def bias(self, psi: Array) -> float:
+    def bias(self, psi: Floats) -> float:
         """Factor by which the autoregression's spectral density at frequency zero is too small on average.
 
-        Where a level is fitted too, as by start temperatures, its pole φ comes out too small by (1 + 3φ)/n (Kendall,
-        1954), hence S(0) by a part 4/n_e of itself, with n_e independent samples per sensor; nothing of white residuals.
+        Where a level is fitted too, as by start temperatures, its pole φ comes out too small by (1 + 3φ)/n
+        (Kendall, 1954), hence S(0) by a part 4/n_e of itself, with n_e independent samples per sensor; nothing of white
+        residuals.
         """
         share = self.share(psi)
         return 1.0 + 4.0 * (1.0 - share) / max(share * len(psi), 1.0)
 
 
-def correlation_of(segments: list[Array]) -> Correlation:
+def correlation_of(segments: list[Floats]) -> Correlation:
     """Fit by Burg's method, order by BIC; segments (n, n_sensors) of the same sensors are pooled.
 
     Parameters
@@ -81,7 +82,7 @@ def correlation_of(segments: list[Array]) -> Correlation:
     return Correlation(polynomials, v.T @ v / len(v))
 
 
-def burg(segments: list[Array]) -> Array:
+def burg(segments: list[Floats]) -> Floats:
     """Monic autoregression polynomial of several stretches of one signal, always stable; order by BIC."""
     n = sum(e.size for e in segments)
     power = sum(float(e @ e) for e in segments) / n

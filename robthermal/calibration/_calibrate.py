@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Literal, overload
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
+from .._arrays import Floats
 from .._fitting import (
     LOSSES,
     STARTS,
@@ -45,7 +45,6 @@ from ._response_fit import ResponseFit, calibrate_response
 from ._score import score_of
 from ._whiteness import whiteness_of
 
-Array = NDArray[np.float64]
 Method = Literal["output_error", "prediction_error"]
 METHODS = ("output_error", "prediction_error")
 _ROUNDS = 8  # of noise estimation
@@ -161,7 +160,7 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
 class Solution:
     """Where the optimiser ended: unknowns, noise levels, its status and iterations."""
 
-    v: Array
+    v: Floats
     noise: dict[str, float]
     converged: bool
     iterations: int
@@ -189,7 +188,7 @@ def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterati
     return Solution(v, noise, run.status > 0 and settled, max_iterations - left)
 
 
-def _weights(problem: Problem, v: Array, noise: dict[str, float], filtered: bool) -> list[Weigh]:
+def _weights(problem: Problem, v: Floats, noise: dict[str, float], filtered: bool) -> list[Weigh]:
     levels = [np.array([noise[name] for name in one.sensors]) for one in problem.data]
     if not filtered:
         return [scaled(level) for level in levels]
@@ -197,7 +196,7 @@ def _weights(problem: Problem, v: Array, noise: dict[str, float], filtered: bool
     return [whitener(system, one, level) for system, one, level in zip(systems, problem.data, levels, strict=True)]
 
 
-def _levels(problem: Problem, v: Array, unknown: list[str], loss: Loss) -> dict[str, float]:
+def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict[str, float]:
     try:
         residuals = problem.residuals(v)
     except Diverged as error:
@@ -242,11 +241,11 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 
 
-def _by_sensor(one: Data, values: Array) -> dict[str, Array]:
+def _by_sensor(one: Data, values: Floats) -> dict[str, Floats]:
     return {name: values[:, i] for i, name in enumerate(one.sensors)}
 
 
-def _by_lump(system: System, temperatures: Array) -> dict[str, float]:
+def _by_lump(system: System, temperatures: Floats) -> dict[str, float]:
     return dict(zip(system.lump_names, temperatures.tolist(), strict=True))
 
 
@@ -286,7 +285,7 @@ def _refuse_double_start(ranges: Ranges, initial: Start) -> None:
                          remedy='Leave it out (a free start estimates it for every record), or use initial="system".')
 
 
-def _refuse_idle(problem: Problem, v: Array) -> None:
+def _refuse_idle(problem: Problem, v: Floats) -> None:
     """A parameter that no reading feels."""
     ranges = problem.ranges
     reach = np.zeros(len(ranges.names))

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from .._arrays import Floats
 from ..errors import InputError, Outcome
 from ..signals import Record
 from ._plateaus import Plateau, column, plateaus
 
-Array = NDArray[np.float64]
 _SETTLED = 0.01  # drift over the tail, as a part of the temperature difference, up to which a plateau counts as steady
 _UNKNOWN = 3
 
@@ -41,12 +40,12 @@ class ConvectionLaw:
     a: float
     b: float
     c: float
-    covariance: Array
+    covariance: Floats
     area: float
     points: pd.DataFrame
     outcome: Outcome
 
-    def coefficient(self, difference: Any) -> Array:
+    def coefficient(self, difference: Any) -> Floats:
         """The law at some temperature differences.
 
         Parameters
@@ -130,16 +129,16 @@ def convection_law(record: Record, *, heater: str, sensor: str, ambient: str, ar
     return _fitted(excess, heat, area)
 
 
-def _is_steady(plateau: Plateau, difference: Array) -> bool:
+def _is_steady(plateau: Plateau, difference: Floats) -> bool:
     mean = float(plateau.tail(difference).mean())
     return mean > 0 and abs(plateau.drift(difference)) < _SETTLED * mean
 
 
-def _law(p: Array, excess: Array) -> Array:
+def _law(p: Floats, excess: Floats) -> Floats:
     return np.asarray(p[0] + p[1] * excess ** p[2], np.float64)
 
 
-def _fitted(excess: Array, heat: Array, area: float) -> ConvectionLaw:
+def _fitted(excess: Floats, heat: Floats, area: float) -> ConvectionLaw:
     h = heat / (area * excess)
     scale = float(h.mean())
     run = least_squares(lambda p: (_law(p, excess) - h) / scale, [scale / 2, scale / 2 / excess.mean() ** 0.25, 0.25],

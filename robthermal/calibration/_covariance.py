@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from .._arrays import Floats
 from .._fitting import Loss, Problem, Ranges, score, score_slope
 from ._autoregression import correlation_of
 from ._score_blocks import block_scores, blocks_of, covariance_scale
 
-Array = NDArray[np.float64]
 _ZERO = 1e-12  # relative eigenvalue that is rounding
 
 
@@ -34,14 +33,14 @@ class Information:
         Factor by which residuals exceed what the covariance accounts for, at least 1.
     """
 
-    covariance: Array
-    undetermined: tuple[Array, ...]
-    bounded: tuple[Array, ...]
+    covariance: Floats
+    undetermined: tuple[Floats, ...]
+    bounded: tuple[Floats, ...]
     degrees_of_freedom: float
     scale: float
 
 
-def information(problem: Problem, v: Array, loss: Loss) -> Information:
+def information(problem: Problem, v: Floats, loss: Loss) -> Information:
     """Sandwich covariance at the estimate.
 
     H = Σ J̃ᵀ D J̃ + GᵀG + P and M = Σ J̃ᵀ Cov(ψ) J̃ + GᵀG + P with J̃ = J - X G the derivative after the initial
@@ -55,7 +54,7 @@ def information(problem: Problem, v: Array, loss: Loss) -> Information:
     answered, absorbed, power, independent, bias = [], 0.0, 0.0, -float(p), 1.0
     found, expected = np.zeros((p, p)), np.zeros((p, p))
     blocks = blocks_of([len(e) for e, _, _ in weighted])
-    starts: list[tuple[Array, Array]] = []
+    starts: list[tuple[Floats, Floats]] = []
     for e, J, X in weighted:
         root = np.sqrt(score_slope(e, loss))[..., None]
         J2, X2 = (root * J).reshape(e.size, p), (root * X).reshape(e.size, X.shape[2])
@@ -103,7 +102,7 @@ def _inflation(power: float, absorbed: float) -> float:
     return power / max(power - absorbed, power / 4.0) if power else 1.0
 
 
-def with_priors(ranges: Ranges, values: Array, H: Array, M: Array, degrees_of_freedom: float, scale: float
+def with_priors(ranges: Ranges, values: Floats, H: Floats, M: Floats, degrees_of_freedom: float, scale: float
                 ) -> Information:
     """H⁻¹ M H⁻¹ with the priors added to both; H and M are of the data alone, (p, p), in coordinates."""
     unit = ranges.unit
@@ -121,7 +120,7 @@ def with_priors(ranges: Ranges, values: Array, H: Array, M: Array, degrees_of_fr
     return Information((covariance + covariance.T) / 2, open_, bounded, degrees_of_freedom, scale)
 
 
-def _without_prior(V: Array, P: Array, bounds: Array) -> tuple[tuple[Array, ...], Array]:
+def _without_prior(V: Floats, P: Floats, bounds: Floats) -> tuple[tuple[Floats, ...], Floats]:
     """Directions in the space of V (p, k) about which the priors P say less than the bounds, and what those say there.
 
     The generalized eigenvectors w of (VᵀPV, VᵀBV) tell what a prior closes from what none does; with wᵀVᵀBVw = 1 the
@@ -136,5 +135,5 @@ def _without_prior(V: Array, P: Array, bounds: Array) -> tuple[tuple[Array, ...]
     return tuple(d / np.linalg.norm(d) for d in (V @ w).T), own @ own.T
 
 
-def _variance(value: float, vector: Array, M: Array, largest: float) -> float:
+def _variance(value: float, vector: Floats, M: Floats, largest: float) -> float:
     return np.inf if value <= _ZERO * largest else float(vector @ M @ vector) / value**2

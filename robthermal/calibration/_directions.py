@@ -5,32 +5,32 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Floats
 from .._fitting import Ranges
 
-Array = NDArray[np.float64]
 _VISIBLE = 0.1  # components below this part of the largest are not mentioned
 
 
-def in_words(ranges: Ranges, directions: tuple[Array, ...]) -> tuple[str, ...]:
+def in_words(ranges: Ranges, directions: tuple[Floats, ...]) -> tuple[str, ...]:
     """One sentence per undetermined direction (orthonormal, in units of `Ranges.unit`)."""
     if not directions:
         return ()
     return tuple(_sentence(ranges, direction) for direction in _sparse(np.array(directions)))
 
 
-def named(ranges: Ranges, directions: tuple[Array, ...]) -> tuple[str, ...]:
+def named(ranges: Ranges, directions: tuple[Floats, ...]) -> tuple[str, ...]:
     """Names of the parameters with visible weight in some direction."""
     return tuple(name for name, seen in zip(ranges.names, weights(ranges, directions), strict=True) if seen)
 
 
-def weights(ranges: Ranges, directions: tuple[Array, ...]) -> NDArray[np.bool_]:
+def weights(ranges: Ranges, directions: tuple[Floats, ...]) -> NDArray[np.bool_]:
     """Which parameters (p,) have visible weight in some direction, written with as few parameters as possible."""
     if not directions:
         return np.zeros(len(ranges.names), np.bool_)
     return np.asarray((np.abs(_sparse(np.array(directions))) > _VISIBLE).any(axis=0))
 
 
-def _sparse(basis: Array) -> Array:
+def _sparse(basis: Floats) -> Floats:
     """Basis of the same space with as many zeros as elimination gives: each direction then speaks of few parameters."""
     B = basis.copy()
     for row in range(len(B)):
@@ -43,7 +43,7 @@ def _sparse(basis: Array) -> Array:
     return B / np.abs(B).max(axis=1, keepdims=True)
 
 
-def _sentence(ranges: Ranges, direction: Array) -> str:
+def _sentence(ranges: Ranges, direction: Floats) -> str:
     direction = direction / direction[np.abs(direction).argmax()]
     seen = np.flatnonzero(np.abs(direction) > _VISIBLE).tolist()
     names = [ranges.names[i] for i in seen]

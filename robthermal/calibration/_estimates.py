@@ -10,11 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import Outcome
 from ..thermal import System
 from ._parameter_ranges import Set, ranges_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,11 +55,11 @@ class Estimates:
     system: System
     parameters: dict[str, float]
     start: dict[str, float]
-    lower: Array
-    upper: Array
-    sigma: Array
+    lower: Floats
+    upper: Floats
+    sigma: Floats
     at_bound: NDArray[np.bool_]
-    covariance: Array
+    covariance: Floats
     undetermined: tuple[str, ...]
     undetermined_parameters: tuple[str, ...]
     bounded: NDArray[np.bool_]
@@ -76,7 +75,7 @@ class Estimates:
         return dict(zip(self.parameters, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
-    def correlation(self) -> Array:
+    def correlation(self) -> Floats:
         """Correlation of the estimates, (p, p) [-]."""
         deviation = np.sqrt(np.diag(self.covariance))
         return self.covariance / np.outer(deviation, deviation)

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Floats
 from .._fitting import rmse_by_sensor
 from ..signals import Record
 from ._estimates import Estimates, plain
 from ._figure import draw
 from ._score import Score
 from ._whiteness import Whiteness
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,8 +67,8 @@ class Fit(Estimates):
     noise: dict[str, float]
     data: tuple[Record, ...]
     validation_data: tuple[Record, ...]
-    residuals: tuple[dict[str, Array], ...]
-    validation_residuals: tuple[dict[str, Array], ...]
+    residuals: tuple[dict[str, Floats], ...]
+    validation_residuals: tuple[dict[str, Floats], ...]
     initial_temperatures: tuple[dict[str, float], ...]
     validation_temperatures: tuple[dict[str, float], ...]
     train: tuple[Score, ...]

@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from .._arrays import Floats
 from .._fitting import Data
 from ..thermal import System, linearize, trajectory
 
-Array = NDArray[np.float64]
 _STEADY = 1e-12  # relative change of the state covariance at which the gain counts as constant
 
 
@@ -35,12 +34,12 @@ class Whitener:
         Inverse Cholesky factor of the innovation's covariance, likewise.
     """
 
-    A: Array
-    C: Array
-    gains: list[Array]
-    roots: list[Array]
+    A: Floats
+    C: Floats
+    gains: list[Floats]
+    roots: list[Floats]
 
-    def __call__(self, r: Array) -> Array:
+    def __call__(self, r: Floats) -> Floats:
         """Whiten (n, n_sensors, ...) along time."""
         flat = r.reshape(*r.shape[:2], -1)
         z, x, last = np.empty_like(flat), np.zeros((len(self.A), flat.shape[2])), len(self.gains) - 1
@@ -57,7 +56,7 @@ def has_disturbance(system: System) -> bool:
     return any(lump.disturbance > 0 for lump in system.lumps.values())
 
 
-def whitener(system: System, one: Data, noise: Array) -> Whitener:
+def whitener(system: System, one: Data, noise: Floats) -> Whitener:
     """Filter of one record, linearised at its mean simulated temperatures and mean inputs.
 
     Parameters
@@ -78,14 +77,14 @@ def whitener(system: System, one: Data, noise: Array) -> Whitener:
     return Whitener(A, C, *_gains(A, C, Q, np.diag(noise**2), len(record)))
 
 
-def _intensity(system: System, n_states: int) -> Array:
+def _intensity(system: System, n_states: int) -> Floats:
     """Process noise dx = (s / C) dW of every state [K²/s]; sensor lags have none of their own."""
     q = np.zeros(n_states)
     q[:len(system.lumps)] = [(lump.disturbance / lump.capacity) ** 2 for lump in system.lumps.values()]
     return np.diag(q)
 
 
-def _sampled(A: Array, q: Array, h: float) -> tuple[Array, Array]:
+def _sampled(A: Floats, q: Floats, h: float) -> tuple[Floats, Floats]:
     """Transition over one sample and the noise gathered in it, ∫ e^{At} q e^{Aᵀt} dt.
 
     Van Loan's (1978) block exponential over a step in which nothing decays much, for it holds e^{-At}; then doubled.
@@ -100,9 +99,9 @@ def _sampled(A: Array, q: Array, h: float) -> tuple[Array, Array]:
     return step, (Q + Q.T) / 2
 
 
-def _gains(A: Array, C: Array, Q: Array, R: Array, n: int) -> tuple[list[Array], list[Array]]:
-    gains: list[Array] = []
-    roots: list[Array] = []
+def _gains(A: Floats, C: Floats, Q: Floats, R: Floats, n: int) -> tuple[list[Floats], list[Floats]]:
+    gains: list[Floats] = []
+    roots: list[Floats] = []
     P = np.zeros_like(A)
     for _ in range(n):
         S = C @ P @ C.T + R

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..signals import Record
 from ..thermal import Linear, Module
 from ._plateaus import Plateau, column, plateaus
 
-Array = NDArray[np.float64]
 _SETTLED = 0.02  # K: drift of a face over the end of a plateau up to which it counts as steady
 _APART = 1.0  # K between the faces, below which neither S nor K shows
 
@@ -135,12 +134,12 @@ def module_properties(record: Record, *, current: str, voltage: str, hot: str, c
         steady=pd.DataFrame({"temperature": T, "seebeck": seebeck, "conductance": K}))
 
 
-def _is_steady(plateau: Plateau, hot: Array, cold: Array) -> bool:
+def _is_steady(plateau: Plateau, hot: Floats, cold: Floats) -> bool:
     apart = abs(float(plateau.tail(hot).mean() - plateau.tail(cold).mean()))
     return apart >= _APART and max(abs(plateau.drift(hot)), abs(plateau.drift(cold))) < _SETTLED
 
 
-def _line(x: Array, y: Array) -> tuple[Array, list[float]]:
+def _line(x: Floats, y: Floats) -> tuple[Floats, list[float]]:
     """Straight line by least squares, and standard deviations of its value at 0 and its slope."""
     X = np.column_stack([np.ones_like(x), x])
     found, _, rank, _ = np.linalg.lstsq(X, y, rcond=None)
@@ -152,7 +151,7 @@ def _line(x: Array, y: Array) -> tuple[Array, list[float]]:
     return beta, np.sqrt(variance * np.diag(np.linalg.inv(X.T @ X))).tolist()
 
 
-def _linear(line: Array, name: str) -> Linear:
+def _linear(line: Floats, name: str) -> Linear:
     if line[0] <= 0:
         raise InputError(f"the {name} comes out as {line[0]:.4g} at the reference temperature", where="argument record",
                          expected="a positive value", remedy="Check the signs of current, voltage, hot and cold.")

@@ -6,21 +6,20 @@ import math
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
+from .._arrays import Floats
 from ..errors import InputError
 
 if TYPE_CHECKING:
     from ._estimates import Estimates
 
-Array = NDArray[np.float64]
 Set = Literal["ellipsoid", "box"]
 SETS = ("ellipsoid", "box")
 
 
-def ranges_of(fit: Estimates, confidence: float, shape: str) -> tuple[Array, Array]:
+def ranges_of(fit: Estimates, confidence: float, shape: str) -> tuple[Floats, Floats]:
     """Lower and upper ends (p,) of the ranges, in the unit of each parameter.
 
     In the coordinates q of the optimizer (logarithms of positive parameters) the ends are q̂ ± c s, s the standard

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..signals import Record
 
-Array = NDArray[np.float64]
 _TAIL = 0.2  # part of a plateau whose mean stands for its steady state
 _SHORTEST = 10  # samples
 
@@ -31,11 +30,11 @@ class Plateau:
     stop: int
     level: float
 
-    def tail(self, signal: Array) -> Array:
+    def tail(self, signal: Floats) -> Floats:
         """The end of a signal on it."""
         return signal[self.stop - max(4, round(_TAIL * (self.stop - self.start))):self.stop]
 
-    def drift(self, signal: Array) -> float:
+    def drift(self, signal: Floats) -> float:
         """Change between the two halves of the tail [unit of the signal]."""
         tail = self.tail(signal)
         half = tail.size // 2
@@ -54,7 +53,7 @@ def plateaus(record: Record, name: str, least: int) -> list[Plateau]:
     return found
 
 
-def column(record: Record, name: str) -> Array:
+def column(record: Record, name: str) -> Floats:
     """A column of the record by name."""
     if name not in record:
         raise InputError(f"the record has no column {name!r}", where="argument record",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Complex, Floats
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..thermal import System
-from ._response_model import Bins, Complex
+from ._response_model import Bins
 
-Array = NDArray[np.float64]
 _CHUNK = 100  # bins whose correlation with their neighbours is computed at once
 
 
@@ -53,7 +53,7 @@ def independent_freedom(G: FrequencyResponse, bins: Bins) -> float:
     return max(q / max((2 * G.half_width + 1) / stride, 1.0), 1.0)
 
 
-def _inverse_roots(covariance: Complex, frequencies: Array) -> Complex:
+def _inverse_roots(covariance: Complex, frequencies: Floats) -> Complex:
     try:
         return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.complex128)
     except np.linalg.LinAlgError:
@@ -64,7 +64,7 @@ def _inverse_roots(covariance: Complex, frequencies: Array) -> Complex:
                          where="argument data", expected="noise in every channel", remedy=remedy) from None
 
 
-def spread_of_score(G: FrequencyResponse, bins: Bins, J: Complex) -> Array:
+def spread_of_score(G: FrequencyResponse, bins: Bins, J: Complex) -> Floats:
     """M = 2 Re Jᴴ L⁻¹ Σ L⁻ᴴ J, (p, p), with Σ the covariance between neighbouring bins too.
 
     Each side is widened by √(q/(q - n_y - 1)): the weights are estimates themselves, with q degrees of freedom, and a

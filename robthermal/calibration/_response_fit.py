@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from .._arrays import Floats
 from .._fitting import Choice, OperatingPoint, chosen_ranges
 from ..errors import InputError, Outcome
 from ..identify import FrequencyResponse
@@ -19,8 +20,6 @@ from ._directions import in_words, named, weights
 from ._estimates import Estimates, outcome_of
 from ._response_bins import bins_of, independent_freedom, spread_of_score
 from ._response_model import ResponseProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,7 +121,7 @@ def calibrate_response(system: System, response: FrequencyResponse, parameters: 
     return _result(problem, run.x, run.status > 0, int(run.nfev))
 
 
-def _result(problem: ResponseProblem, q: Array, converged: bool, iterations: int) -> ResponseFit:
+def _result(problem: ResponseProblem, q: Floats, converged: bool, iterations: int) -> ResponseFit:
     ranges, G, bins = problem.ranges, problem.response, problem.bins
     values, J, z = ranges.values(q), problem.slopes(q), problem.whitened(q)
     H = 2.0 * np.einsum("kap,kaq->pq", J.conj(), J).real

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .._arrays import Complex, Floats
 from .._fitting import OperatingPoint, Ranges, residual, sampled_response
 from ..errors import Diverged
 from ..identify import FrequencyResponse
 from ..thermal import System
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 _DIFFERENCE = 1e-4  # step of the central differences, in `Ranges.spread`; their error is the square of it
 
 
@@ -67,23 +66,23 @@ class ResponseProblem:
     ranges: Ranges
     operating_point: OperatingPoint
 
-    def system_at(self, q: Array) -> System:
+    def system_at(self, q: Floats) -> System:
         """System at some coordinates."""
         return self.system.with_parameters(self.ranges.assigned(self.ranges.values(q)))
 
-    def model(self, q: Array) -> Complex:
+    def model(self, q: Floats) -> Complex:
         """vec G of the model at the bins, (n_b, m)."""
         frequencies = self.response.frequencies[self.bins.index]
         G = sampled_response(self.system_at(q), frequencies, self.response.sample_time, self.operating_point,
                              self.bins.outputs, self.bins.inputs)
         return G.transpose(0, 2, 1).reshape(len(frequencies), -1)  # columns of G stacked
 
-    def whitened(self, q: Array) -> Complex:
+    def whitened(self, q: Floats) -> Complex:
         """L⁻¹ (measured − modelled), (n_b, m)."""
         white: Complex = np.einsum("kab,kb->ka", self.bins.root, residual(self.bins.measured, self.model(q)))
         return white
 
-    def slopes(self, q: Array) -> Complex:
+    def slopes(self, q: Floats) -> Complex:
         """Derivative of `whitened` by central differences, (n_b, m, p); one-sided at a bound."""
         low, high = self.ranges.coordinates(self.ranges.lower), self.ranges.coordinates(self.ranges.upper)
         out = np.empty((*self.bins.measured.shape, q.size), np.complex128)
@@ -94,7 +93,7 @@ class ResponseProblem:
             out[..., i] = np.einsum("kab,kb->ka", self.bins.root, change) / (after[i] - before[i])
         return out
 
-    def vector(self, q: Array) -> Array:
+    def vector(self, q: Floats) -> Floats:
         """Real residuals, whose half sum of squares is minus the log-likelihood, then the priors."""
         prior = self.ranges.prior(self.ranges.values(q))
         try:
@@ -102,7 +101,7 @@ class ResponseProblem:
         except Diverged:  # no steady state: a rejected step
             return np.full(2 * self.bins.measured.size + prior.size, np.inf)
 
-    def jacobian(self, q: Array) -> Array:
+    def jacobian(self, q: Floats) -> Floats:
         """Derivative of `vector`."""
         known = np.isfinite(self.ranges.sigma)
         prior = np.diag(self.ranges.prior_slopes(self.ranges.values(q)))[known]
@@ -111,7 +110,7 @@ class ResponseProblem:
         return np.concatenate([data, prior])
 
 
-def _real(z: Complex) -> Array:
+def _real(z: Complex) -> Floats:
     """Circular complex noise of unit variance has real and imaginary parts of variance one half."""
     flat = np.sqrt(2.0) * z.ravel()
     return np.concatenate([flat.real, flat.imag])

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .._arrays import Floats
 from .._fitting import Data, rmse_by_sensor
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,13 +29,13 @@ class Score:
     fit_percent: dict[str, float]
 
 
-def score_of(one: Data, residual: Array) -> Score:
+def score_of(one: Data, residual: Floats) -> Score:
     """Score of residuals (n, n_sensors) [K]."""
     by_sensor = {name: residual[:, i] for i, name in enumerate(one.sensors)}
     percent = {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)}
     return Score(one.label, rmse_by_sensor([by_sensor]), percent)
 
 
-def _percent(y: Array, residual: Array) -> float:
+def _percent(y: Floats, residual: Floats) -> float:
     spread = float(np.linalg.norm(y - y.mean()))
     return 100.0 * (1.0 - float(np.linalg.norm(residual)) / spread) if spread else float("nan")

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from .._arrays import Floats
 from ._autoregression import Correlation
 
-Array = NDArray[np.float64]
 BLOCKS = 10  # of all records together: long against the correlation of residuals, yet enough to estimate a variance
 _LEVEL = 0.01  # chance of a scale above 1 if the autoregression is right
 _ZERO = 1e-9  # relative eigenvalue that is rounding
@@ -26,7 +25,7 @@ def blocks_of(lengths: Sequence[int]) -> list[list[slice]]:
     return out
 
 
-def block_scores(psi: Array, J: Array, correlation: Correlation, blocks: Sequence[slice]) -> tuple[Array, Array]:
+def block_scores(psi: Floats, J: Floats, correlation: Correlation, blocks: Sequence[slice]) -> tuple[Floats, Floats]:
     """Sum over blocks of s sᵀ, s = Jᵀψ of the block, and of what the autoregression expects of it, both (p, p).
 
     Parameters
@@ -45,7 +44,7 @@ def block_scores(psi: Array, J: Array, correlation: Correlation, blocks: Sequenc
     return scores.T @ scores, expected
 
 
-def covariance_scale(found: Array, expected: Array, count: int) -> float:
+def covariance_scale(found: Floats, expected: Floats, count: int) -> float:
     """Mean ratio of found to expected variance of the scores if it is beyond chance, else 1.
 
     The fit makes the sum of all block scores vanish, which takes one of the `count` degrees of freedom of each

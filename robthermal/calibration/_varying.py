@@ -9,14 +9,12 @@ from typing import Any
 import control
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from .._arrays import Floats
 from ..errors import InputError
 from ..thermal import System, linearize
 from ._estimates import Estimates
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,9 +35,9 @@ class VaryingModel:
 
     system: System
     names: tuple[str, ...]
-    temperatures: Array
-    values: Array
-    std: Array
+    temperatures: Floats
+    values: Floats
+    std: Floats
 
     def parameters(self, temperature: float) -> dict[str, float]:
         """Parameters at a temperature, linear between the local models.
@@ -175,7 +173,7 @@ def join_models(local: Mapping[float, Estimates]) -> VaryingModel:
     return VaryingModel(system=fits[0].system, names=names, temperatures=temperatures, values=values, std=std)
 
 
-def _line(A: Array, value: Array, std: Array) -> tuple[float, float, float, float]:
+def _line(A: Floats, value: Floats, std: Floats) -> tuple[float, float, float, float]:
     """Weighted line: value, slope, its standard deviation, and the p-value of the scatter."""
     weighted = A / std[:, None]
     covariance = np.linalg.inv(weighted.T @ weighted)

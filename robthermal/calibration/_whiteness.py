@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
-Array = NDArray[np.float64]
+from .._arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Whiteness:
     p_value: float
 
 
-def whiteness_of(segments: list[Array]) -> Whiteness:
+def whiteness_of(segments: list[Floats]) -> Whiteness:
     """Test stretches of one sensor's weighted residuals, about zero: a constant residual is not white either."""
     Q, total = 0.0, 0
     for e in segments:
