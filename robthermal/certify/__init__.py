@@ -1,11 +1,11 @@
 """Certificates of thermal systems: contraction in a box, current limits, box invariance, runaway, large networks."""
 
-from .._linear import GainBound as GainBound
-from .._linear import frequency_norm as frequency_norm
-from .._linear import frequency_radius as frequency_radius
-from .._linear import hinf as hinf
-from .._linear import peak as peak
-from .._linear import stability as stability
+from ..linear import GainBound as GainBound
+from ..linear import frequency_norm as frequency_norm
+from ..linear import frequency_radius as frequency_radius
+from ..linear import hinf as hinf
+from ..linear import peak as peak
+from ..linear import stability as stability
 from ._authority import check_certificate as check_certificate
 from ._contraction import contraction as contraction
 from ._enclosure import RunawayFree as RunawayFree

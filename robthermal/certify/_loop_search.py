@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._conic import Form, largest_margin
+from ..conic import Form, largest_margin
 from ._loop_picture import Maps, Picture
 
 Array = NDArray[np.floating[Any]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from .._conic import Form
+from ..conic import Form
 from ..errors import InputError
 from ..thermal import System
 from ._jacobian import BoxJacobian

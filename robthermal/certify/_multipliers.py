@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._conic import Inequality, inside
+from ..conic import Inequality, inside
 
 Array = NDArray[np.floating[Any]]
 Channel = tuple[Array, Array, Array]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
-from .._conic import Form
+from ..conic import Form
 from ..errors import InputError
 from ..thermal import Equations, System
 from ..verification import Certificate, establish, not_certified

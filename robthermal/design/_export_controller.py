@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import Program, comment, identifier, number, write_export
+from ..export import Program, comment, identifier, number, write_export
 from ._matrices import Matrices, dot, matrices
 from ._modules import Array
 

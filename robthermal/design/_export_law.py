@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import Program, comment, doubles, identifier, write_export
+from ..export import Program, comment, doubles, identifier, write_export
 
 if TYPE_CHECKING:
     from ._linearization import FeedbackLinearization

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._export import Program, comment, doubles, identifier, number, rows, write_export
+from ..export import Program, comment, doubles, identifier, number, rows, write_export
 from ..thermal import format_system
 from ._export_heats import DRIVE, HEATS, INTEGERS, Heat, Row
 from ._observer_recursion import ObserverRecursion

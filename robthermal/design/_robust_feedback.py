@@ -11,7 +11,7 @@ import control
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from .._conic import Form, Inequality, inside, largest_margin
+from ..conic import Form, Inequality, inside, largest_margin
 from ..errors import InputError, Outcome
 from ._constant_gain import ConstantGain
 from ._error_box import Interval

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._conic import Inequality, inside
+from ..conic import Inequality, inside
 from ..errors import InputError, Outcome
 from ._error_box import Block
 from ._modules import Array

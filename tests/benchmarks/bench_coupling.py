@@ -9,7 +9,7 @@ import numpy as np
 from _timing import best_of, header, row
 
 import robthermal as rt
-from robthermal._conic import smallest_bound
+from robthermal.conic import smallest_bound
 from robthermal.coupling.problem import prepare
 from robthermal.coupling.synthesis import (
     Demands,

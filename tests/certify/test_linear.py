@@ -10,8 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
-from robthermal._linear import hinf_norm, interval_norms, interval_radii
 from robthermal.errors import InputError
+from robthermal.linear import hinf_norm, interval_norms, interval_radii
 
 # python-control control/tests/sysnorm_test.py, values computed in MATLAB
 A3 = [[-1.017041847539126, -0.224182952826418, 0.042538079149249],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal._conic import Form, largest_margin, strictly
+from robthermal.conic import Form, largest_margin, strictly
 
 BOX = (278.15, 358.15)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal._conic import NormBounds, smallest_bound
+from robthermal.conic import NormBounds, smallest_bound
 from robthermal.coupling.analysis._worst_case import _Maps
 from robthermal.coupling.problem import radius, youla_parameter
 from robthermal.coupling.synthesis import make_basis, moments, square_root

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array
-from ..._linear import hinf
 from ...errors import InputError
+from ...linear import hinf
 from ...verification import Certificate
 from ..systems import Response, Zpk, apart, diagonal, minus_identity, natural, realize, sample_time_of, series
 from ._loop import Loop, close

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._export import Program, identifier, number, rows
+from ...export import Program, identifier, number, rows
 from ._recursion import Recursion
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._export import by_suffix, matlab_bytes
+from ...export import by_suffix, matlab_bytes
 from ._c_source import program
 from ._files import document
 

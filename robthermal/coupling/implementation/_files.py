@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import control
 import numpy as np
 
-from ..._export import json_bytes
 from ..._write import write
 from ...errors import InputError, Outcome
+from ...export import json_bytes
 from ._sections import sections
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from robthermal._linear import interval_norms
+from robthermal.linear import interval_norms
 
 from ..systems import Response
 from ._blocks import Complex, Real, Structure

@@ -8,8 +8,8 @@ from typing import Any
 import control
 import numpy as np
 
-from robthermal._linear import frequency_norm, hinf
 from robthermal.errors import InputError, Outcome
+from robthermal.linear import frequency_norm, hinf
 from robthermal.verification import Certificate
 
 from ._blocks import Complex, Real, read_blocks

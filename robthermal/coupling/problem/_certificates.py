@@ -8,7 +8,7 @@ import control
 import numpy as np
 
 from ..._arrays import Array
-from ..._linear import frequency_radius, hinf, hinf_norm, interval_norms, interval_radii, stability
+from ...linear import frequency_radius, hinf, hinf_norm, interval_norms, interval_radii, stability
 from ...verification import Certificate
 from ..factors import Intervals
 from ..systems import Response, connected

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
-from ..._conic import NormBounds, smallest_bound
+from ...conic import NormBounds, smallest_bound
 from ..problem import radius
 
 _ROUNDS = 12

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._conic import group_sparse
+from ...conic import group_sparse
 from ..effects import Candidate
 from ..evidence import Scores, columns
 from ..fit import Refit
