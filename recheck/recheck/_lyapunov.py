@@ -18,6 +18,7 @@ from ._thermal import Network, check_cost
 from ._vertices import Entries, Vertex, add, count, groups, jacobian, vertices
 
 PIECES = (1, 2, 4, 8)
+_MOST_ENTRIES = 4_000_000  # of the shares of all vertices, some 250 MB
 _MOST_WORK = 200_000_000  # vertices times n³, and what every vertex costs however small: about 20 s
 
 
@@ -94,8 +95,11 @@ def refine(network: Network, start: Units, bent: Sequence[Sequence[Entries]], pa
     failed = Failure([])
     for pieces in PIECES:
         cuts = [pieces] * len(network.modules)
-        total = math.prod([count(network, group, cuts) for group in found] + [len(ends) for ends in bent])
+        counts = [count(network, group, cuts) for group in found]
+        total = math.prod([*counts, *(len(ends) for ends in bent)])
         check_work(total, size)
+        if sum(counts) * size**2 > _MOST_ENTRIES:
+            raise NotCovered(f"{sum(counts)} vertices of matrices of {size} rows are too many to keep")
         modules = [[Share(*part(vertex.entries), vertex) for vertex in vertices(network, group, cuts)]
                    for group in found]
         open_vertex = _first_failure(Share(*start), [*links, *modules])
