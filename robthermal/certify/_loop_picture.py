@@ -80,8 +80,7 @@ def picture(system: System, section: Mapping[str, Any], region: Mapping[str, Any
     """Picture of the loop of a certificate's sections, the current ranges cut into pieces."""
     eq = Equations(system)
     n, m = len(eq.capacity), len(system.modules)
-    control = {key: np.array(rows, float).reshape(shape) for (key, rows), shape in zip(
-        section["controller"].items(), _shapes(section["controller"], n, m), strict=True)}
+    control = controller_matrices(section["controller"], n, m)
     T = region["sample_time"]
     F = eq.A.toarray() / eq.capacity[:, None]
     both = expm(np.block([[F, np.diag(1 / eq.capacity)], [np.zeros((n, 2 * n))]]) * T)
@@ -92,7 +91,7 @@ def picture(system: System, section: Mapping[str, Any], region: Mapping[str, Any
     real: list[list[Share]] = []
     for k, name in enumerate(system.modules):
         wanted = np.hstack([control["D"][k], control["C"][k]])
-        module = _Module(system, name, region, wanted)
+        module = ModulePicture(system, name, region, wanted)
         free = [piece for piece in module.pieces(pieces)]
         fixed = module.limited()
         corners.append(free + fixed)
@@ -115,10 +114,11 @@ def picture(system: System, section: Mapping[str, Any], region: Mapping[str, Any
                    reach)
 
 
-def _shapes(controller: Mapping[str, Any], n: int, m: int) -> list[tuple[int, int]]:
+def controller_matrices(controller: Mapping[str, Any], n: int, m: int) -> dict[str, Array]:
+    """A, B, C, D, windup of a certificate's controller as arrays, empty ones in their shapes."""
     q = len(controller["A"])
     shapes = {"A": (q, q), "B": (q, n), "C": (m, q), "D": (m, n), "windup": (q, m)}
-    return [shapes[key] for key in controller]
+    return {key: np.array(controller[key], float).reshape(shape) for key, shape in shapes.items()}
 
 
 def _heats(n: int, q: int, a: int, b: int, slopes: Array) -> Array:
@@ -128,7 +128,7 @@ def _heats(n: int, q: int, a: int, b: int, slopes: Array) -> Array:
     return heats
 
 
-class _Module:
+class ModulePicture:
     """Slopes of one module: free or limited current."""
 
     def __init__(self, system: System, name: str, region: Mapping[str, Any], wanted: Array):
@@ -203,6 +203,37 @@ class _Module:
         faces = np.eye(len(self.wanted))[[self.h, self.c]]
         movers = np.vstack([faces, self.wanted])
         return heats, np.zeros(len(self.wanted)), np.vstack([self.middle @ movers, movers])
+
+    def control_points(self, current: tuple[float, float]) -> Array:
+        """[J, b] at points whose hull has all of the box, (k, 2, 3): Bernstein's, for degree two in each of h, c, I."""
+        marks = [np.array([low, 0.5 * (low + high), high]) for low, high in (self.hot, self.cold, current)]
+        J, b = self.slopes(*np.meshgrid(*marks, indexing="ij"))
+        values = np.concatenate([J + self.exchange, b[..., None]], axis=-1)
+        for axis in range(3):
+            low, middle, high = (np.take(values, k, axis) for k in range(3))
+            chord, control = 0.5 * (low + high), 2 * middle - 0.5 * (low + high)
+            straight = np.abs(control - chord).max() <= 1e-10 * np.abs(values).max()
+            values = np.stack([low, high] if straight else [low, control, high], axis)
+        return np.unique(values.reshape(-1, 2, 3), axis=0)
+
+    def free_corners(self, current: tuple[float, float], *, heat: bool) -> Array:
+        """Slopes of (current, heat_h, achieved - wanted) by (x_h, x_c, v) where the current is free, (k, 3, 3)."""
+        free, moves = self.law(*self.grid(current, _GRID))
+        slopes = np.hstack([moves, free]) if heat else moves
+        wider = _WIDER * np.ptp(slopes, axis=0)
+        found = []
+        for corner in product(*zip(slopes.min(axis=0) - wider, slopes.max(axis=0) + wider, strict=True)):
+            rows = np.zeros((3, 3))
+            rows[:len(corner) // 3] = np.array(corner).reshape(-1, 3)
+            found.append(rows)
+        return np.array(found)
+
+    def limited_corners(self, current: float) -> Array:
+        """The same at a limit."""
+        J, _ = self.slopes(*self.grid((current, current), 2))
+        found = np.zeros((len(J), 3, 3))
+        found[:, 1, :2], found[:, 2, :2], found[:, 2, 2] = J[:, 0], J[:, 1], -1.0
+        return np.unique(found, axis=0)
 
     def bound(self, bounds: _Bounds, k: int, drift: float | None) -> None:
         """Add how large the slopes are, and how far they can change within a sample."""

@@ -84,7 +84,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     section = system_section(system)
     check_choice(system, "full", large)
     section["sensors"] = sensor_list(system, sensors)
-    section["gain"] = _gain(gain, len(system.lumps), len(section["sensors"]))
+    section["gain"] = gain_matrix(gain, len(system.lumps), len(section["sensors"]))
     region = region_section(system, current, temperature, parameters)
     region["sample_time"] = _positive(sample_time)
     parts: dict[str, Any] = {"system": section, "region": region}
@@ -212,7 +212,8 @@ def _growth(vertices: Polytope, system: System) -> str | None:
             "temperature range.")
 
 
-def _gain(value: ArrayLike, rows: int, columns: int) -> list[list[float]]:
+def gain_matrix(value: ArrayLike, rows: int, columns: int) -> list[list[float]]:
+    """Rows of an observer's gain for a certificate's section."""
     try:
         gain = np.asarray(value, float)
     except (TypeError, ValueError):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,18 +30,20 @@ Matrices = dict[str, Array]
 
 @dataclass(frozen=True)
 class CertifiedLoop:
-    """What is proven of a closed loop: of the continuous plant, or with an observer only of its sampled model.
+    """What is proven of a closed loop: of the continuous plant, or of the sampled model only, and then it says so.
 
     Parameters
     ----------
     loop : Certificate
-        In the box the loop contracts, limits active or not. With an observer this is about the sampled model (the heat
-        of the modules held over a sample), which says nothing about what the machine does between the samples: it may
-        oscillate where the sampled model does not.
+        In the box the loop contracts, limits active or not; with an observer, plant, estimates and controller together.
+        Where that is not proven of the continuous plant it may be about the sampled model (the heat of the modules held
+        over a sample), which says nothing about what the machine does between the samples: it may oscillate where the
+        sampled model does not. The outcome then has the code "certified_sampled_model".
     invariance : Certificate
         Currents within the limits never drive a temperature of the continuous plant out of the box.
     observer : Certificate or None
-        In the box the estimation error of the sampled model shrinks; none where the temperatures are measured.
+        In the box the estimation error of the sampled model shrinks; none where the temperatures are measured, or
+        `loop` covers the estimates.
     outcome : Outcome
         "certified", or what is missing and why.
     """
@@ -81,9 +84,9 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     ambient, heat : mapping, optional
         {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, none.
     observer : GainObserver, optional
-        Where the law and the controller use estimates. The claim is then about the *sampled model* of the observer,
-        the heat of the modules held over a sample, not about the machine between the samples; without an observer it
-        is about the plant in continuous time.
+        Where the law and the controller use estimates. If the loop is too large, or no proof is found for the plant
+        in continuous time, the claim is about the *sampled model* of the observer, the heat of the modules held over a
+        sample, not about the machine between the samples, and the outcome says so.
     drift : float, optional
         As in `rt.certify.loop`.
     parameters : mapping, optional
@@ -93,7 +96,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     -------
     CertifiedLoop
         If it holds there is, for constant set-points, ambients and loads, one steady state, reached from everywhere in
-        the box; with an observer this is said of the sampled model only, and the outcome says so.
+        the box as long as estimates stay in it; where this is said of the sampled model only, the outcome says so.
 
     Raises
     ------
@@ -112,7 +115,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     >>> law = rt.design.feedback_linearization(system, current_limits=(-0.2, 0.5))
     >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.05, sample_time=1.0)
     >>> print(rt.design.certify_loop(system, pi, law))
-    Certified: whatever its start in the box, 6.0 to 36.7 °C, the loop forgets it, with limits active or not.
+    Certified: whatever its start in the box, 5.8 to 36.9 °C, the loop forgets it, with limits active or not.
     """
     expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     limits = _limits(system, law)
@@ -136,13 +139,25 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         box = dict(temperature) if isinstance(temperature, Mapping) else dict.fromkeys(system.lumps, temperature)
         stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat,
                                    parameters=parameters)
-    loop = certify_plain_loop(system, current=limits, temperature=box, sample_time=controller.sample_time,
-                              controller=matrices, plant="continuous" if observer is None else "held",
-                              drift=drift if observer is None else None, parameters=parameters)
-    estimate = None if observer is None else certify_observer(
-        system, gain=observer.gain, sensors=observer.sensors, sample_time=observer.sample_time, current=limits,
-        temperature=box)
-    return CertifiedLoop(loop, stays, estimate, _outcome(loop, stays, estimate, box, drift))
+    limits_and_box: dict[str, Any] = {"current": limits, "temperature": box, "sample_time": controller.sample_time,
+                                      "controller": matrices}
+    if observer is None:
+        loop = certify_plain_loop(system, **limits_and_box, drift=drift, parameters=parameters)
+        return CertifiedLoop(loop, stays, None, _outcome(loop, stays, None, box, drift))
+    if parameters:
+        raise InputError("uncertain links with an observer", where="argument parameters", expected="no observer",
+                         remedy="Certify the loop at the true temperatures and rt.certify.observer with them.")
+    # the certificate's sensors read gain times their lump, this observer undoes that first
+    gain = observer.gain / np.array([system.sensors[name].gain for name in observer.sensors])
+    both = certify_plain_loop(system, **limits_and_box, gain=gain, sensors=list(observer.sensors))
+    if both.holds:
+        return CertifiedLoop(both, stays, None, _outcome(both, stays, None, box, None))
+    held = certify_plain_loop(system, **limits_and_box, plant="held")
+    error = certify_observer(system, gain=gain, sensors=list(observer.sensors), sample_time=observer.sample_time,
+                             current=limits, temperature=box)
+    outcome = _outcome(held, stays, error, box, None)
+    text = f"{outcome.text} Why not for the machine itself: {both.reason}" if outcome.ok else outcome.text
+    return CertifiedLoop(held, stays, error, replace(outcome, text=text))
 
 
 def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None, box: Mapping[str, Interval],
@@ -159,9 +174,11 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
                        f"{low:.1f} to {high:.1f} °C, the sampled model of the loop forgets it, with limits active or "
                        "not, as long as its temperatures and estimates stay in the box. The machine moves between the "
                        "samples and is not covered; of the continuous plant it is proven that it stays in the box.")
+    where = " of temperatures and estimates" if "gain" in loop.system else ""
     moves = "" if drift is None else f", as long as no face of a module moves by more than {drift:g} K within a sample"
-    return Outcome(True, "certified", f"Certified: whatever its start in the box, {low:.1f} to {high:.1f} °C, "
-                   f"the loop forgets it, with limits active or not{moves}.")
+    stay = ", as long as the estimates stay in it; the temperatures do" if where else ""
+    return Outcome(True, "certified", f"Certified: whatever its start in the box{where}, {low:.1f} to {high:.1f} °C, "
+                   f"the loop forgets it, with limits active or not{moves}{stay}.")
 
 
 def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:

@@ -17,10 +17,13 @@ from robthermal.errors import InputError
 
 from ._definite import approximate, is_positive_preconditioned
 from ._fields import get, mapping, margin_of, no_other, not_negative, numbers, positive, sequence, text
+from ._flow import flow_growth
+from ._growth import Growth
 from ._kind import Kind, Proof, working_precision
-from ._loop_growth import Growth, growth
+from ._loop_growth import growth
 from ._lyapunov import asymmetry
 from ._numbers import decimal, exact, name_of, round_down, show
+from ._observer import Sensor, read_sensors, say_sensors
 from ._system import Region, ThermalSystem, read_region, read_system, say_region
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
@@ -58,6 +61,9 @@ class Loop:
     weights: tuple[fmpq, ...]
     sizes: tuple[fmpq, ...]
     parameters: Parameters = ()
+    start: tuple[Rows, ...] = ()
+    sensors: tuple[Sensor, ...] | None = None
+    gain: Rows = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
@@ -80,13 +86,31 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
     pieces = exact(found.get("pieces", 1), "evidence.pieces")
     if pieces.q != 1 or not 1 <= pieces <= _PIECES:
         raise InputError(f"pieces {show(pieces)}", where="evidence.pieces", expected=f"an integer from 1 to {_PIECES}")
-    size = n + len(controller.A)
+    sensors, gain = _observer(system, nominal)
+    start = sequence(found.get("start", []), "evidence.start")
+    if sensors is not None and (not start or plant != "continuous" or parameters):
+        raise InputError("an observer in the loop", where="system.gain",
+                         expected="plant 'continuous', nominal parameters and evidence.start")
+    if start and ("drift" in table or plant != "continuous"):
+        raise InputError("matrices for the start of a sample", where="evidence.start",
+                         expected="only for plant 'continuous', without a drift")
+    size = n + len(controller.A) + (n if sensors is not None else 0)
     return Loop(network, box, controller, positive(get(table, "sample_time", "region"), "region.sample_time"), plant,
                 not_negative(table["drift"], "region.drift") if "drift" in table else None, contraction,
                 margin_of(margin, "contraction"), _matrix(get(found, "matrix", "evidence"), size, size,
                                                           "evidence.matrix"),
                 int(pieces.p), _list(found.get("weights", []), "evidence.weights"),
-                _list(found.get("sizes", []), "evidence.sizes"), parameters)
+                _list(found.get("sizes", []), "evidence.sizes"), parameters,
+                tuple(_matrix(item, size + m, size + m, f"evidence.start[{k}]") for k, item in enumerate(start)),
+                sensors, gain)
+
+
+def _observer(system: Any, network: ThermalSystem) -> tuple[tuple[Sensor, ...] | None, Rows]:
+    """Return sensors and gain of the observer whose estimates law and controller use, None without one."""
+    if "gain" not in system:
+        return None, ()
+    sensors = read_sensors(system, network)
+    return sensors, _matrix(system["gain"], len(network.lumps), len(sensors), "system.gain")
 
 
 def _links_only(parameters: Parameters, plant: Any) -> Parameters:
@@ -109,13 +133,19 @@ def claim(problem: Loop, machine: str) -> str:
     moves = ("" if problem.drift is None else
              f" or moves a face of a module by more than {decimal(problem.drift)} K within a sample")
     subject = say_subject(problem.system, problem.parameters, machine, _PLANTS[problem.plant])
+    read, stay, differences = "the true temperatures", "no trajectory from this box leaves it", "temperatures"
+    if problem.sensors is not None:
+        read = ("the estimates of the observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) with sensors "
+                f"{say_sensors(problem.sensors, problem.system)}, f held in its model")
+        stay = ("temperatures and estimates both stay in this box of temperatures (that they do is not part of this "
+                "claim)")
+        differences = "temperatures, estimates"
+    who = "between any two trajectories under the same set-points, ambients and heat loads"
     return (f"The closed loop of the {subject}, with its controller ({states} state{'' if states == 1 else 's'}) "
             f"sampled every {decimal(problem.sample_time)} s, heats turned into currents by feedback "
-            f"linearisation at the true temperatures, contracts for all "
-            f"{say_region(problem.system, problem.region)}, the current ranges being its limits: provided that no "
-            f"trajectory from this box leaves it{moves}, e'Pe of the differences in temperatures "
-            f"and controller states between any two trajectories under the same set-points, ambients and heat loads "
-            f"{speed}.")
+            f"linearisation at {read}, contracts for all "
+            f"{say_region(problem.system, problem.region)}, the current ranges being its limits: provided that "
+            f"{stay}{moves}, e'Pe of the differences in {differences} and controller states {who} {speed}.")
 
 
 def prove(problem: Loop) -> Proof:
@@ -151,14 +181,14 @@ def find_margin(problem: Loop) -> dict[str, float]:
 
 def _growth(problem: Loop) -> Growth | str:
     """Return what e'Pe can become after one sample, after all checks that do not depend on the contraction."""
-    broken = asymmetry(problem.matrix)
-    if broken:
-        return broken
+    broken = [asymmetry(matrix) for matrix in (problem.matrix, *problem.start)]
+    if any(broken):
+        return next(filter(None, broken))
     P = arb_mat([[arb(entry) for entry in row] for row in problem.matrix])
     if not is_positive_preconditioned(P, approximate(P)):
         return "P > 0 fails or cannot be proven"
     try:
-        return growth(problem, P)
+        return flow_growth(problem, P) if problem.start else growth(problem, P)
     except ZeroDivisionError:
         return "a matrix has no inverse, or none can be proven"
 

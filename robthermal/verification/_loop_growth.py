@@ -7,7 +7,7 @@ matrices of `_between`. Each of these is convex in the slopes: the corners of th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from flint import arb, arb_mat, fmpq
 from ._between import Bounds, Deviation, Sampled, deviation, diagonal, sample
 from ._definite import approximate, is_positive_preconditioned
 from ._fields import Interval
+from ._growth import Growth
 from ._law import fixed_slopes, free_slopes, unfit, variation
 from ._lyapunov import MOST_WORK, link_slopes
 from ._numbers import name_of, show
@@ -41,14 +42,6 @@ class Share:
     windup: Row | None
     free: tuple[Row, ...]
     where: str
-
-
-@dataclass(frozen=True)
-class Growth:
-    """All cases, with where they are, and their number."""
-
-    cases: Iterable[tuple[arb_mat, str]]
-    count: int
 
 
 def growth(problem: Loop, P: arb_mat) -> Growth | str:

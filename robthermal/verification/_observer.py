@@ -8,7 +8,7 @@ e+ = M e with M = A_d - L C + Γ F, F a mean of ∂f/∂x over the box (proof no
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,8 +71,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Observer:
                              expected="conductances of links, values and slopes of modules",
                              remedy="Certify the observer for each capacity of interest.")
     network = worst_system(nominal, system, parameters)
-    sensors = tuple(_sensor(item, network, f"system.sensors[{k}]")
-                    for k, item in enumerate(sequence(get(system, "sensors", "system"), "system.sensors")))
+    sensors = read_sensors(system, network)
     contraction = positive(found.get("contraction", 1), "evidence.contraction")
     if contraction > 1:
         raise InputError(f"contraction {show(contraction)}", where="evidence.contraction", expected="at most 1")
@@ -86,15 +85,14 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Observer:
 
 def claim(problem: Observer, machine: str) -> str:
     """Return the one sentence the data give."""
-    lumps = problem.system.lumps
-    reads = ", ".join(f"{name_of(s.name)} ({decimal(s.gain)} times {name_of(lumps[s.lump])})" for s in problem.sensors)
+    reads = say_sensors(problem.sensors, problem.system)
     speed = (f"shrinks at least by the factor {decimal(problem.contraction)}² per sample" if problem.contraction < 1
              else "shrinks strictly with every sample")
     known = (", the same in plant and observer, A_d and Γ those of the nominal numbers and f all other heat"
              if problem.parameters else "")
     subject = say_subject(problem.system, problem.parameters, machine, "sampled model with held heat")
     return (f"The observer x^+ = A_d x^ + Γ f(x^, I) + L (y - C x^) of the {subject}{known}, with sensors "
-            f"{reads or 'none'}, sampled every {decimal(problem.sample_time)} s, f held in between, converges for all "
+            f"{reads}, sampled every {decimal(problem.sample_time)} s, f held in between, converges for all "
             f"{say_region(problem.system, problem.region)}, as long as temperatures and estimates both stay in this "
             f"box (that they do is not part of this claim): e'Pe of the error {speed}.")
 
@@ -221,6 +219,18 @@ def _schur(PM: arb_mat, own: arb_mat | None = None) -> arb_mat:
     above = PM.transpose().tolist()
     rows = [[*inside[i], *above[i]] for i in range(n)] + [[*below[i], *inside[i]] for i in range(n)]
     return arb_mat(rows)
+
+
+def read_sensors(system: Mapping[str, Any], network: ThermalSystem) -> tuple[Sensor, ...]:
+    """Return the sensors of a certificate's system section."""
+    items = sequence(get(system, "sensors", "system"), "system.sensors")
+    return tuple(_sensor(item, network, f"system.sensors[{k}]") for k, item in enumerate(items))
+
+
+def say_sensors(sensors: Sequence[Sensor], system: ThermalSystem) -> str:
+    """Return the sensors for a claim."""
+    return ", ".join(f"{name_of(s.name)} ({decimal(s.gain)} times {name_of(system.lumps[s.lump])})"
+                     for s in sensors) or "none"
 
 
 def _sensor(value: Any, system: ThermalSystem, where: str) -> Sensor:

@@ -138,7 +138,9 @@ def test_other_controllers():
         assert proven.holds and rt.verify(proven.loop).valid, proven.outcome.text
 
 
-def test_with_an_observer_the_sampled_model_converges():
+def test_with_an_observer_too_large_for_the_search_it_is_the_sampled_model(monkeypatch):
+    """Where the continuous plant is out of reach the words "sampled model" stand in outcome and claim."""
+    monkeypatch.setattr("robthermal.certify._loop._FLOW_SIZE", 4)
     system = machine(np.random.default_rng(7))
     system = system.model_copy(update={"sensors": rt.System(
         ambients=system.ambients, lumps=system.lumps, links=system.links, modules=system.modules,
@@ -148,6 +150,7 @@ def test_with_an_observer_the_sampled_model_converges():
     proven = rt.design.certify_loop(system, pi, law, observer=estimator)
     assert proven.holds and "estimates" in proven.outcome.text and proven.loop.region["plant"] == "held"
     assert "sampled model only" in str(proven) and "sampled model" in proven.loop.claim
+    assert proven.outcome.code == "certified_sampled_model" and "too many for the search" in str(proven)
     rng, starts, ends = np.random.default_rng(3), [], []
     for _ in range(2):
         x, guess, z = rng.uniform(290, 305, 4), rng.uniform(290, 305, 4), rng.uniform(-2, 2, 1)
