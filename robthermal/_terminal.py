@@ -42,21 +42,26 @@ def drawing(file: Path | None) -> Path | None:
 
 
 def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome] = (), **more: Any) -> None:
-    """Claims of a report as a table or JSON; exit status 1 unless all hold and are verified."""
+    """Verdict, reasons and claims of a report, for people or as JSON; exit status 1 where the verdict is FAIL."""
     def show() -> None:
         table = Table("claim", "answer", "box", "margin")
         for claim in report.claims:
             said = Text(_word(claim), style="green" if claim.good else "bold red")
-            table.add_row(Text(claim.title), said, Text(claim.box), Text(claim.margin))  # [1/s] is a unit, no markup
+            table.add_row(Text(claim.name), said, Text(claim.box), Text(claim.margin))  # [1/s] is a unit, no markup
         console = Console()
         if not console.is_terminal:
             console.width = max(console.width, _PIPE_WIDTH)
         console.print(table)
+        say(f"verdict: {report.verdict}", *(f"  {one.level}: {one}" for one in report.reasons))
+        say(*(f"usable current, {row.direction}{' (parameter ranges)' * (row.parameters == 'ranges')}: {row.range}"
+              for row in report.usable))
         say(*(f"{name}: {value}" for name, value in more.items()), *(f"remark: {remark.text}" for remark in remarks),
             f"report: {out / 'report.html'}")
 
-    summary = {"holds": report.holds, "out": str(out), "report": str(out / "report.html"), **more,
-               "claims": [{"title": c.title, "holds": c.holds, "verified": c.verified, "reason": c.reason}
+    summary = {"verdict": report.verdict, "holds": report.holds,
+               "reasons": [one.to_dict() for one in report.reasons], "out": str(out),
+               "report": str(out / "report.html"), **more,
+               "claims": [{"title": c.name, "holds": c.holds, "verified": c.verified, "reason": c.reason}
                           for c in report.claims],
                "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
     answer(summary, as_json, show)

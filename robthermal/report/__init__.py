@@ -11,8 +11,10 @@ from ._figure import Figure as Figure
 from ._html import write_html as write_html
 from ._provenance import file_hash as file_hash
 from ._provenance import versions as versions
+from ._reasons import Reason as Reason
 from ._residuals import residuals_before_after as residuals_before_after
 from ._residuals import spectra_before_after as spectra_before_after
+from ._store import is_unchanged as is_unchanged
 from ._store import read_content as read_content
 from ._store import write_content as write_content
 from ._style import house_style as house_style
@@ -21,8 +23,10 @@ from ._summaries import write_junit as write_junit
 from ._table import Printed as Printed
 from ._table import Table as Table
 from ._traces import measured_against_model as measured_against_model
+from ._usable import Bound as Bound
+from ._usable import UsableRange as UsableRange
 
-__all__ = ["Claim", "Evidence", "Figure", "Printed", "Report", "Section", "Table", "box_ranges", "current_limits",
-           "file_hash", "house_style", "load_curve", "measured_against_model", "read_content",
-           "residuals_before_after", "spectra_before_after", "versions", "write_content", "write_html", "write_json",
-           "write_junit"]
+__all__ = ["Bound", "Claim", "Evidence", "Figure", "Printed", "Reason", "Report", "Section", "Table", "UsableRange",
+           "box_ranges", "current_limits", "file_hash", "house_style", "is_unchanged", "load_curve",
+           "measured_against_model", "read_content", "residuals_before_after", "spectra_before_after", "versions",
+           "write_content", "write_html", "write_json", "write_junit"]

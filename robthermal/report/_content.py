@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ._evidence import Evidence
 from ._figure import Figure
+from ._reasons import Reason, Verdict, contradicts, verdict_of
 from ._table import Printed, Table
+from ._usable import Parameters, UsableRange
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class Claim:
         Duration of the check [s].
     tested : bool, optional
         Whether it is the result of a test on data: nothing is proven then, and `verified` is None.
+    parameters : str, optional
+        "nominal" or "ranges": for which parameters, where the same is claimed for both; then both have one title.
 
     Raises
     ------
@@ -70,6 +75,7 @@ class Claim:
     kind: str = ""
     seconds: float = 0.0
     tested: bool = False
+    parameters: Parameters = ""
 
     def __post_init__(self) -> None:
         # "no" and NaN are true in Python; here they would turn a badge green.
@@ -96,6 +102,11 @@ class Claim:
         if not self.holds:
             return "Not proven"
         return "Proven and verified" if self.verified else "Not verified"
+
+    @property
+    def name(self) -> str:
+        """Title, and for which parameters where that is said."""
+        return f"{self.title}, for the parameter ranges" if self.parameters == "ranges" else self.title
 
     @property
     def why(self) -> str:
@@ -174,12 +185,22 @@ class Report:
         Every certificate file with what the independent check said.
     checker : str, optional
         Which version of what made that check.
+    gate : sequence of Reason, optional
+        Reasons of the verdict beside those that the claims give.
+    gates : sequence of str, optional
+        Codes that were looked for, found or not: test cases of the pipeline.
+    usable : sequence of UsableRange, optional
+        Usable currents, for the first screen.
+    first : sequence of Section, optional
+        Sections that belong on the first screen: model against data.
+    data : mapping, optional
+        Tables for the JSON summary, by key.
 
     Examples
     --------
     >>> import robthermal as rt
-    >>> rt.report.Report("Setup", "", "", (), (), {}, (), "today").holds
-    False
+    >>> rt.report.Report("Setup", "", "", (), (), {}, (), "today").verdict
+    'FAIL'
     """
 
     title: str
@@ -193,15 +214,58 @@ class Report:
     answer: str = ""
     evidence: Sequence[Evidence] = ()
     checker: str = ""
+    gate: Sequence[Reason] = ()
+    gates: Sequence[str] = ()
+    usable: Sequence[UsableRange] = ()
+    first: Sequence[Section] = ()
+    data: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
-        """Whether something is claimed, and all of it holds and is verified."""
-        return bool(self.claims) and all(claim.good for claim in self.claims)
+        """Whether the verdict is not FAIL."""
+        return self.verdict != "FAIL"
 
     @property
-    def reasons(self) -> list[str]:
-        """Why the answer is no, one sentence per claim; empty if it is yes."""
+    def verdict(self) -> Verdict:
+        """PASS, PASS WITH REMARKS or FAIL: the worst reason decides."""
+        return verdict_of(self.reasons)
+
+    @property
+    def reasons(self) -> list[Reason]:
+        """Everything that is not as it should be, failures first."""
+        found = [*self._of_claims(), *self.gate]
+        return sorted(found, key=lambda one: one.level != "fail")
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data contradict the model that the claims are about."""
+        return contradicts(self.gate)
+
+    def status(self, claim: Claim) -> str:
+        """Status of a claim in words; nothing is called proven about a model that the data contradict.
+
+        Parameters
+        ----------
+        claim : Claim
+            One of the claims of this report.
+        """
+        return "Holds for the model in the file" if self.contradicted and claim.good and not claim.tested else (
+            claim.status)
+
+    def _of_claims(self) -> list[Reason]:
         if not self.claims:
-            return ["nothing is claimed"]
-        return [f"{claim.title}: {claim.why}" for claim in self.claims if not claim.good]
+            return [Reason("fail", "not_certified", "certify", "claims", "Nothing is claimed.")]
+        bad = {claim.title for claim in self.claims if claim.parameters != "ranges" and not claim.good}
+        return [_reason(claim) for claim in self.claims
+                if not claim.good and not (claim.parameters == "ranges" and claim.title in bad)]
+
+
+_CODES = {True: "not_verified", False: "not_certified"}
+
+
+def _reason(claim: Claim) -> Reason:
+    if claim.tested:
+        return Reason("fail", "not_passed", "diagnose", claim.title, f"{claim.title}: {claim.why}")
+    code = "not_robust" if claim.parameters == "ranges" else _CODES[bool(claim.holds)]
+    words = "It holds for the parameters as they stand, not for all of their ranges: " if code == "not_robust" else ""
+    return Reason("fail", code, "certify", claim.title, f"{claim.title}: {words}{claim.why}")

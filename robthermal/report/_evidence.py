@@ -37,6 +37,10 @@ class Evidence:
         Duration of the check [s].
     assumptions : sequence of str, optional
         What this claim rests on, beside what every claim of the report rests on.
+    machine : str, optional
+        Short hash of the machine it is about.
+    second : str, optional
+        What a second, independent checker said: "valid", "not valid" or "not covered"; empty if it did not run.
 
     Raises
     ------
@@ -63,6 +67,8 @@ class Evidence:
     margins: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
     assumptions: Sequence[str] = ()
+    machine: str = ""
+    second: str = ""
 
     def __post_init__(self) -> None:
         where = f"evidence {self.title!r}"
@@ -74,5 +80,5 @@ class Evidence:
 
     @property
     def good(self) -> bool:
-        """Proven, and the independent check confirmed it."""
-        return self.proven and self.valid is True
+        """Proven, the independent check confirmed it, and no second check says otherwise."""
+        return self.proven and self.valid is True and self.second != "not valid"

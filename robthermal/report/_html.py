@@ -14,6 +14,7 @@ from ._appendix import margins, numbered_assumptions, resting
 from ._content import Claim, Report, Section
 from ._figure import Figure, inline
 from ._save import printable, save_text
+from ._usable import Bound, rounded_down, shown
 
 
 def write_html(report: Report, path: str | Path) -> Path:
@@ -50,14 +51,20 @@ def write_html(report: Report, path: str | Path) -> Path:
         return inline(figure, f"f{next(counter)}-")
 
     files = {claim.file for claim in report.claims}
+    parts = _anchored([*report.first, *report.sections])
+    first, sections = parts[:len(report.first)], parts[len(report.first):]
     page = _template("report.html").render(
-        report=report, sections=_anchored(report.sections), drawing=drawing, ranges=_ranges, margins=margins,
-        assumptions=numbered_assumptions(report), resting=resting(report),
+        report=report, sections=sections, first=first, drawing=drawing, ranges=_ranges, margins=margins,
+        assumptions=numbered_assumptions(report), resting=resting(report), usable=shown(report.usable),
+        amps=_amps, least=lambda row: "–" if row.current is None else rounded_down(row.current),
+        paired=any(claim.parameters == "ranges" for claim in report.claims),
+        about=": about the model, which the data contradict" if report.contradicted else "",
+        machine={one.file: one.machine for one in report.evidence},
         claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
     return save_text(printable(page), path)
 
 
-_OWN = ("top", "claims", "claims-title", "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
+_OWN = ("top", "usable", "usable-title", "claims", "claims-title", "bounds", "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
         "provenance", "check")
 
 
@@ -67,6 +74,10 @@ def _template(name: str) -> Template:
                               trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
     environment.filters["units"] = _together
     return environment.get_template(name)
+
+
+def _amps(bound: Bound | None) -> str:
+    return "–" if bound is None or bound.current is None else rounded_down(bound.current)
 
 
 def _ranges(claim: Claim) -> list[str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import asdict
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,10 +15,12 @@ from ..errors import InputError
 from ._content import Claim, Report, Section
 from ._evidence import Evidence
 from ._figure import Figure
-from ._save import save_json
+from ._reasons import Reason
+from ._save import printable, save_json
 from ._table import Printed, Table
+from ._usable import UsableRange
 
-STORE = "robthermal-report-content/1"
+STORE = "robthermal-report-content/2"
 _LARGEST = 50_000_000  # bytes
 _REMEDY = "Is this the report.json of a results folder? Run the job again."
 
@@ -34,7 +39,7 @@ class _Section(_Strict):
 
 
 class _Stored(_Strict):
-    format: Literal["robthermal-report-content/1"]
+    format: Literal["robthermal-report-content/2"]
     title: str
     subtitle: str
     label: str
@@ -46,6 +51,12 @@ class _Stored(_Strict):
     answer: str
     evidence: list[Evidence]
     checker: str
+    gate: list[Reason]
+    gates: list[str]
+    usable: list[UsableRange]
+    first: list[_Section]
+    data: dict[str, Any]
+    digest: str
 
 
 def write_content(report: Report, path: str | Path) -> Path:
@@ -75,15 +86,54 @@ def write_content(report: Report, path: str | Path) -> Path:
     >>> rt.report.read_content(path).assumptions
     ['One temperature per lump.']
     """
-    sections = [{"title": one.title, "text": one.text, "figures": [asdict(figure) for figure in one.figures],
-                 "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor}
-                for one in report.sections]
     content = {"format": STORE, "title": report.title, "subtitle": report.subtitle, "label": report.label,
-               "claims": [_claim(claim) for claim in report.claims], "sections": sections,
+               "claims": [_claim(claim) for claim in report.claims], "sections": _stored(report.sections),
                "provenance": dict(report.provenance), "assumptions": list(report.assumptions),
                "generated": report.generated, "answer": report.answer,
-               "evidence": [asdict(one) for one in report.evidence], "checker": report.checker}
-    return save_json(content, path)
+               "evidence": [asdict(one) for one in report.evidence], "checker": report.checker,
+               "gate": [asdict(one) for one in report.gate], "gates": list(report.gates),
+               "usable": [asdict(one) for one in report.usable], "first": _stored(report.first),
+               "data": dict(report.data)}
+    return save_json({**content, "digest": _digest(content)}, path)
+
+
+def is_unchanged(path: str | Path) -> bool:
+    """Whether a stored report still is what `write_content` wrote: a digest of its contents stands in it.
+
+    It shows a file that was edited; it is no signature, and who knows the digest can compute it again.
+
+    Parameters
+    ----------
+    path : str or Path
+        Stored report that `read_content` accepts.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, robthermal as rt
+    >>> report = rt.report.Report("Set-up", "", "", (), (), {}, (), "today")
+    >>> path = rt.report.write_content(report, tempfile.mkdtemp() + "/report.json")
+    >>> rt.report.is_unchanged(path)
+    True
+    >>> _ = path.write_text(path.read_text().replace("Set-up", "Other"))
+    >>> rt.report.is_unchanged(path)
+    False
+    """
+    content = json.loads(Path(path).read_text(encoding="utf-8"))
+    return content.pop("digest") == _digest(content)
+
+
+def _digest(content: dict[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    return sha256(printable(text).encode("utf-8")).hexdigest()
+
+
+def _stored(sections: Sequence[Section]) -> list[dict[str, Any]]:
+    return [{"title": one.title, "text": one.text, "figures": [asdict(figure) for figure in one.figures],
+             "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor} for one in sections]
 
 
 def read_content(path: str | Path) -> Report:
@@ -124,9 +174,11 @@ def read_content(path: str | Path) -> Report:
         fault: Any = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"])) or "the file"
         raise InputError(f"is not a stored report: {place}, {fault['msg']}", where=str(file), remedy=_REMEDY) from None
-    sections = tuple(Section(one.title, one.text, one.figures, one.tables, one.anchor) for one in stored.sections)
+    sections, first = (tuple(Section(one.title, one.text, one.figures, one.tables, one.anchor) for one in part)
+                       for part in (stored.sections, stored.first))
     return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
-                  stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker)
+                  stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
+                  stored.gates, stored.usable, first, stored.data)
 
 
 def _printed(table: Table | Printed) -> Printed:

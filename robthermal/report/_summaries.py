@@ -10,18 +10,21 @@ from xml.etree import ElementTree
 from ._appendix import numbered_assumptions
 from ._content import Claim, Report
 from ._evidence import Evidence
+from ._reasons import Reason
 from ._save import printable, save_json, save_text
+from ._usable import summary as currents
 
-FORMAT = "robthermal-report/1"
+FORMAT = "robthermal-summary/2"
 
 
 def write_junit(report: Report, path: str | Path) -> Path:
-    """Write the claims as JUnit XML, one test case per claim.
+    """Write claims and gates as JUnit XML: one test case per claim, and one per gate that was looked at.
 
     Parameters
     ----------
     report : Report
-        A claim that does not hold or is not verified is a failure; so is a report that claims nothing.
+        A claim that does not hold or is not verified is a failure; so is a report that claims nothing. Of a gate,
+        failures are failures, and remarks are its output.
     path : str or Path
         File to write.
 
@@ -43,23 +46,21 @@ def write_junit(report: Report, path: str | Path) -> Path:
     >>> 'failures="1"' in path.read_text(encoding="utf-8")
     True
     """
-    cases = _cases(report)
-    failures = str(sum(case.find("failure") is not None for case in cases))
-    total = {"tests": str(len(cases)), "failures": failures, "errors": "0", "skipped": "0",
-             "time": f"{sum(claim.seconds for claim in report.claims):.6f}"}
-    root = ElementTree.Element("testsuites", {"name": "robthermal", **total})
-    suite = ElementTree.SubElement(root, "testsuite", {"name": printable(report.title), **total})
-    properties = ElementTree.SubElement(suite, "properties")
-    for name, value in {"generated": report.generated, **report.provenance}.items():
-        ElementTree.SubElement(properties, "property", {"name": printable(name), "value": printable(value)})
-    suite.extend(cases)
+    suites = [(report.title, _cases(report))] + ([(f"{report.title}: gates", _gates(report))] if report.gates else [])
+    root = ElementTree.Element("testsuites", {"name": "robthermal", **_total([c for _, cases in suites for c in cases])})
+    for name, cases in suites:
+        suite = ElementTree.SubElement(root, "testsuite", {"name": printable(name), **_total(cases)})
+        properties = ElementTree.SubElement(suite, "properties")
+        for key, value in {"generated": report.generated, **report.provenance}.items():
+            ElementTree.SubElement(properties, "property", {"name": printable(key), "value": printable(value)})
+        suite.extend(cases)
     ElementTree.indent(root)
     body = ElementTree.tostring(root, encoding="unicode")
     return save_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n', path)
 
 
 def write_json(report: Report, path: str | Path) -> Path:
-    """Write the claims and the provenance as JSON.
+    """Write verdict, reasons, claims, currents and provenance as JSON.
 
     Parameters
     ----------
@@ -85,8 +86,13 @@ def write_json(report: Report, path: str | Path) -> Path:
     >>> json.loads(path.read_text())["holds"]
     False
     """
-    summary = {"format": FORMAT, "title": report.title, "label": report.label, "holds": report.holds,
-               "reasons": report.reasons, "claims": [_claim(claim) for claim in report.claims],
+    data = dict(report.data)
+    if "certify" in data:
+        data["certify"] = {**data["certify"], "nominal": _answers(report, "nominal"),
+                           "robust": _answers(report, "ranges")}
+    summary = {"format": FORMAT, "title": report.title, "label": report.label, "verdict": report.verdict,
+               "holds": report.holds, "reasons": [one.to_dict() for one in report.reasons], **data,
+               "currents": currents(report.usable), "claims": [_claim(claim) for claim in report.claims],
                "certificates": [_certificate(one) for one in report.evidence], "checker": report.checker,
                "version": report.provenance.get("robthermal", ""),
                "assumptions": numbered_assumptions(report), "provenance": dict(report.provenance),
@@ -94,15 +100,19 @@ def write_json(report: Report, path: str | Path) -> Path:
     return save_json(summary, path)
 
 
+def _answers(report: Report, parameters: str) -> dict[str, bool]:
+    return {claim.title: claim.good for claim in report.claims if claim.parameters == parameters}
+
+
 def _certificate(one: Evidence) -> dict[str, object]:
     return {"title": one.title, "file": one.file, "sha256": one.sha256, "kind": one.kind, "claim": one.claim,
             "proven": one.proven, "valid": one.valid, "margins": dict(one.margins), "reason": one.reason,
-            "seconds": one.seconds}
+            "seconds": one.seconds, "machine": one.machine, "second": one.second}
 
 
 def _claim(claim: Claim) -> dict[str, object]:
     verified = None if claim.verified is None else bool(claim.verified)
-    return {**asdict(claim), "valid": claim.good, "holds": bool(claim.holds), "verified": verified,
+    return {**asdict(claim), "name": claim.name, "valid": claim.good, "holds": bool(claim.holds), "verified": verified,
             "seconds": float(claim.seconds), "reason": claim.why}
 
 
@@ -112,11 +122,32 @@ def _cases(report: Report) -> list[ElementTree.Element]:
     seen: Counter[str] = Counter()
     cases = []
     for claim in report.claims:
-        seen[claim.title] += 1  # pipelines drop a second case of the same name
-        name = claim.title if seen[claim.title] == 1 else f"{claim.title} [{seen[claim.title]}]"
+        seen[claim.name] += 1  # pipelines drop a second case of the same name
+        name = claim.name if seen[claim.name] == 1 else f"{claim.name} [{seen[claim.name]}]"
         about = f"{claim.sentence}\nbox: {claim.box}\nmargin: {claim.margin}\nhow: {claim.how}\nfile: {claim.file}"
         cases.append(_case(name, claim.seconds, claim.why, _failure(claim), about))
     return cases
+
+
+def _gates(report: Report) -> list[ElementTree.Element]:
+    cases = []
+    for code in report.gates:
+        found = [one for one in report.gate if one.code == code]
+        failed = [one for one in found if one.level == "fail"]
+        said = "\n".join(f"{one.level}: {_words(one)}" for one in found) or "nothing found"
+        cases.append(_case(code, 0.0, "; ".join(map(_words, failed)), code, said, "robthermal.gates"))
+    return cases
+
+
+def _words(reason: Reason) -> str:
+    return f"{reason.text} {reason.remedy}".strip()
+
+
+def _total(cases: list[ElementTree.Element]) -> dict[str, str]:
+    failures = sum(case.find("failure") is not None for case in cases)
+    seconds = sum(float(case.get("time", "0")) for case in cases)
+    return {"tests": str(len(cases)), "failures": str(failures), "errors": "0", "skipped": "0",
+            "time": f"{seconds:.6f}"}
 
 
 def _failure(claim: Claim) -> str:
@@ -125,9 +156,9 @@ def _failure(claim: Claim) -> str:
     return "not verified" if claim.holds else "not certified"
 
 
-def _case(name: str, seconds: float, why: str, kind: str, about: str) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", {"classname": "robthermal.certificates", "name": printable(name),
-                                            "time": f"{seconds:.6f}"})
+def _case(name: str, seconds: float, why: str, kind: str, about: str,
+          suite: str = "robthermal.certificates") -> ElementTree.Element:
+    case = ElementTree.Element("testcase", {"classname": suite, "name": printable(name), "time": f"{seconds:.6f}"})
     if why:
         failure = ElementTree.SubElement(case, "failure", {"message": printable(why), "type": kind})
         failure.text = printable(about)

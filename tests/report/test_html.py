@@ -55,6 +55,19 @@ class Page(HTMLParser):
         return " ".join(data for tag, data in self.texts if tag != "style")
 
 
+def badge(page: Page) -> str:
+    """What the badge says."""
+    after = page.text.partition("10 lumps")[2].split()
+    return " ".join(after[:2])
+
+
+def verdict_colors(page: Page) -> set[str]:
+    """Classes of the head that say its color."""
+    heads = [attributes["class"].split() for _, attributes in page.tags if "verdict" in attributes.get("class", "").split()]
+    assert len(heads) == 1
+    return set(heads[0]) - {"verdict"}
+
+
 @pytest.fixture(scope="module")
 def path(report: Report, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_html(report, tmp_path_factory.mktemp("page") / "report.html")
@@ -122,10 +135,10 @@ def test_contrast_of_every_text_colour(path: Path) -> None:
     light = dict(re.findall(r"--([\w-]+): (#\w{6})", blocks[0]))
     for block in blocks:
         colours = light | dict(re.findall(r"--([\w-]+): (#\w{6})", block))
-        inks = ("ink", "quiet", "link", "yes-text", "no-text")
+        inks = ("ink", "quiet", "link", "yes-text", "no-text", "remarks-text")
         pairs = [(ink, ground) for ink in inks for ground in ("paper", "card")]
         values = [(colours[a], colours[b]) for a, b in [*pairs, ("banner-ink", "banner")]]
-        for a, b in [*values, ("#ffffff", colours["yes"]), ("#ffffff", colours["no"])]:
+        for a, b in [*values, *(("#ffffff", colours[name]) for name in ("yes", "no", "remarks"))]:
             low, high = sorted((luminance(a), luminance(b)))
             assert (high + 0.05) / (low + 0.05) >= 4.5, (a, b)
 
@@ -139,29 +152,29 @@ def test_badge_is_never_green_without_proof_and_check(holds: bool, verified: boo
     report = with_claim(holds=holds, verified=verified)
     page = Page(write_html(report, tmp_path / "r.html"))
     assert not report.holds
-    assert "NOT CERTIFIED" in page.text and "CERTIFIED & VERIFIED" not in page.text and why in page.text
+    assert badge(page) == "✗ FAIL" and "is proven, and an independent" not in page.text and why in page.text
     assert not any("yes" in attributes.get("class", "").split() for _, attributes in page.tags)
 
 
 def test_one_bad_claim_among_good_ones_is_named(report: Report, claim: Claim, tmp_path: Path) -> None:
     bad = replace(claim, title="The odd one", verified=False, reason="margin is -0.02 W/K")
     page = Page(write_html(replace(report, claims=(claim, bad)), tmp_path / "r.html"))
-    assert "NOT CERTIFIED" in page.text and "The odd one: margin is -0.02\u00a0W/K" in page.text
+    assert badge(page) == "✗ FAIL" and "The odd one: margin is -0.02\u00a0W/K" in page.text
 
 
 def test_badge_is_green_when_everything_is_proven_and_checked(page: Page, report: Report) -> None:
-    assert report.holds and report.reasons == []
-    assert "CERTIFIED & VERIFIED" in page.text and "NOT CERTIFIED" not in page.text
+    assert report.holds and report.reasons == [] and report.verdict == "PASS"
+    assert badge(page) == "✓ PASS" and verdict_colors(page) == {"yes"}
 
 
 def test_nothing_claimed_is_not_certified(report: Report, tmp_path: Path) -> None:
     page = Page(write_html(replace(report, claims=()), tmp_path / "r.html"))
-    assert "NOT CERTIFIED" in page.text and "nothing is claimed" in page.text
+    assert badge(page) == "✗ FAIL" and "Nothing is claimed" in page.text
 
 
 def test_first_screen_comes_before_contents_and_appendix_last(page: Page) -> None:
     text = page.text
-    words = ("SIMULATED DATA", "CERTIFIED & VERIFIED", "What is claimed", "m1: 0 to 1.2\u00a0A",
+    words = ("SIMULATED DATA", "PASS", "What is claimed", "m1: 0 to 1.2\u00a0A",
              "rate 0.00123\u00a01/s", "Contents", "Two ", "Assumptions", "What each claim rests on",
              "Exact claims", "Provenance")
     order = [text.index(word) for word in words]

@@ -47,7 +47,8 @@ def change(path: Path, *place: object, value: object) -> None:
 @pytest.mark.parametrize(("place", "value"), [
     (("claims", 0, "verified"), "yes"), (("claims", 0, "verified"), 1), (("claims", 0, "holds"), None),
     (("claims", 0, "seconds"), -1.0), (("evidence", 0, "valid"), "true"), (("evidence", 0, "margins"), {"rate": "1"}),
-    (("format",), "robthermal-report-content/2"), (("nonsense",), 1), (("title",), 3), (("sections",), {}),
+    (("format",), "robthermal-report-content/1"), (("gate",), [{"level": "fail"}]),
+    (("usable",), [{"direction": "cooling"}]), (("nonsense",), 1), (("title",), 3), (("sections",), {}),
     (("sections", 0, "tables", 0, "rows"), [["only one cell"]]),
     (("sections", 0, "figures", 0, "svg"), "<svg><script>alert(1)</script></svg>"),
     (("sections", 0, "figures", 0, "svg"), '<svg><image href="https://example.org/x.png"/></svg>'),

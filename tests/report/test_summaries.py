@@ -51,7 +51,7 @@ def test_junit_cases_of_one_title_have_different_names(report: Report, claim: Cl
 def test_json_summary(report: Report, claim: Claim, tmp_path: Path) -> None:
     bad = replace(claim, title="odd", holds=np.True_, verified=None)
     summary = json.loads(write_json(replace(report, claims=(claim, bad)), tmp_path / "s.json").read_text())
-    assert summary["format"] == "robthermal-report/1"
+    assert summary["format"] == "robthermal-summary/2"
     assert summary["holds"] is False
     assert [(c["holds"], c["verified"]) for c in summary["claims"]] == [(True, True), (True, None)]
     assert summary["claims"][1]["reason"] == "the independent check was not run"
