@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,6 +22,10 @@ Structure = Literal["full", "block"]
 Direction = Literal["symmetric", "cooling", "heating"]
 Initial = Literal["free", "measured", "system"]
 Loss = Literal["linear", "soft_l1", "huber"]
+ParameterSet = Literal["ellipsoid", "box"]
+TemperatureLower = Literal["reported", "held"]
+Remarks = Literal["pass", "fail"]
+Ranges = Mapping[str, tuple[float, float]]
 METHODS: tuple[Method, ...] = ("energy", "sum", "max", "lyapunov")
 STRUCTURES: tuple[Structure, ...] = ("full", "block")
 DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
@@ -56,10 +61,32 @@ class CertifyTable(Table):
     method: Method = "energy"
     structure: Structure = "full"
     large: bool = False
+    parameters: Literal["calibration", "none"] | dict[str, Pair] = "calibration"
+    set: ParameterSet = "ellipsoid"
+    temperature_lower: TemperatureLower = "reported"
+
+
+Size = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+
+
+class GateTable(Table):
+    """[gate]: when the verdict is FAIL."""
+
+    tolerance: Size | dict[str, Size] = {}
+    confidence: Annotated[float, Field(gt=0.5, lt=1, allow_inf_nan=False, strict=True)] = 0.95
+    remarks: Remarks = "pass"
+
+
+class DiagnoseTable(Table):
+    """[diagnose]: look for what the model lacks."""
+
+    session_gain: bool = False
 
 
 class _File(Table):
     project: ProjectTable
+    gate: GateTable = GateTable()
+    diagnose: DiagnoseTable | None = None
     calibrate: CalibrateTable = CalibrateTable()
     certify: CertifyTable = CertifyTable()
 
@@ -82,6 +109,15 @@ class Boxes:
         Method "lyapunov": "full" or "block" P.
     large : bool
         Method "lyapunov": search P for more than 40 lumps too.
+    parameters : str or mapping
+        "calibration": ranges of what was calibrated; "none": the parameters as they stand; or {parameter: (lower,
+        upper)}, each in its unit.
+    confidence : float
+        Of the ranges from a calibration.
+    set : {"ellipsoid", "box"}
+        Set that these ranges cover, as in `Fit.ranges`.
+    temperature_lower : {"reported", "held"}
+        Whether the lower end of `temperature` must be held by the box that is never left, or is only reported.
     """
 
     temperature: tuple[float, float] = (278.15, 358.15)
@@ -92,6 +128,39 @@ class Boxes:
     method: Method = "energy"
     structure: Structure = "full"
     large: bool = False
+    parameters: Literal["calibration", "none"] | Ranges = "calibration"
+    confidence: float = 0.95
+    set: ParameterSet = "ellipsoid"
+    temperature_lower: TemperatureLower = "reported"
+
+
+@dataclass(frozen=True)
+class Gate:
+    """When the verdict of a job is FAIL.
+
+    Parameters
+    ----------
+    tolerance : dict
+        Largest root mean square beyond the noise by sensor [K]; "default" for those not named; 3 times the noise of
+        the sensor where neither is given.
+    remarks : {"pass", "fail"}
+        "fail": a remark is a failure too.
+    """
+
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    remarks: Remarks = "pass"
+
+    def of(self, sensor: str, noise: float) -> float:
+        """Tolerance of a sensor [K].
+
+        Parameters
+        ----------
+        sensor : str
+            Name of the sensor.
+        noise : float
+            Its standard deviation [K].
+        """
+        return self.tolerance.get(sensor, self.tolerance.get("default", 3.0 * noise))
 
 
 @dataclass(frozen=True)
@@ -114,6 +183,12 @@ class Project:
         What to certify.
     files : tuple of Path
         Every input file, for the hashes of the report.
+    gate : Gate
+        When the verdict is FAIL.
+    diagnose : bool
+        Whether to look for what the model lacks.
+    session_gain : bool
+        Whether the diagnosis lets every record have its own gains.
     """
 
     name: str
@@ -126,6 +201,9 @@ class Project:
     loss: Loss
     boxes: Boxes
     files: tuple[Path, ...]
+    gate: Gate = Gate()
+    diagnose: bool = False
+    session_gain: bool = False
 
 
 def read_project(path: str | Path) -> Project:
@@ -159,7 +237,9 @@ def read_project(path: str | Path) -> Project:
     train, validation = (tuple(_beside(folder, name, path) for name in names)
                          for names in (head.train, head.validation))
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
-                   data.calibrate.loss, _boxes(system, data.certify, path), (path, system_file, *train, *validation))
+                   data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
+                   (path, system_file, *train, *validation), _gate(system, data.gate, path),
+                   data.diagnose is not None, data.diagnose is not None and data.diagnose.session_gain)
 
 
 def _beside(folder: Path, name: str, project: Path) -> Path:
@@ -183,7 +263,17 @@ def _with_fit(system: System, ranges: dict[str, dict[str, float]], path: Path) -
                          remedy=error.remedy) from None
 
 
-def _boxes(system: System, table: CertifyTable, path: Path) -> Boxes:
+def _gate(system: System, table: GateTable, path: Path) -> Gate:
+    if not isinstance(table.tolerance, dict):
+        return Gate({"default": table.tolerance}, table.remarks)
+    unknown = [name for name in table.tolerance if name not in (*system.sensors, "default")]
+    if unknown:
+        raise InputError(f"there is no sensor {unknown[0]!r}", where=f"{path} [gate] tolerance",
+                         expected="one of " + ", ".join((*system.sensors, "default")))
+    return Gate(table.tolerance, table.remarks)
+
+
+def _boxes(system: System, table: CertifyTable, confidence: float, path: Path) -> Boxes:
     unit, where = system.temperature_unit, f"{path} [certify]"
     box = range_in_kelvin(table.temperature, unit, f"{where} temperature") if table.temperature else None
     return Boxes(temperature=box or Boxes().temperature,
@@ -192,7 +282,8 @@ def _boxes(system: System, table: CertifyTable, path: Path) -> Boxes:
                  current=table.current, heat=table.heat,
                  setpoint={name: in_kelvin(value, unit, f"{where} setpoint.{name}")
                            for name, value in table.setpoint.items()},
-                 method=table.method, structure=table.structure, large=table.large)
+                 method=table.method, structure=table.structure, large=table.large, parameters=table.parameters,
+                 confidence=confidence, set=table.set, temperature_lower=table.temperature_lower)
 
 
 def in_kelvin(value: float, unit: str, where: str) -> float:

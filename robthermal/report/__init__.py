@@ -24,6 +24,7 @@ from ._table import Printed as Printed
 from ._table import Table as Table
 from ._traces import measured_against_model as measured_against_model
 from ._usable import Bound as Bound
+from ._usable import Parameters as Parameters
 from ._usable import UsableRange as UsableRange
 
 __all__ = ["Bound", "Claim", "Evidence", "Figure", "Printed", "Reason", "Report", "Section", "Table", "UsableRange",

@@ -1,0 +1,60 @@
+"""Codes of the reasons of a verdict: what each means, and what to do."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class GateCode(Enum):
+    """Why a report fails, or what its reader has to know: code, meaning, remedy."""
+
+    NOT_CERTIFIED = ("A required claim does not hold at the parameters as they stand.",
+                     "Narrow the currents, ambients or heats, or improve the heat sink.")
+    NOT_VERIFIED = ("The file of a required certificate is not valid.",
+                    "Run the job again; the check names the inequality that fails.")
+    NOT_ROBUST = ("A required claim holds at the parameters as they stand, not for all parameters in their ranges.",
+                  "Narrow the currents a little, or measure the parameter that is named better.")
+    VALIDATION_MISFIT = ("The model misses a record that was held out by more than the noise of the sensor explains.",
+                         "Find what the model lacks with `robthermal diagnose`; or state the tolerance that is good "
+                         "enough, [gate] tolerance.")
+    TRAINING_MISFIT = ("The model misses the records it was fitted to by more than the noise of the sensor explains.",
+                       "Find what the model lacks with `robthermal diagnose`; or state the tolerance that is good "
+                       "enough, [gate] tolerance.")
+    NO_VALIDATION = ("The model was not compared with any record that was held out.",
+                     "Name one in [project] validation.")
+    NOT_DIAGNOSED = ("Nobody looked for what the model lacks.", "Add a table [diagnose] to the project file.")
+    DIAGNOSIS_UNEXPLAINED = ("The diagnosis found that something is missing, and no effect of the catalogue explains it.",
+                             "Look at the diagnosis; improve the model by hand.")
+    DIAGNOSIS_AMBIGUOUS = ("The diagnosis found several effects that explain the records alike.",
+                           "Make the experiment that the diagnosis proposes.")
+    DIAGNOSIS_NAMED = ("The diagnosis names an effect that the certified model does not have.",
+                       "Put it into the system file and run the job again.")
+    UNDETERMINED_PARAMETER = ("The records do not determine a parameter: its range is that of [fit].",
+                              "Excite the system differently, fix the parameter, or give it a prior (sigma).")
+    PARAMETER_AT_BOUND = ("A parameter ended at a bound of [fit].",
+                          "Widen the bound if the physics allow, else doubt the structure of the model.")
+    CURRENT_BEYOND_RATING = ("Currents exceed what the system file declares as the module's limit.",
+                             "Ask for less current.")
+    CURRENT_BEYOND_RUNAWAY = ("Currents exceed the runaway limit: beyond it more current heats.",
+                              "Ask for less current.")
+    CURRENT_BEYOND_INVARIANCE = ("Currents exceed those for which a box inside the stated one is never left.",
+                                 "Ask for less current, or improve the heat sink.")
+    OUTSIDE_DATA = ("A claim reaches beyond what the records hold.",
+                    "Measure there, or narrow what is claimed.")
+    SIMULATED_DATA = ("The records are simulated: they say nothing about a machine.", "Replace them by measurements.")
+    CONSTANT_INPUT = ("An input never changes in the records: nothing can be learnt about what it does.",
+                      "Change it during a measurement.")
+    NO_NOISE_STATED = ("The noise of a sensor is not stated; it was estimated from the readings.",
+                       "Give `noise` in [sensors.NAME].")
+    NOMINAL_ONLY = ("The claims are about exactly the parameters of the model, not about ranges of them.",
+                    "Calibrate with data, or give [certify] parameters.")
+    REPORT_CHANGED = ("report.json is not what the job wrote.", "Run the job again.")
+
+    def __init__(self, meaning: str, remedy: str) -> None:
+        self.meaning = meaning
+        self.remedy = remedy
+
+    @property
+    def code(self) -> str:
+        """As it stands in summary.json and junit.xml."""
+        return self.name.lower()
