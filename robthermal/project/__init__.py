@@ -6,9 +6,10 @@ from ._arguments import point_from_text as point_from_text
 from ._check_files import FileCheck as FileCheck
 from ._check_files import verify_files as verify_files
 from ._check_files import write_checks as write_checks
-from ._claims import Certification as Certification
-from ._claims import Checked as Checked
+from ._checked import Certification as Certification
+from ._checked import Checked as Checked
 from ._claims import certify_system as certify_system
+from ._codes import GateCode as GateCode
 from ._couple import Coupling as Coupling
 from ._couple import couple_subsystems as couple_subsystems
 from ._couple_file import CouplingJob as CouplingJob
@@ -35,15 +36,17 @@ from ._frequency import design_excitation as design_excitation
 from ._frequency import estimate_response as estimate_response
 from ._frequency import read_measured as read_measured
 from ._frequency import write_excitation as write_excitation
-from ._job import Comparison as Comparison
-from ._job import JobResult as JobResult
 from ._job import run_job as run_job
+from ._job_result import Comparison as Comparison
+from ._job_result import JobResult as JobResult
 from ._map import MapRequest as MapRequest
 from ._map import map_from_text as map_from_text
 from ._map import map_system as map_system
 from ._map import write_map as write_map
+from ._misfit import Misfit as Misfit
 from ._rebuild import rebuild_report as rebuild_report
 from ._schema import Boxes as Boxes
+from ._schema import Gate as Gate
 from ._schema import Project as Project
 from ._schema import read_project as read_project
 from ._second import SecondVerdict as SecondVerdict
@@ -53,11 +56,11 @@ from ._write import write_certify as write_certify
 from ._write import write_job as write_job
 
 __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign", "Coupling", "CouplingJob",
-           "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "JobResult", "MapRequest", "Project",
-           "Residuals", "ResponseResiduals", "SecondVerdict", "boxes_from_text", "calibrate_files",
-           "certificate_files", "certify_system", "check_free", "couple_subsystems", "demo_project",
-           "design_excitation", "design_from_text", "design_system", "diagnose_records", "estimate_response",
-           "explain", "explainable", "map_from_text", "map_system", "new_project", "output_folder", "point_from_text",
-           "read_coupling", "read_measured", "read_project", "rebuild_report", "run_job", "second_verdicts",
-           "verify_files", "write_certify", "write_checks", "write_coupling", "write_design", "write_diagnosis",
-           "write_excitation", "write_job", "write_map"]
+           "DesignRequest", "Diagnosed", "Explanation", "FileCheck", "Gate", "GateCode", "JobResult", "MapRequest",
+           "Misfit", "Project", "Residuals", "ResponseResiduals", "SecondVerdict", "boxes_from_text",
+           "calibrate_files", "certificate_files", "certify_system", "check_free", "couple_subsystems",
+           "demo_project", "design_excitation", "design_from_text", "design_system", "diagnose_records",
+           "estimate_response", "explain", "explainable", "map_from_text", "map_system", "new_project",
+           "output_folder", "point_from_text", "read_coupling", "read_measured", "read_project", "rebuild_report",
+           "run_job", "second_verdicts", "verify_files", "write_certify", "write_checks", "write_coupling",
+           "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]

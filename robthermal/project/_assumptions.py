@@ -12,9 +12,12 @@ _MACHINE = (
     "face.",
     "Currents are imposed (current drive).",
     "Heats not in the network stay within the stated ranges.",
-    "Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is not part of "
-    "them.",
 )
+_NOMINAL = ("Certificates are about the model with exactly the stated parameters; the calibration's uncertainty is "
+            "not part of them.")
+_RANGES = ("Claims \"for the parameter ranges\" are about all parameters in the ranges that their files state, in any "
+           "combination; the other claims are about exactly the parameters as they stand. Ranges from a "
+           "calibration hold the truth with the stated confidence if the model has the right structure.")
 _OF_MODULES = _MACHINE[1:3]
 _LINEAR = "The system is linear and does not change with time; its numbers are those in the certificate file."
 KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
@@ -55,9 +58,10 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
 }
 
 
-def machine_assumptions(system: System) -> tuple[str, ...]:
-    """What every claim about a thermal system rests on."""
-    return (*(text for text in _MACHINE if system.modules or text not in _OF_MODULES), ARITHMETIC)
+def machine_assumptions(system: System, ranges: bool = False) -> tuple[str, ...]:
+    """What every claim about a thermal system rests on; `ranges`: claims are made for parameter ranges too."""
+    machine = (text for text in _MACHINE if system.modules or text not in _OF_MODULES)
+    return (*machine, _RANGES if ranges else _NOMINAL, ARITHMETIC)
 
 
 def kind_assumptions(kind: str) -> tuple[str, ...]:

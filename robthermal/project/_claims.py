@@ -2,101 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ..certify import (
-    CurrentLimit,
-    Runaway,
     RunawayFree,
     contraction,
     heater_heat,
-    largest_current,
     largest_regulated_current,
     runaway,
     runaway_free,
 )
 from ..errors import InputError
+from ..report import Parameters
 from ..thermal import System
-from ..verification import Certificate, Verdict, not_certified, verify
-from ._schema import DIRECTIONS, METHODS, Boxes, Method
+from ..verification import Certificate, not_certified, verify
+from ._checked import Certification, Checked
+from ._currents import rest_on_certificates, usable_currents
+from ._parameter_ranges import Ranges, breaking
+from ._schema import Boxes
+
+TITLES = {"contraction": "Contraction in the stated box", "box": "The box is never left",
+          "box_contraction": "Contraction in the box that is never left"}
+RANGES = "_ranges"  # ending of the key of a claim for all parameters in their ranges
 
 
-@dataclass(frozen=True)
-class Checked:
-    """A certificate with its independent check.
-
-    Parameters
-    ----------
-    key : str
-        File name without ending.
-    title : str
-        For people.
-    certificate : Certificate
-        What is claimed.
-    verdict : Verdict or None
-        Of `rt.verify`; None if there is nothing to verify because the claim does not hold.
-    required : bool
-        Whether the job's answer is no without it.
-    """
-
-    key: str
-    title: str
-    certificate: Certificate
-    verdict: Verdict | None
-    required: bool
-
-    @property
-    def good(self) -> bool:
-        """Holds and is verified."""
-        return self.certificate.holds and self.verdict is not None and self.verdict.valid
-
-
-@dataclass(frozen=True)
-class Certification:
-    """Everything that was certified about a system.
-
-    Parameters
-    ----------
-    system : System
-        About which.
-    boxes : Boxes
-        For which ranges.
-    checked : tuple of Checked
-        Certificates with verdicts; the required ones first.
-    limits : tuple of CurrentLimit
-        By method and direction.
-    runaway : Runaway or None
-        None without set-points.
-    safe : RunawayFree
-        The claim of no thermal runaway.
-    """
-
-    system: System
-    boxes: Boxes
-    checked: tuple[Checked, ...]
-    limits: tuple[CurrentLimit, ...]
-    runaway: Runaway | None
-    safe: RunawayFree
-
-    @property
-    def holds(self) -> bool:
-        """Whether everything required holds and is verified."""
-        return all(c.good for c in self.checked if c.required)
-
-
-def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None] = lambda stage: None) -> Certification:
+def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None] = lambda stage: None, *,
+                   parameters: Ranges | None = None) -> Certification:
     """Certify a system in its boxes and verify every certificate.
 
     Parameters
     ----------
     system : System
-        Whose.
+        System with the parameters of the nominal claims.
     boxes : Boxes
         Ranges of the claims.
     progress : callable, optional
         Called with a sentence before every stage.
+    parameters : mapping, optional
+        {parameter: (lower, upper)}: every claim is made for all of them too. Default: those of `boxes`, if it names
+        some.
 
     Returns
     -------
@@ -115,39 +62,88 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     >>> done.holds
     True
     """
+    if parameters is None and not isinstance(boxes.parameters, str):
+        parameters = boxes.parameters
     current = _currents(system, boxes)
     heat = heater_heat(system) if boxes.heat is None else boxes.heat
-    progress("certifying the temperature box")
-    norm: dict[str, Any] = {"method": boxes.method, "structure": boxes.structure, "large": boxes.large}
-    box = contraction(system, current=current, temperature=boxes.temperature, **norm)
-    progress("certifying that no trajectory leaves its box")
-    safe = runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, **norm)
-    found = [("contraction", "Contraction in the stated box", box, True),
-             ("box", "The box is never left", safe.invariance, True)]
-    if safe.contraction is not safe.invariance:
-        found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
-    limits = []
-    for method in _limit_methods(boxes) if system.modules else ():
-        for direction in DIRECTIONS:
-            progress(f"searching the largest {direction} current, method {method}")
-            limit = largest_current(system, temperature=boxes.temperature, direction=direction,
-                                    **{**norm, "method": method})
-            limits.append(limit)
-            if limit.certificate.holds:
-                found.append((f"limit_{method}_{direction}", f"Largest {direction} current, method {method}",
-                              limit.certificate, False))
-    limit_of_load = None
+    progress("certifying the temperature box, and that no trajectory leaves its box")
+    nominal, safe = _required(system, boxes, current, heat)
+    found = list(nominal.values())
+    if parameters:
+        progress("certifying the same for the parameter ranges")
+        robust = _robust(system, boxes, current, heat, parameters, nominal)
+        found = [one for key in nominal for one in (nominal[key], robust.get(key)) if one is not None]
+    rows, limits = usable_currents(system, boxes, current, heat, parameters, progress)
+    fold = None
+    optional = [Checked(key, title, certificate, None, False) for key, title, certificate in limits]
     if boxes.setpoint:
         progress("searching the runaway limit")
-        limit_of_load = runaway(system, setpoint=boxes.setpoint)
-        found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
-                  for name, cert in limit_of_load.certificates.items()]
+        fold = runaway(system, setpoint=boxes.setpoint)
+        optional += [Checked(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert,
+                             None, False) for name, cert in fold.certificates.items()]
         progress("searching the largest current while the cold faces are held")
-        found.append(("regulated", "Largest current while the cold faces are held", _held(system, boxes), False))
+        optional.append(Checked("regulated", "Largest current while the cold faces are held", _held(system, boxes),
+                                None, False))
     progress("verifying every certificate")
-    checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
-                    for key, title, cert, required in found)
-    return Certification(system, boxes, checked, tuple(limits), limit_of_load, safe)
+    checked = tuple(_verified(one) for one in (*found, *optional))
+    rows = rest_on_certificates(rows, {one.file: one.certificate for one in checked if one.good})
+    return Certification(system, boxes, checked, (), fold, safe, tuple(rows), parameters)
+
+
+def claims_hold(system: System, boxes: Boxes, parameters: Ranges) -> bool:
+    """Whether every required claim holds for all parameters in these ranges.
+
+    Parameters
+    ----------
+    system : System
+        System with the parameters of the nominal claims.
+    boxes : Boxes
+        Ranges of the claims.
+    parameters : mapping
+        {parameter: (lower, upper)}.
+    """
+    heat = heater_heat(system) if boxes.heat is None else boxes.heat
+    box, safe = _claims(system, boxes, _currents(system, boxes), heat, parameters)
+    return box.holds and safe.holds
+
+
+def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any],
+            parameters: Ranges | None) -> tuple[Certificate, RunawayFree]:
+    norm: dict[str, Any] = {"method": boxes.method, "structure": boxes.structure, "large": boxes.large,
+                            "parameters": parameters}
+    box = contraction(system, current=current, temperature=boxes.temperature, **norm)
+    return box, runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, **norm)
+
+
+def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any],
+              parameters: Ranges | None = None) -> tuple[dict[str, Checked], RunawayFree]:
+    """Required claims by key, as yet without their checks."""
+    box, safe = _claims(system, boxes, current, heat, parameters)
+    found = {"contraction": box, "box": safe.invariance}
+    if safe.contraction is not safe.invariance:
+        found["box_contraction"] = safe.contraction
+    ending = RANGES if parameters else ""
+    which: Parameters = "ranges" if parameters else "nominal"
+    return {key: Checked(key + ending, TITLES[key], certificate, None, True, which)
+            for key, certificate in found.items()}, safe
+
+
+def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any], parameters: Ranges,
+            nominal: Mapping[str, Checked]) -> dict[str, Checked]:
+    """The same for all parameters in their ranges, with the parameter that breaks what holds without the ranges."""
+    found, _ = _required(system, boxes, current, heat, parameters)
+
+    def holds(key: str, ranges: Ranges) -> bool:
+        again, _ = _required(system, boxes, current, heat, ranges)
+        return key in again and again[key].certificate.holds
+
+    return {key: one if one.certificate.holds or not nominal[key].certificate.holds else replace(
+        one, breaks=breaking(parameters, partial(holds, key))) for key, one in found.items() if key in nominal}
+
+
+def _verified(one: Checked) -> Checked:
+    verdict = verify(one.certificate) if one.certificate.holds else None
+    return replace(one, verdict=verdict)
 
 
 def _held(system: System, boxes: Boxes) -> Certificate:
@@ -158,11 +154,6 @@ def _held(system: System, boxes: Boxes) -> Certificate:
     except InputError as refusal:
         return not_certified("regulated", system={}, region={"setpoint": setpoint}, evidence={}, reason=str(refusal),
                              made_by={}, claim="While its cold faces are held, the rest of the network contracts.")
-
-
-def _limit_methods(boxes: Boxes) -> tuple[Method, ...]:
-    """Methods whose limits are searched: with a full P, which may take minutes, only where it is asked for."""
-    return METHODS if boxes.method == "lyapunov" else tuple(method for method in METHODS if method != "lyapunov")
 
 
 def _currents(system: System, boxes: Boxes) -> dict[str, tuple[float, float]]:

@@ -23,7 +23,7 @@ class GateCode(Enum):
     NO_VALIDATION = ("The model was not compared with any record that was held out.",
                      "Name one in [project] validation.")
     NOT_DIAGNOSED = ("Nobody looked for what the model lacks.", "Add a table [diagnose] to the project file.")
-    DIAGNOSIS_UNEXPLAINED = ("The diagnosis found that something is missing, and no effect of the catalogue explains it.",
+    DIAGNOSIS_UNEXPLAINED = ("The diagnosis found that something is missing, and no known effect explains it.",
                              "Look at the diagnosis; improve the model by hand.")
     DIAGNOSIS_AMBIGUOUS = ("The diagnosis found several effects that explain the records alike.",
                            "Make the experiment that the diagnosis proposes.")

@@ -11,7 +11,7 @@ from ..coupling import NORMS, Filters, Simulation, Spectra, Uncertainty, WorstCa
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..verification import verify
-from ._claims import Checked
+from ._checked import Checked
 from ._couple_file import CouplingJob
 
 _SHOWN = 50  # exposure windows in the simulated trace

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..report import Claim
 from ._assumptions import ARITHMETIC
-from ._claims import Checked
+from ._checked import Checked
 from ._couple import LIMITED, Coupling
 
 _HOW = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from typing import Literal
@@ -18,21 +18,23 @@ Direction = Literal["cooling", "heating", "symmetric"]
 Found = tuple[str, str, Certificate]  # key, title, certificate
 Pairs = Mapping[str, tuple[float, float]]
 _NAMES = {"contraction": "contraction", "box": "invariance", "runaway": "runaway", "rating": "rating"}
-_CODES = {"rating": GateCode.CURRENT_BEYOND_RATING, "runaway": GateCode.CURRENT_BEYOND_RUNAWAY,
+CODES = {"rating": GateCode.CURRENT_BEYOND_RATING, "runaway": GateCode.CURRENT_BEYOND_RUNAWAY,
           "invariance": GateCode.CURRENT_BEYOND_INVARIANCE}
+_HELD = ("held", "held_contraction")  # endings of the two certificates of a headline
 _ROUNDING = 1e-9  # of a comparison between currents
 
 
 def directions(current: Pairs) -> tuple[Direction, ...]:
-    """Cooling and heating; symmetric too where a module is to have currents of both signs."""
-    both = any(low < 0.0 < high for low, high in current.values())
+    """Cooling and heating; symmetric too where there are to be currents of both signs."""
+    both = any(low < 0.0 for low, _ in current.values()) and any(high > 0.0 for _, high in current.values())
     return ("cooling", "heating", "symmetric") if both else ("cooling", "heating")
 
 
 def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, parameters: Pairs | None,
                     progress: Callable[[str], None]) -> tuple[list[UsableRange], list[Found]]:
     """Usable currents of all directions, for the parameters as they stand and for their ranges, with certificates."""
-    rows, found = [], []
+    rows: list[UsableRange] = []
+    found: list[Found] = []
     for direction in directions(current) if system.modules else ():
         for ranges in (None, parameters) if parameters else (None,):
             progress(f"searching the usable {direction} current{', for the parameter ranges' * (ranges is not None)}")
@@ -50,7 +52,9 @@ def _row(best: UsableCurrent, direction: str, ranges: bool, modules: tuple[str, 
                     f"certificates/{_key(direction, name, ranges)}.json"
                     if one.certificate is not None and one.certificate.holds else "")
               for name, one in best.limits.items()]
-    return UsableRange(direction, "ranges" if ranges else "nominal", modules, bounds)
+    held = [f"certificates/{_key(direction, name, ranges)}.json" for name in _HELD] if best.invariance.holds else []
+    return UsableRange(direction, "ranges" if ranges else "nominal", modules, bounds, best.current, held,
+                       best.limiting_parameter or "")
 
 
 def _certificates(best: UsableCurrent, direction: str, ranges: bool) -> Iterator[Found]:
@@ -61,9 +65,9 @@ def _certificates(best: UsableCurrent, direction: str, ranges: bool) -> Iterator
     for name, one in best.limits.items():
         if one.certificate is not None and one.certificate.holds:
             yield _key(direction, name, ranges), titles[name] + about, one.certificate
-    for name, certificate, what in (("held", best.invariance, "The box is never left"),
-                                    ("held_contraction", best.contraction, "Contraction in that box")):
-        if certificate is not None and certificate.holds:
+    for name, certificate, what in zip(_HELD, (best.invariance, best.contraction),
+                                       ("The box is never left", "Contraction in that box"), strict=True):
+        if certificate.holds:
             yield _key(direction, name, ranges), f"{what} at the usable {direction} current{about}", certificate
 
 
@@ -81,7 +85,20 @@ def rest_on_certificates(rows: Sequence[UsableRange], certificates: Mapping[str,
     certificates : mapping
         Certificates by file, only those that hold and are verified.
     """
-    return [replace(row, bounds=[_rested(bound, certificates) for bound in row.bounds]) for row in rows]
+    return [replace(row, bounds=[_rested(bound, certificates) for bound in row.bounds],
+                    certified=_certified(row, certificates)) for row in rows]
+
+
+def _certified(row: UsableRange, certificates: Mapping[str, Certificate]) -> float | None:
+    if row.certified is None or not row.certified:
+        return row.certified
+    return min((_size(certificates[file]) if file in certificates else 0.0 for file in row.files), default=0.0)
+
+
+def _size(certificate: Certificate) -> float:
+    """Current that every module may have in the region of a certificate [A]."""
+    currents = certificate.region.get("current") or {}
+    return min((max(abs(float(low)), abs(float(high))) for low, high in currents.values()), default=0.0)
 
 
 def _rested(bound: Bound, certificates: Mapping[str, Certificate]) -> Bound:
@@ -90,29 +107,57 @@ def _rested(bound: Bound, certificates: Mapping[str, Certificate]) -> Bound:
     certificate = certificates.get(bound.file)
     if certificate is None:
         return replace(bound, current=0.0, text="its certificate is not valid")
-    sizes = [max(abs(float(low)), abs(float(high))) for low, high in certificate.region["current"].values()]
-    return replace(bound, current=min(sizes, default=0.0))
+    return replace(bound, current=_size(certificate))
 
 
-def within_usable(current: Pairs, rows: Sequence[UsableRange]) -> bool:
+def box_stays_inside(good: Mapping[str, Certificate], needed: Iterable[str], held: bool) -> bool:
+    """Whether the boxes that are never left are certified and lie inside the stated one.
+
+    Parameters
+    ----------
+    good : mapping
+        Certificates that hold and are verified, by file.
+    needed : iterable of str
+        Files of the boxes: for the parameters as they stand and, where asked for, for their ranges.
+    held : bool
+        Whether the lower ends must lie inside too.
+    """
+    stated = good.get("certificates/contraction.json")
+    needed = list(needed)
+    if stated is None or not needed or any(file not in good for file in needed):
+        return False
+    low, high = (float(end) for end in stated.region["temperature"])
+    ends = [(float(a), float(b)) for file in needed for a, b in good[file].region["temperature"].values()]
+    return all(b <= high and (a >= low or not held) for a, b in ends)
+
+
+def within_usable(current: Pairs, rows: Sequence[UsableRange], inside: bool) -> bool:
     """Whether every current of these ranges is inside the usable ones; True where there is no module."""
-    return not any(True for _ in beyond(current, rows)) and all(
-        limit is None or size <= limit * (1.0 + _ROUNDING)
-        for _, direction, size in _sizes(current) for limit in [_limit(rows, direction, None)])
+    return not list(beyond(current, rows, inside)) and not any(
+        _exceeds(size, _limit(rows, direction, None)) for _, direction, size in _sizes(current)
+        if direction != "symmetric")
 
 
-def beyond(current: Pairs, rows: Sequence[UsableRange]) -> Iterator[tuple[str, str, str, float, float]]:
-    """Module, direction, bound, size and limit [A] wherever a range exceeds a bound other than contraction."""
+def beyond(current: Pairs, rows: Sequence[UsableRange], inside: bool
+           ) -> Iterator[tuple[str, str, str, float, float]]:
+    """Module, direction, bound, size and limit [A] wherever a range exceeds a bound other than contraction.
+
+    `inside` says that for exactly these ranges a certified box inside the stated one is never left: currents of both
+    signs need no more than that.
+    """
     for module, direction, size in _sizes(current):
-        for name in _CODES:
+        for name in ("invariance",) if direction == "symmetric" else tuple(CODES):
             limit = _limit(rows, direction, name)
-            if limit is not None and size > limit * (1.0 + _ROUNDING):
+            if limit is not None and _exceeds(size, limit) and not (direction == "symmetric" and inside):
                 yield module, direction, name, size, limit
 
 
+def _exceeds(size: float, limit: float | None) -> bool:
+    return limit is not None and size > limit * (1.0 + _ROUNDING)
+
+
 def _sizes(current: Pairs) -> Iterator[tuple[str, str, float]]:
-    both = any(low < 0.0 < high for low, high in current.values()) or (
-        any(low < 0.0 for low, _ in current.values()) and any(high > 0.0 for _, high in current.values()))
+    both = "symmetric" in directions(current)
     for module, (low, high) in current.items():
         if high > 0.0:
             yield module, "cooling", high
@@ -129,10 +174,14 @@ def _limit(rows: Sequence[UsableRange], direction: str, name: str | None) -> flo
     if row is None:
         return None
     bound = row.bound(name) if name else None
-    return row.current if name is None else bound.current if bound else None
+    if name is None:
+        return row.current
+    if name == "invariance" and row.certified is not None and bound is not None and bound.current is not None:
+        return min(bound.current, row.certified) if row.limited_by == name else bound.current
+    return bound.current if bound else None
 
 
-def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange]) -> Iterator[Reason]:
+def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange], inside: bool) -> Iterator[Reason]:
     """Failures where the certified currents exceed a bound; remarks where those of the records do.
 
     Parameters
@@ -141,18 +190,20 @@ def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange]
         Ranges of the claims and of the records, by module [A].
     rows : sequence of UsableRange
         Usable currents.
+    inside : bool
+        Whether a certified box for exactly the claimed currents lies inside the stated one.
     """
     failed = set()
-    for module, direction, name, size, limit in beyond(current, rows):
+    for module, direction, name, size, limit in beyond(current, rows, inside):
         failed.add((module, name))
         usable = _limit(rows, direction, None)
-        yield Reason("fail", _CODES[name].code, "certify", module, f"{module} is to have {direction} currents up to "
+        yield Reason("fail", CODES[name].code, "certify", module, f"{module} is to have {direction} currents up to "
                      f"{size:.4g} A; {_MEANS[name]} is {limit:.4g} A.", f"Ask for at most {usable or 0.0:.4g} A, the "
                      "usable current.", size, limit)
-    for module, direction, name, size, limit in beyond(measured, rows):
-        if (module, name) not in failed and direction != "symmetric":
+    for module, direction, name, size, limit in beyond(measured, rows, True):
+        if (module, name) not in failed:
             failed.add((module, name))
-            yield Reason("remark", _CODES[name].code, "certify", module, f"In the records {module} has {direction} "
+            yield Reason("remark", CODES[name].code, "certify", module, f"In the records {module} has {direction} "
                          f"currents up to {size:.4g} A; {_MEANS[name]} is {limit:.4g} A.", "", size, limit)
 
 

@@ -26,7 +26,7 @@ from ..design import (
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, verify
-from ._claims import Certification, Checked
+from ._checked import Certification, Checked
 from ._design_limits import Pairs, ambient_ends, candidates, certified_limits, check_given, contain, worst_runaway
 from ._design_request import DesignRequest, celsius
 from ._schema import Boxes

@@ -66,7 +66,7 @@ def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | P
     """
     system = result.certification.system
     report = Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
-                    claims=claims(system, result.certification.checked), sections=tuple(_sections(result)),
+                    claims=claims(result.certification.checked), sections=tuple(_sections(result)),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
                     generated=now())
     with output_folder(out) as folder:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..report import Evidence, Report, file_hash, versions, write_content, write_html, write_json, write_junit
 from ..verification import Certificate, Verdict
 from ._assumptions import kind_assumptions
-from ._claims import Checked
+from ._checked import Checked
 
 
 def write_certification(checked: Sequence[Checked], report: Report, folder: Path) -> Report:
@@ -36,9 +36,8 @@ def write_certification(checked: Sequence[Checked], report: Report, folder: Path
 
 
 def _saved(one: Checked, folder: Path) -> Evidence:
-    file = f"certificates/{one.key}.json"
-    one.certificate.save(folder / file)
-    return judged(one.title, file, file_hash(folder / file), one.certificate, one.verdict)
+    one.certificate.save(folder / one.file)
+    return judged(one.title, one.file, file_hash(folder / one.file), one.certificate, one.verdict)
 
 
 def judged(title: str, file: str, sha256: str, certificate: Certificate, verdict: Verdict | None) -> Evidence:

@@ -3,104 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from .._fitting import as_data, free_run, residual, rmse
+from .._fitting import as_data, free_run
 from ..calibration import Fit, calibrate
+from ..errors import InputError
 from ..signals import Record, read_record
 from ..thermal import System
-from ._claims import Certification, certify_system
-from ._schema import Project
+from ._claims import certify_system, claims_hold
+from ._diagnose import Diagnosed, diagnose_records
+from ._gate import gate_reasons
+from ._job_result import Comparison, JobResult
+from ._misfit import Misfit, misfit, noise_of_readings
+from ._parameter_ranges import claim_ranges, doubted
+from ._schema import Gate, Project
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One record beside the nominal and the calibrated model, both run freely as the calibration runs them.
-
-    The calibrated model starts from the initial temperatures that the calibration found (training) or estimated on the
-    first tenth (validation); the nominal one from those estimated on the first tenth.
-
-    Parameters
-    ----------
-    kind : str
-        "train" or "validation".
-    record : Record
-        Measured.
-    nominal, calibrated : Record
-        The record with modelled readings in place of the measured ones.
-    """
-
-    kind: str
-    record: Record
-    nominal: Record
-    calibrated: Record
-
-    def rmse(self, model: Record) -> dict[str, float]:
-        """Root-mean-square residual of every measured sensor.
-
-        Parameters
-        ----------
-        model : Record
-            One of the simulations, `nominal` or `calibrated`.
-
-        Returns
-        -------
-        dict
-            By sensor [K].
-        """
-        return {name: rmse([e]) for name, e in self.residuals(model).items()}
-
-    def residuals(self, model: Record) -> dict[str, Array]:
-        """Measured − modelled of every measured sensor.
-
-        Parameters
-        ----------
-        model : Record
-            One of the simulations, `nominal` or `calibrated`.
-
-        Returns
-        -------
-        dict
-            By sensor, (n,) [K].
-        """
-        return {name: residual(self.record[name], model[name]) for name in model.output_names}
-
-
-@dataclass(frozen=True)
-class JobResult:
-    """Everything the main job found.
-
-    Parameters
-    ----------
-    project : Project
-        What was asked.
-    fit : Fit or None
-        Calibration; None without training records.
-    system : System
-        Calibrated, or nominal.
-    comparisons : tuple of Comparison
-        Model against data.
-    certification : Certification
-        Claims and verdicts.
-    """
-
-    project: Project
-    fit: Fit | None
-    system: System
-    comparisons: tuple[Comparison, ...]
-    certification: Certification
-
-    @property
-    def holds(self) -> bool:
-        """Whether every required claim holds and is verified."""
-        return self.certification.holds
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -147,7 +70,43 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
         system = fit.system
     progress("comparing model and data")
     comparisons = _comparisons(project, fit, train, validation)
-    return JobResult(project, fit, system, comparisons, certify_system(system, project.boxes, progress))
+    ranges = claim_ranges(project.boxes, fit)
+    certification = certify_system(system, project.boxes, progress, parameters=ranges)
+    found = JobResult(project, fit, system, comparisons, certification, _misfits(comparisons, system, project.gate),
+                      _diagnosis(project, train, validation, progress), _doubted(project, fit, progress), ranges)
+    return replace(found, reasons=gate_reasons(found))
+
+
+def _misfits(comparisons: Sequence[Comparison], system: System, gate: Gate) -> tuple[Misfit, ...]:
+    found = []
+    for one in comparisons:
+        for name, e in one.residuals(one.calibrated).items():
+            noise = system.sensors[name].noise or noise_of_readings(one.record[name])
+            found.append(misfit(one.kind, one.record.name or "record", name, e, noise, gate.of(name, noise)))
+    return tuple(found)
+
+
+def _diagnosis(project: Project, train: Sequence[Record], validation: Sequence[Record], progress: Progress
+               ) -> Diagnosed | None:
+    if not (project.diagnose and train):
+        return None
+    return diagnose_records(project.system, project.files, train, validation, progress,
+                            session_gain=project.session_gain)
+
+
+def _doubted(project: Project, fit: Fit | None, progress: Progress) -> tuple[tuple[str, str, bool], ...]:
+    """Parameters that the records leave open or that ended at a bound, and whether the claims hold on all of [fit]."""
+    if fit is None:
+        return ()
+    found = []
+    for what, name, whole in doubted(fit):
+        progress(f"certifying for the whole range of {name}")
+        try:
+            holds = claims_hold(fit.system, project.boxes, whole)
+        except InputError:  # a parameter that no certificate covers, or a range that is none
+            holds = False
+        found.append((what, name, holds))
+    return tuple(found)
 
 
 def _comparisons(project: Project, fit: Fit | None, train: Sequence[Record], validation: Sequence[Record]

@@ -17,7 +17,7 @@ from ..thermal import System
 from ..verification import verify
 from ._arguments import boxes_from_text
 from ._assumptions import machine_assumptions
-from ._claims import Checked
+from ._checked import Checked
 from ._evidence import write_certification
 from ._folder import output_folder
 from ._now import now
@@ -183,7 +183,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
                        verify(certificate) if certificate.holds else None, True),)
     data = in_unit(result.data, system.temperature_unit)
     report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system), label="",
-                    claims=claims(system, checked), sections=(_section(result, data),),
+                    claims=claims(checked), sections=(_section(result, data),),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
                     generated=now())
     with output_folder(out) as folder:

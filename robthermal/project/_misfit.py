@@ -1,9 +1,9 @@
 r"""How far a model is from a record, beyond the noise of the sensors, and whether chance explains it.
 
 With residuals e = measured − modelled, the excess is √(max(rms² − noise², 0)). Under the hypothesis that e is noise of
-the stated size, n_eff rms² / noise² is nearly χ² with n_eff degrees of freedom, where n_eff = n / (1 + 2 Σ ρ_k²) and ρ_k
-are the autocorrelations of e without its mean, up to the first that is not significant: correlated residuals count as
-fewer (Satterthwaite's approximation of a sum of correlated squares).
+the stated size, n_eff rms² / noise² is nearly χ² with n_eff degrees of freedom, where n_eff = n / (1 + 2 Σ ρ_k²) and
+ρ_k are the autocorrelations of e without its mean, up to the first that is not significant: correlated residuals count
+as fewer (Satterthwaite's approximation of a sum of correlated squares).
 """
 
 from __future__ import annotations

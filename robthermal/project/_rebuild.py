@@ -5,15 +5,32 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from ..errors import InputError
-from ..report import Claim, Evidence, Report, file_hash, read_content, write_html, write_json, write_junit
-from ..verification import Certificate, verify
+from ..report import (
+    Claim,
+    Evidence,
+    Reason,
+    Report,
+    UsableRange,
+    file_hash,
+    is_unchanged,
+    read_content,
+    versions,
+    write_html,
+    write_json,
+    write_junit,
+)
+from ..verification import Certificate, Verdict, verify
+from ._assumptions import ARITHMETIC
+from ._codes import GateCode
+from ._currents import CODES, box_stays_inside, current_reasons, rest_on_certificates, within_usable
 from ._evidence import checker, judged
 from ._now import now
+from ._words import claim_of
 
 _NO_EVIDENCE = "it names no certificate that could be checked"
 
@@ -55,15 +72,32 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     """
     folder = Path(folder)
     stored = _stored(folder)
-    evidence = []
+    found = []
     for i, one in enumerate(stored.evidence):
         progress(i, len(stored.evidence))
-        evidence.append(_checked_again(one, folder))
-    by_file = {one.file: one for one in evidence}
-    claims = tuple(_claimed_again(claim, by_file.get(claim.file)) for claim in stored.claims)
-    report = replace(stored, claims=claims, evidence=tuple(evidence), checker=checker(), generated=now())
+        found.append(_checked_again(one, folder))
+    good = {one.evidence.file: one.certificate for one in found if one.evidence.good and one.certificate is not None}
+    usable = tuple(rest_on_certificates(stored.usable, good))
+    inside = box_stays_inside(good, [claim.file for claim in stored.claims if claim.kind == "invariance"],
+                              stored.data.get("certify", {}).get("temperature_lower") == "held")
+    runaway_free = within_usable(_current(good), usable, inside)
+    by_file = {one.evidence.file: one for one in found}
+    claims = tuple(_claimed_again(claim, by_file.get(claim.file), runaway_free) for claim in stored.claims)
+    report = replace(stored, claims=claims, evidence=tuple(one.evidence for one in found), usable=usable,
+                     gate=_gate_again(stored, good, usable, inside), checker=checker(), generated=now())
+    if not is_unchanged(folder / "report.json"):
+        report = _distrusted(report, folder)
     _write(report, folder)
     return report
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A certificate file as it is now: its evidence, the certificate if it can be read, and what the check said."""
+
+    evidence: Evidence
+    certificate: Certificate | None = None
+    verdict: Verdict | None = None
 
 
 def _stored(folder: Path) -> Report:
@@ -73,36 +107,72 @@ def _stored(folder: Path) -> Report:
     return read_content(folder / "report.json")
 
 
-def _checked_again(one: Evidence, folder: Path) -> Evidence:
+def _checked_again(one: Evidence, folder: Path) -> _Found:
     place = PurePosixPath(one.file)
     if place.parent != PurePosixPath("certificates") or place.name in ("", ".."):
-        return _lost(one, "is not in the folder of certificates")
+        return _Found(_lost(one, "is not in the folder of certificates"))
     try:
         certificate = Certificate.load(folder / one.file)
         verdict = verify(certificate) if certificate.holds else None
         found = judged(one.title, one.file, file_hash(folder / one.file), certificate, verdict)
     except InputError as error:
-        return _lost(one, str(error).replace(f"{folder}{os.sep}", ""))
+        return _Found(_lost(one, str(error).replace(f"{folder}{os.sep}", "")))
     if found.good and found.sha256 != one.sha256:
-        return replace(found, valid=False, reason="valid by itself, but not the file of this report: its SHA-256 is "
-                       "another one")
+        return _Found(replace(found, valid=False, reason="valid by itself, but not the file of this report: its "
+                              "SHA-256 is another one"), certificate)
     # How long the check took is no result: with the first duration the same results give the same bytes.
-    return replace(found, seconds=one.seconds)
+    return _Found(replace(found, seconds=one.seconds), certificate, verdict)
 
 
 def _lost(one: Evidence, reason: str) -> Evidence:
-    return replace(one, valid=False, reason=reason, margins={})
+    return replace(one, claim="", proven=False, valid=False, reason=reason, margins={})
 
 
-def _claimed_again(claim: Claim, evidence: Evidence | None) -> Claim:
-    """No better than it was, and no better than its certificate is now."""
-    if claim.tested or not claim.good:
+def _claimed_again(claim: Claim, found: _Found | None, usable: bool) -> Claim:
+    """What its certificate says now, and no better than it was. A test on data has no certificate: it stays."""
+    if claim.tested:
         return claim
-    if evidence is None:
-        return replace(claim, verified=False, margin="none", reason=_NO_EVIDENCE)
-    if not evidence.good:
-        return replace(claim, verified=False, margin="none", reason=evidence.reason)
-    return claim
+    if found is None or found.certificate is None:
+        why = claim.reason or "no proof was found" if not claim.holds else (
+            found.evidence.reason if found else _NO_EVIDENCE)
+        return replace(claim, sentence="", box="", verified=False, margin="none", reason=why)
+    verdict = found.verdict if found.evidence.good and claim.good else None
+    again = claim_of(claim.file, found.certificate, verdict, title=claim.title, seconds=claim.seconds,
+                     usable=usable)
+    if claim.good and not found.evidence.good:
+        return replace(again, verified=False, margin="none", reason=found.evidence.reason)
+    return again if claim.good else replace(again, holds=claim.holds and again.holds, verified=False, margin="none",
+                                            reason=claim.reason)
+
+
+def _gate_again(stored: Report, good: Mapping[str, Certificate], usable: Sequence[UsableRange], inside: bool
+                ) -> tuple[Reason, ...]:
+    """Stored reasons, with the failures about the claimed currents found again from the certificates."""
+    if not stored.usable:
+        return tuple(stored.gate)
+    codes = {code.code for code in CODES.values()}
+    kept = [one for one in stored.gate if not (one.code in codes and one.about in _current(good) and
+                                               one.text.startswith(f"{one.about} is to have"))]
+    return (*kept, *current_reasons(_current(good), {}, usable, inside))
+
+
+def _current(good: Mapping[str, Certificate]) -> dict[str, tuple[float, float]]:
+    """Currents that the claims of a job are about, by module [A]."""
+    box = good.get("certificates/box.json")
+    pairs = (box.region.get("current") or {}) if box is not None else {}
+    return {name: (float(low), float(high)) for name, (low, high) in pairs.items()}
+
+
+def _distrusted(report: Report, folder: Path) -> Report:
+    """What is left of a report whose report.json was edited: only what the certificates say."""
+    reason = Reason("fail", GateCode.REPORT_CHANGED.code, "report", "report.json", "report.json was changed after it "
+                    "was written: its text, drawings, tables and reasons are left out, and only what the certificates "
+                    "say is shown.", GateCode.REPORT_CHANGED.remedy)
+    claims = tuple(replace(claim, sentence="", box="", margin="", holds=False, reason="report.json was changed")
+                   if claim.tested else claim for claim in report.claims)
+    return replace(report, title=f"Results in {folder.resolve().name}", subtitle="", label="", claims=claims,
+                   sections=(), first=(), usable=(), gate=(reason,), gates=(reason.code,), answer="", data={},
+                   assumptions=(ARITHMETIC,), provenance=versions())
 
 
 def _write(report: Report, folder: Path) -> None:

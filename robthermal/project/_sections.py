@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
 
 from ..calibration import Fit
-from ..report import Figure, Section, Table, box_ranges, current_limits, house_style, measured_against_model
-from ._claims import Certification
-from ._job import Comparison
+from ..report import Figure, Section, Table, box_ranges, house_style, measured_against_model
+from ._checked import Certification
+from ._job_result import Comparison
+from ._misfit import Misfit
 
 _ZERO = 273.15
 
@@ -32,6 +33,33 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> 
                    tables=(Table(table, "Residuals (measured − model), root mean square."),), anchor="model")
 
 
+def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ...]) -> Section:
+    """Model against the records that were held out, for the first screen; against the training records without any."""
+    kind = "validation" if any(one.kind == "validation" for one in misfits) else "train"
+    rows = sorted((one for one in misfits if one.kind == kind),
+                  key=lambda one: -one.excess / max(one.tolerance, 1e-9))
+    worst = next((c for c in comparisons if c.kind == kind and c.record.name == rows[0].record), comparisons[0])
+    frame = pd.DataFrame([{"record": one.record, "sensor": one.sensor, "mean [K]": one.mean, "rms [K]": one.rms,
+                           "noise [K]": one.noise, "beyond noise [K]": one.excess, "tolerance [K]": one.tolerance,
+                           "answer": _answer(one)} for one in rows])
+    what = ("records that were held out" if kind == "validation" else
+            "its own training records: none was held out, so that nothing is known about its predictions")
+    return Section("Model against data", f"The calibrated model, run freely, beside {what}.",
+                   figures=(_comparison_figure(worst),),
+                   tables=(Table(frame.head(_ROWS), f"Residual measured − modelled by sensor, the largest first"
+                                 f"{f'; {_ROWS} of {len(frame)}' * (len(frame) > _ROWS)}.", digits=3),),
+                   anchor="validation")
+
+
+_ROWS = 6
+
+
+def _answer(one: Misfit) -> str:
+    if not one.significant:
+        return "within the noise"
+    return "NOT within the tolerance" if one.beyond else "beyond the noise, within the tolerance"
+
+
 def _comparison_figure(c: Comparison) -> Figure:
     names = _worst(c, 4)
     figure = measured_against_model(c.record.time, {n: c.record[n] for n in names},
@@ -48,33 +76,29 @@ def _worst(c: Comparison, count: int) -> list[str]:
     return sorted(rmse, key=lambda name: -rmse[name])[:count]
 
 
-def parameter_section(fit: Fit) -> Section:
+def parameter_section(fit: Fit, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
     """Calibrated parameters with their uncertainty, and what the data do not determine."""
     text = "Estimated from the training records; standard deviations are for the residuals as they are."
+    frame = fit.table()
+    if ranges:
+        text += " The claims for the parameter ranges hold for all of them from lowest to highest, in any combination."
+        frame.insert(2, "lowest", [ranges[name][0] if name in ranges else float("nan") for name in frame.index])
+        frame.insert(3, "highest", [ranges[name][1] if name in ranges else float("nan") for name in frame.index])
     if fit.undetermined:
         text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
-    table = Table(fit.table().reset_index(names="parameter"), "Calibrated parameters.")
+    table = Table(frame.reset_index(names="parameter"), "Calibrated parameters.", digits=6)
     return Section("Calibrated parameters", text, tables=(table,), anchor="parameters")
 
 
 def limit_section(result: Certification) -> Section:
-    """Current limits by method and direction, beside the runaway limit and the declared ones."""
+    """Contraction limits by method and direction: no limits for use."""
     low, high = result.boxes.temperature
-    rows = [{"direction": limit.direction, "method": limit.method, "largest certified current [A]": limit.current,
-             "proven": "yes" if limit.certificate.holds else "no"} for limit in result.limits]
-    lines = {f"declared limit of {name}": limits[1] for name, limits in result.system.current_limits.items() if limits}
-    if result.runaway is not None:
-        lines |= {f"I* of {name}": value for name, value in result.runaway.current.items()}
-    figure = Figure.draw(current_limits([f"{li.direction}, {li.method}" for li in result.limits],
-                                        [li.current for li in result.limits], lines),
-                         alt="Bar chart of the largest certified current by direction and method.",
-                         caption="Largest certified current; the lines are the declared limits and the runaway limit "
-                                 "I*.")
-    text = ("Every module may have any current in the range, at any time and independently, while all lumps are "
-            f"between {low - _ZERO:.6g} and {high - _ZERO:.6g} °C. Every method is a norm; any one is a proof, so "
-            "the largest value of a direction may be used.")
-    return Section("Current limits", text, figures=(figure,),
-                   tables=(Table(pd.DataFrame(rows), "Certified currents."),), anchor="limits")
+    rows = [{"direction": limit.direction, "method": limit.method, "contraction limit [A]": limit.current,
+             "proven": limit.certificate.holds} for limit in result.limits]
+    text = ("Contraction limit inside the box; not a limit for use: it holds only while all lumps are between "
+            f"{low - _ZERO:.6g} and {high - _ZERO:.6g} °C, and such a current may leave that box.")
+    return Section("Contraction limits", text, tables=(Table(pd.DataFrame(rows), "Contraction limits."),),
+                   anchor="limits")
 
 
 def runaway_section(result: Certification) -> Section | None:

@@ -12,6 +12,7 @@ from ._html import write_html as write_html
 from ._provenance import file_hash as file_hash
 from ._provenance import versions as versions
 from ._reasons import Reason as Reason
+from ._reasons import Verdict as Verdict
 from ._residuals import residuals_before_after as residuals_before_after
 from ._residuals import spectra_before_after as spectra_before_after
 from ._store import is_unchanged as is_unchanged

@@ -64,7 +64,8 @@ def write_html(report: Report, path: str | Path) -> Path:
     return save_text(printable(page), path)
 
 
-_OWN = ("top", "usable", "usable-title", "claims", "claims-title", "bounds", "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
+_OWN = ("top", "usable", "usable-title", "claims", "claims-title", "bounds",
+        "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
         "provenance", "check")
 
 

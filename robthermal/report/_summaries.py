@@ -47,7 +47,8 @@ def write_junit(report: Report, path: str | Path) -> Path:
     True
     """
     suites = [(report.title, _cases(report))] + ([(f"{report.title}: gates", _gates(report))] if report.gates else [])
-    root = ElementTree.Element("testsuites", {"name": "robthermal", **_total([c for _, cases in suites for c in cases])})
+    everything = [case for _, cases in suites for case in cases]
+    root = ElementTree.Element("testsuites", {"name": "robthermal", **_total(everything)})
     for name, cases in suites:
         suite = ElementTree.SubElement(root, "testsuite", {"name": printable(name), **_total(cases)})
         properties = ElementTree.SubElement(suite, "properties")

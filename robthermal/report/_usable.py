@@ -81,6 +81,13 @@ class UsableRange:
         Modules that may have it, all at the same time and independently.
     bounds : sequence of Bound
         The bounds it is the smallest of.
+    certified : float or None, optional
+        Size of the current for which a box that is never left is certified, with contraction in it [A]; the usable
+        current is not larger. None: nothing beside the bounds.
+    files : sequence of str, optional
+        Certificate files of that box.
+    costly : str, optional
+        Parameter whose range costs most of the current.
 
     Examples
     --------
@@ -94,16 +101,21 @@ class UsableRange:
     parameters: Parameters
     modules: Sequence[str]
     bounds: Sequence[Bound]
+    certified: float | None = None
+    files: Sequence[str] = ()
+    costly: str = ""
 
     @property
     def current(self) -> float | None:
-        """Smallest bound [A]; None if no bound applies."""
-        return min((one.current for one in self.bounds if one.current is not None), default=None)
+        """The usable current: smallest bound, and not more than what is certified [A]; None if no bound applies."""
+        sizes = [one.current for one in self.bounds if one.current is not None]
+        return min([*sizes, *([] if self.certified is None else [self.certified])], default=None)
 
     @property
     def limited_by(self) -> str:
         """Name of the smallest bound; empty if no bound applies."""
-        return next((one.name for one in self.bounds if one.current is not None and one.current == self.current), "")
+        sizes = {one.name: one.current for one in self.bounds if one.current is not None}
+        return min(sizes, key=lambda name: sizes[name], default="")
 
     @property
     def range(self) -> str:
@@ -143,7 +155,7 @@ def shown(rows: Sequence[UsableRange]) -> list[tuple[str, UsableRange, UsableRan
 
 
 def summary(rows: Sequence[UsableRange]) -> dict[str, dict[str, object]]:
-    """By module and direction, for JSON: four bounds, the smallest and its name, and the same for nominal parameters."""
+    """By module and direction, for JSON: four bounds, the smallest and its name; the same for nominal parameters."""
     found: dict[str, dict[str, object]] = {}
     for direction, best, nominal in shown(rows):
         for module in best.modules:

@@ -63,7 +63,7 @@ def badge(page: Page) -> str:
 
 def verdict_colors(page: Page) -> set[str]:
     """Classes of the head that say its color."""
-    heads = [attributes["class"].split() for _, attributes in page.tags if "verdict" in attributes.get("class", "").split()]
+    heads = [words for _, attributes in page.tags if "verdict" in (words := attributes.get("class", "").split())]
     assert len(heads) == 1
     return set(heads[0]) - {"verdict"}
 

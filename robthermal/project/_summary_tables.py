@@ -1,0 +1,58 @@
+"""Tables of a job for summary.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ._checked import Certification
+from ._job_result import JobResult
+
+
+def summary_tables(result: JobResult) -> dict[str, Any]:
+    """Calibration, residuals and certification, by the keys of the summary.
+
+    Parameters
+    ----------
+    result : JobResult
+        From `run_job`.
+    """
+    tables: dict[str, Any] = {"residuals": _residuals(result), "certify": certify_table(result.certification)}
+    if result.fit is not None:
+        tables["calibrate"] = {"parameters": _parameters(result), "outcome": result.fit.outcome.code}
+    return tables
+
+
+def certify_table(result: Certification) -> dict[str, Any]:
+    """Which parameters the robust claims cover, and how sure the ranges are.
+
+    Parameters
+    ----------
+    result : Certification
+        From `certify_system`.
+    """
+    calibrated = result.boxes.parameters == "calibration" and result.parameters is not None
+    return {"confidence": result.boxes.confidence if calibrated else None,
+            "set": result.boxes.set if calibrated else None,
+            "temperature_lower": result.boxes.temperature_lower,
+            "parameters": {name: list(pair) for name, pair in (result.parameters or {}).items()}}
+
+
+def _parameters(result: JobResult) -> dict[str, Any]:
+    fit, ranges = result.fit, result.ranges or {}
+    assert fit is not None
+    found = {}
+    for i, (name, value) in enumerate(fit.parameters.items()):
+        bound = ("lower" if value - fit.lower[i] < fit.upper[i] - value else "upper") if fit.at_bound[i] else None
+        found[name] = {"value": value, "std": fit.std[name], "range": list(ranges[name]) if name in ranges else None,
+                       "determined": name not in fit.undetermined_parameters, "bound": bound}
+    return found
+
+
+def _residuals(result: JobResult) -> Mapping[str, Any]:
+    found: dict[str, dict[str, dict[str, dict[str, float]]]] = {}
+    for one in result.misfits:
+        row = {"mean": one.mean, "rms": one.rms, "noise": one.noise, "excess": one.excess,
+               "tolerance": one.tolerance, "p": one.p_value}
+        found.setdefault(one.kind, {}).setdefault(one.record, {})[one.sensor] = row
+    return found
