@@ -7,8 +7,9 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
+from ..errors import InputError
 from ..report import Evidence, Report, file_hash, versions, write_content, write_html, write_json, write_junit
-from ..verification import Certificate, Verdict
+from ..verification import Certificate, Verdict, machine_hash
 from ._assumptions import kind_assumptions
 from ._checked import Checked
 
@@ -46,7 +47,16 @@ def judged(title: str, file: str, sha256: str, certificate: Certificate, verdict
     reason = certificate.reason if verdict is None else "" if verdict.valid else verdict.reason
     return Evidence(title, file, sha256, certificate.kind, certificate.claim, certificate.holds,
                     None if verdict is None else verdict.valid, reason, margins,
-                    0.0 if verdict is None else verdict.seconds, kind_assumptions(certificate.kind))
+                    0.0 if verdict is None else verdict.seconds, kind_assumptions(certificate.kind),
+                    machine_of(certificate))
+
+
+def machine_of(certificate: Certificate) -> str:
+    """Short hash of the machine a certificate is about; empty where it names none."""
+    try:
+        return machine_hash(certificate.system)
+    except InputError:  # an honest no may come without a system
+        return ""
 
 
 def write_report(report: Report, folder: Path) -> Report:

@@ -24,7 +24,7 @@ from ..report import (
     write_json,
     write_junit,
 )
-from ..verification import Certificate, Verdict, verify
+from ..verification import Certificate, Verdict, same_system, verify
 from ._assumptions import ARITHMETIC
 from ._codes import GateCode
 from ._currents import CODES, box_stays_inside, current_reasons, rest_on_certificates, within_usable
@@ -76,6 +76,7 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     for i, one in enumerate(stored.evidence):
         progress(i, len(stored.evidence))
         found.append(_checked_again(one, folder))
+    found = _of_one_machine(found)
     good = {one.evidence.file: one.certificate for one in found if one.evidence.good and one.certificate is not None}
     usable = tuple(rest_on_certificates(stored.usable, good))
     inside = box_stays_inside(good, [claim.file for claim in stored.claims if claim.kind == "invariance"],
@@ -122,6 +123,23 @@ def _checked_again(one: Evidence, folder: Path) -> _Found:
                               "SHA-256 is another one"), certificate)
     # How long the check took is no result: with the first duration the same results give the same bytes.
     return _Found(replace(found, seconds=one.seconds), certificate, verdict)
+
+
+def _of_one_machine(found: list[_Found]) -> list[_Found]:
+    """A certificate of another machine than that of the first claim, however valid, is no evidence here."""
+    first = next((one.certificate for one in found if one.certificate is not None and one.evidence.good
+                  and "lumps" in one.certificate.system), None)
+    if first is None:
+        return found
+    system = {key: value for key, value in first.system.items() if key in _NETWORK}
+    return [one if one.certificate is None or "lumps" not in one.certificate.system
+            or same_system(one.certificate, system) else
+            replace(one, evidence=replace(one.evidence, valid=False, margins={}, reason="valid by itself, but about "
+                                          f"another machine ({one.evidence.machine}) than the first claim"))
+            for one in found]
+
+
+_NETWORK = ("name", "lumps", "ambients", "links", "modules")
 
 
 def _lost(one: Evidence, reason: str) -> Evidence:
