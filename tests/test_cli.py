@@ -200,7 +200,9 @@ def test_junit_of_the_demo_is_well_formed_and_agrees_with_the_summary(
     cases = list(suite.iter("testcase"))
     summary = json.loads((demo[1] / "summary.json").read_text(encoding="utf-8"))
     assert summary["holds"] is True
-    assert len(cases) == len(summary["claims"]) == 3
+    assert summary["verdict"] == "PASS WITH REMARKS" and len(summary["claims"]) == 6
+    assert len([case for case in cases if case.get("classname") == "robthermal.certificates"]) == 6
+    assert {one["code"] for one in summary["reasons"]} >= {"simulated_data", "not_diagnosed"}
     assert not list(suite.iter("failure"))
 
 
@@ -291,7 +293,6 @@ def test_certify_with_a_full_matrix(run: Cli, system: Path, tmp_path: Path) -> N
     assert done.status == 0
     claims = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (out / "certificates").iterdir()}
     assert claims["contraction"]["evidence"]["method"] == "lyapunov"
-    assert claims["limit_lyapunov_cooling"]["holds"] and claims["limit_sum_cooling"]["holds"]
 
 
 def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp_path: Path) -> None:
@@ -303,7 +304,7 @@ def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp
     assert summary["holds"] is False
     failed = [claim for claim in summary["claims"] if not claim["holds"]]
     assert failed and all(claim["reason"] for claim in failed)
-    assert "NOT CERTIFIED" in (out / "report.html").read_text(encoding="utf-8")
+    assert summary["verdict"] == "FAIL" and "FAIL" in (out / "report.html").read_text(encoding="utf-8")
     assert list(ElementTree.parse(out / "junit.xml").getroot().iter("failure"))
     assert run("verify", out).status == 1
 

@@ -32,11 +32,12 @@ def directions(current: Pairs) -> tuple[Direction, ...]:
 
 def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, parameters: Pairs | None,
                     progress: Callable[[str], None]) -> tuple[list[UsableRange], list[Found]]:
-    """Usable currents of all directions, for the parameters as they stand and for their ranges, with certificates."""
+    """Usable currents of all directions, with certificates; for the parameter ranges too where they are asked for."""
     rows: list[UsableRange] = []
     found: list[Found] = []
     for direction in directions(current) if system.modules else ():
-        for ranges in (None, parameters) if parameters else (None,):
+        asked = any(high > 0.0 if direction == "cooling" else low < 0.0 for low, high in current.values())
+        for ranges in (None, parameters) if parameters and asked else (None,):
             progress(f"searching the usable {direction} current{', for the parameter ranges' * (ranges is not None)}")
             best = usable_current(system, direction=direction, temperature=boxes.temperature, ambient=boxes.ambient,
                                   heat=heat, setpoint=boxes.setpoint or None, parameters=ranges,

@@ -81,11 +81,12 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     usable = tuple(rest_on_certificates(stored.usable, good))
     inside = box_stays_inside(good, [claim.file for claim in stored.claims if claim.kind == "invariance"],
                               stored.data.get("certify", {}).get("temperature_lower") == "held")
-    runaway_free = within_usable(_current(good), usable, inside)
     by_file = {one.evidence.file: one for one in found}
+    current = _current(by_file.get("certificates/box.json"))
+    runaway_free = bool(good) and within_usable(current, usable, inside)
     claims = tuple(_claimed_again(claim, by_file.get(claim.file), runaway_free) for claim in stored.claims)
     report = replace(stored, claims=claims, evidence=tuple(one.evidence for one in found), usable=usable,
-                     gate=_gate_again(stored, good, usable, inside), checker=checker(), generated=now())
+                     gate=_gate_again(stored, current, usable, inside), checker=checker(), generated=now())
     if not is_unchanged(folder / "report.json"):
         report = _distrusted(report, folder)
     _write(report, folder)
@@ -163,21 +164,22 @@ def _claimed_again(claim: Claim, found: _Found | None, usable: bool) -> Claim:
                                             reason=claim.reason)
 
 
-def _gate_again(stored: Report, good: Mapping[str, Certificate], usable: Sequence[UsableRange], inside: bool
-                ) -> tuple[Reason, ...]:
+def _gate_again(stored: Report, current: Mapping[str, tuple[float, float]], usable: Sequence[UsableRange],
+                inside: bool) -> tuple[Reason, ...]:
     """Stored reasons, with the failures about the claimed currents found again from the certificates."""
-    if not stored.usable:
+    if not stored.usable or not current:
         return tuple(stored.gate)
     codes = {code.code for code in CODES.values()}
-    kept = [one for one in stored.gate if not (one.code in codes and one.about in _current(good) and
+    kept = [one for one in stored.gate if not (one.code in codes and one.about in current and
                                                one.text.startswith(f"{one.about} is to have"))]
-    return (*kept, *current_reasons(_current(good), {}, usable, inside))
+    return (*kept, *current_reasons(current, {}, usable, inside))
 
 
-def _current(good: Mapping[str, Certificate]) -> dict[str, tuple[float, float]]:
+def _current(box: _Found | None) -> dict[str, tuple[float, float]]:
     """Currents that the claims of a job are about, by module [A]."""
-    box = good.get("certificates/box.json")
-    pairs = (box.region.get("current") or {}) if box is not None else {}
+    pairs = box.certificate.region.get("current") if box is not None and box.certificate is not None else None
+    if not isinstance(pairs, Mapping):
+        return {}
     return {name: (float(low), float(high)) for name, (low, high) in pairs.items()}
 
 

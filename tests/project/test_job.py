@@ -108,7 +108,7 @@ def test_report_of_a_machine_without_modules_does_not_speak_of_them(result: rt.p
     said = " ".join([*(claim.sentence for claim in report.claims), *report.assumptions])
     assert "module" not in said.lower() and "Joule" not in said
     assert sorted(path.stem for path in (tmp_path / "out" / "certificates").iterdir()) == [
-        "box", "box_contraction", "contraction"]
+        "box", "box_contraction", "box_contraction_ranges", "box_ranges", "contraction", "contraction_ranges"]
     for file in (tmp_path / "out" / "certificates").iterdir():
         assert rt.verify(rt.Certificate.load(file)).valid
     assert rt.read_system(tmp_path / "out" / "calibrated.toml").parameter(
@@ -161,7 +161,9 @@ def test_main_job_on_measured_data(tclab: Path, tmp_path: Path) -> None:
     assert validation.rmse(validation.calibrated)["T1"] < 2.5  # another day
     rt.project.write_job(result, tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert summary["holds"] is True and len(summary["claims"]) == 3
+    assert all(claim["valid"] for claim in summary["claims"]) and len(summary["claims"]) == 6
+    assert summary["verdict"] == "FAIL"  # another day, another room temperature: the data contradict the prediction
+    assert "validation_misfit" in {one["code"] for one in summary["reasons"] if one["level"] == "fail"}
     assert "SHA-256 of step_50_run_2.csv" in summary["provenance"]
     # No lump above the steady state at full power in the warmest room, within a kelvin: T = room + α 100 / U_a
     hottest = max(high for _, high in result.certification.safe.temperature.values())
