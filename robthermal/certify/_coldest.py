@@ -12,10 +12,9 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..thermal import Equations, System
-from ._faces import Array, Indices
+from ._faces import Array
 from ._sections import Interval
 
 _MOST_CORNERS = 64
@@ -127,7 +126,7 @@ class _Cases:
         first = len(self.system.inputs)
         u[:, first:first + len(self.system.modules)] = c * self._patterns
         for _ in range(_NEWTON):
-            J, by_current = self._jacobians(x, u)
+            J, by_input = self._eq.jacobians(x, u)
             step = np.linalg.solve(J, (self._eq.heat(x, u) + self._outside[1])[..., None])[..., 0]
             x = x - step
             if not np.isfinite(x).all() or x.max() > _HOTTEST or x.min() <= 0:
@@ -138,29 +137,7 @@ class _Cases:
             return None
         if np.linalg.eigvals(J / self._eq.capacity[:, None]).real.max() >= 0:
             return None
+        by_current = by_input[:, :, first:first + len(self.system.modules)]
         change = np.linalg.solve(J, -np.einsum("bij,bj->bi", by_current, self._patterns)[..., None])[..., 0]
         cold = [self.system.lump_names.index(module.cold) for module in self.system.modules.values()]
         return None if (change[:, cold] >= 0)[self._patterns > 0].any() else x
-
-    def _jacobians(self, x: Array, u: Array) -> tuple[Array, Array]:
-        """∂f/∂x (n_cases, n, n) and ∂f/∂I (n_cases, n, n_modules), dense."""
-        eq, n = self._eq, len(self.system.lumps)
-        J = np.tile(eq.A.toarray(), (len(x), 1, 1))
-        by_current = np.zeros((len(x), n, len(self.system.modules)))
-        for term in eq.terms:
-            s = term.slopes(*eq.ends(term, x, u))
-            for own, other, slope in ((term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
-                                      (term.b, term.b, s.bb)):
-                inside = (own < n) & (other < n)
-                _add(J, own[inside], other[inside], slope[:, inside])
-            if term.drive.size:
-                column = np.arange(len(term.drive))
-                _add(by_current, term.a, column, s.a_drive)
-                _add(by_current, term.b, column, s.b_drive)
-        return J, by_current
-
-
-def _add(matrices: Array, rows: Indices, columns: Indices, values: NDArray[np.floating[Any]]) -> None:
-    """Add one value per pair (row, column) to every matrix; pairs may repeat."""
-    for row, column, value in zip(rows, columns, values.T, strict=True):
-        matrices[:, row, column] += value

@@ -16,7 +16,6 @@ from ._usable_bounds import Question
 from ._usable_result import CurrentBound
 
 _OF_FOLD = 0.98  # share of I* that is used: it is computed, and at I* itself nothing is left
-_SIDE = "the hot side"
 
 
 def runaway_bound(question: Question, setpoint: SetPoints | None) -> tuple[CurrentBound, str | None]:
@@ -31,11 +30,11 @@ def runaway_bound(question: Question, setpoint: SetPoints | None) -> tuple[Curre
     def smallest(numbers: Mapping[str, float]) -> tuple[float, float]:
         """0.98 I* of the modules with set-points, and the coldest current of the others."""
         machine = system.with_parameters(dict(numbers))
-        return (_OF_FOLD * _fold_current(machine, held, question.ambient),
+        return (_OF_FOLD * _fold_current(machine, held, question),
                 coldest_current(machine, free, question.ambient, question.heat) if free else float("inf"))
 
     nominal = smallest({})
-    worst, costly = _worst(question.parameters, {}, nominal, smallest)
+    worst, costly = _worst(question.parameters, nominal, smallest)
     current = min(worst)
     proof = _proof(question, setpoint, current) if held else None
     return CurrentBound(current, proof, "computed", _text(worst, free, question)), costly
@@ -47,33 +46,35 @@ def _points(system: System, setpoint: SetPoints) -> dict[str, Interval]:
     return {name: (low, high) for name, (low, high) in found.items()}
 
 
-def _fold_current(system: System, held: Mapping[str, Interval], ambient: Mapping[str, Interval]) -> float:
-    """Smallest I* over the modules and the corners of set-points and ambients [A]; inf without set-points."""
+def _fold_current(system: System, held: Mapping[str, Interval], question: Question) -> float:
+    """Smallest I* over the modules and the corners of set-points, ambients and heats (all low, all high) [A]."""
     if not held:
         return float("inf")
-    pairs = [*held.values(), *ambient.values()]
     found = []
-    for corner in product(*(sorted(set(pair)) for pair in pairs)):
-        points = dict(zip(held, corner, strict=False))
-        around = dict(zip(ambient, corner[len(held):], strict=True))
-        found.append(float(fold(system, points, ambient=around).current[-1].min()))
+    for end in (0, 1) if any(high > low for low, high in question.heat.values()) else (0,):
+        machine = system.with_parameters({f"lumps.{name}.heat": pair[end] for name, pair in question.heat.items()})
+        pairs = [*held.values(), *question.ambient.values()]
+        for corner in product(*(sorted(set(pair)) for pair in pairs)):
+            points = dict(zip(held, corner, strict=False))
+            around = dict(zip(question.ambient, corner[len(held):], strict=True))
+            found.append(float(fold(machine, points, ambient=around, points=2).current[-1].min()))
     return min(found)
 
 
-def _worst(parameters: Mapping[str, Any], fixed: Mapping[str, float], nominal: tuple[float, float],
+def _worst(parameters: Mapping[str, Any], nominal: tuple[float, float],
            smallest: Callable[[Mapping[str, float]], tuple[float, float]]) -> tuple[tuple[float, float], str | None]:
     """Smallest currents with every parameter at its own worst end, all together, and which one costs most."""
     if not parameters:
         return nominal, None
-    ends: list[dict[str, float]] = [dict(fixed), dict(fixed)]
+    worst: list[dict[str, float]] = [{}, {}]
     cost = {}
-    for name, pair in parameters.items():
-        found = [smallest({name: end}) for end in pair]
+    for name, (low, high) in parameters.items():
+        up = smallest({name: high})
+        cost[name] = abs(min(up) - min(nominal))
         for kind in (0, 1):
-            ends[kind][name] = pair[min((0, 1), key=lambda k, kind=kind: found[k][kind])]  # type: ignore[misc]
-        cost[name] = min(nominal) - min(min(values) for values in found)
-    together = [smallest(numbers)[kind] for kind, numbers in enumerate(ends)]
-    return (together[0], together[1]), max(cost, key=lambda name: cost[name])
+            worst[kind][name] = high if up[kind] < nominal[kind] else low
+    together = smallest(worst[0])[0], smallest(worst[1])[1]
+    return together, max(cost, key=lambda name: cost[name])
 
 
 def _proof(question: Question, setpoint: SetPoints | None, current: float) -> Certificate | None:

@@ -13,6 +13,7 @@ from ._file import format_system as format_system
 from ._file import parse_system as parse_system
 from ._file import read_system as read_system
 from ._file import write_system as write_system
+from ._fold import fold as fold
 from ._geometry import Assembly as Assembly
 from ._geometry import Contact as Contact
 from ._geometry import Layer as Layer
@@ -48,7 +49,6 @@ from ._reduce import Reduction as Reduction
 from ._reduce import hinf_error as hinf_error
 from ._reduce import reduce as reduce
 from ._regulated import LoadCurve as LoadCurve
-from ._regulated import fold as fold
 from ._regulated import load_curve as load_curve
 from ._simulate import Trajectory as Trajectory
 from ._simulate import simulate as simulate

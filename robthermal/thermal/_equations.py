@@ -251,6 +251,39 @@ class Equations:
             parts.append(_matrix(self.B.shape, *entries))
         return csr_array(sum(parts[1:], start=parts[0]) @ diags_array(self.drives.slopes(u)))
 
+    def jacobians(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
+        """∂f/∂x and ∂f/∂u as dense arrays, at one point or many: for small systems much quicker than the sparse ones.
+
+        Parameters
+        ----------
+        x, u : array_like, shape (..., n) and (..., n_u)
+            As in `heat`.
+
+        Returns
+        -------
+        tuple of ndarray, shapes (..., n, n) and (..., n, n_u)
+            [W/K], [W/unit, W/A, W/K].
+        """
+        x, u = np.asarray(x), np.asarray(u)
+        n, n_u = self._dense[1].shape
+        at = [np.tile(part, (*x.shape[:-1], 1, 1)) for part in self._dense]
+        to_column = self.drives.ambients.start - n
+        for term in self.terms:
+            s = term.slopes(*self.ends(term, x, u))
+            for own, other, slope in ((term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
+                                      (term.b, term.b, s.bb)):
+                for k in np.flatnonzero(own < n):
+                    into, column = (0, other[k]) if other[k] < n else (1, other[k] + to_column)
+                    at[into][..., own[k], column] += slope[..., k]
+            for own, slope in ((term.a, s.a_drive), (term.b, s.b_drive)) if term.drive.size else ():
+                for k in np.flatnonzero((own < n) & (term.drive < n_u)):
+                    at[1][..., own[k], term.drive[k]] += slope[..., k]
+        return at[0], at[1] * self.drives.slopes(u)[..., None, :]
+
+    @cached_property
+    def _dense(self) -> tuple[Array, Array]:
+        return self.A.toarray(), self.B.toarray()
+
     def rate(self, x: ArrayLike, u: ArrayLike) -> Array:
         """ẋ = E⁻¹ f(x, u).
 

@@ -184,7 +184,7 @@ class _Problem:
     def jacobian(self, rest: Array) -> Any:
         def J(y: Array, share: float) -> Array:
             x, u = self.state(y, share, rest)
-            Jx, Ju = self.eq.jacobian(x, u).toarray(), self.eq.input_jacobian(x, u).toarray()
+            Jx, Ju = self.eq.jacobians(x, u)
             du = self.u - self.eq.nominal()
             du[self.columns()] = 0.0
             along = Ju @ du + Jx[:, self.held] @ (self.target - rest[self.held]) + self.heat
@@ -203,7 +203,7 @@ class _Problem:
         if self.held.size:
             slowest = slowest_regulated(self.eq, x, u, self.held, self.columns())
         else:
-            slowest = float(np.linalg.eigvals(self.eq.jacobian(x, u).toarray() / self.eq.capacity[:, None]).real.max())
+            slowest = float(np.linalg.eigvals(self.eq.jacobians(x, u)[0] / self.eq.capacity[:, None]).real.max())
         first = len(self.eq.system.inputs)
         return Equilibrium(dict(zip(self.eq.system.lump_names, x.tolist(), strict=True)),
                            dict(zip(self.eq.system.module_names, u[first:].tolist(), strict=False)),
@@ -214,7 +214,7 @@ def _rest(eq: Equations, problem: _Problem) -> Array:
     """Equilibrium with heaters and currents off and nominal ambients, by Newton (monotone: conduction only)."""
     x, u = eq.initial(), eq.nominal()
     for _ in range(50):
-        change = np.linalg.solve(eq.jacobian(x, u).toarray(), eq.heat(x, u))
+        change = np.linalg.solve(eq.jacobians(x, u)[0], eq.heat(x, u))
         x = x - change
         if np.abs(change).max() < 1e-11:
             break
