@@ -54,7 +54,8 @@ SURFACE = {
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
-        Explanation FileCheck Gate GateCode JobResult MapRequest Misfit Project Residuals ResponseResiduals SecondVerdict boxes_from_text
+        Explanation FileCheck Gate GateCode JobResult MapRequest Misfit Project Residuals ResponseResiduals
+        SecondVerdict boxes_from_text
         calibrate_files certificate_files certify_system check_free couple_subsystems demo_project design_excitation
         design_from_text design_system diagnose_records estimate_response explain explainable map_from_text
         map_system new_project output_folder point_from_text read_coupling read_measured read_project rebuild_report
@@ -62,9 +63,9 @@ SURFACE = {
         write_excitation write_job write_map
     """,
     "report": """
-        Bound Claim Evidence Figure Printed Reason Report Section Table UsableRange box_ranges current_limits
-        file_hash house_style is_unchanged load_curve measured_against_model read_content residuals_before_after spectra_before_after versions
-        write_content write_html write_json write_junit
+        "" Bound Claim Evidence Figure Printed Reason Report Section Table UsableRange box_ranges current_limits
+        file_hash house_style is_unchanged load_curve measured_against_model read_content residuals_before_after
+        spectra_before_after versions write_content write_html write_json write_junit
     """,
     "signals": """
         Declared DesignCheck Excitation Import ImportOptions Record

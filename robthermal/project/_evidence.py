@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
 from ..errors import InputError
-from ..report import Evidence, Report, file_hash, versions, write_content, write_html, write_json, write_junit
+from ..report import (
+    Claim,
+    Evidence,
+    Report,
+    file_hash,
+    versions,
+    write_content,
+    write_html,
+    write_json,
+    write_junit,
+)
 from ..verification import Certificate, Verdict, machine_hash
 from ._assumptions import kind_assumptions
 from ._checked import Checked
+from ._second import SecondVerdict, second_verdicts
 
 
 def write_certification(checked: Sequence[Checked], report: Report, folder: Path) -> Report:
@@ -32,8 +43,49 @@ def write_certification(checked: Sequence[Checked], report: Report, folder: Path
         As written.
     """
     (folder / "certificates").mkdir()
-    evidence = tuple(_saved(one, folder) for one in checked)
-    return write_report(replace(report, evidence=evidence, checker=checker()), folder)
+    evidence = twice_checked([_saved(one, folder) for one in checked],
+                             {one.file: one.certificate for one in checked if one.required and one.good})
+    by_file = {one.file: one for one in evidence}
+    claims = tuple(no_better(claim, by_file[claim.file]) if claim.file in by_file else claim
+                   for claim in report.claims)
+    return write_report(replace(report, claims=claims, evidence=evidence, checker=checker()), folder)
+
+
+def twice_checked(evidence: Sequence[Evidence], certificates: Mapping[str, Certificate]) -> tuple[Evidence, ...]:
+    """Evidence with what the second checker says of these certificates, where it is installed.
+
+    Parameters
+    ----------
+    evidence : sequence of Evidence
+        What the first check said.
+    certificates : mapping
+        Certificates the second checker is asked about, by file.
+    """
+    said = dict(zip(certificates, second_verdicts(list(certificates.values())), strict=True))
+    return tuple(_with_second(one, said.get(one.file)) for one in evidence)
+
+
+def _with_second(one: Evidence, said: SecondVerdict | None) -> Evidence:
+    if said is None or said.status == "absent":
+        return one
+    if said.status == "not valid":
+        return replace(one, second=said.status, reason=f"the second checker says that it is not valid: {said.reason}")
+    return replace(one, second=said.status)
+
+
+def no_better(claim: Claim, evidence: Evidence) -> Claim:
+    """A claim that is not better than its evidence.
+
+    Parameters
+    ----------
+    claim : Claim
+        As found.
+    evidence : Evidence
+        Of its certificate.
+    """
+    if not claim.good or evidence.good:
+        return claim
+    return replace(claim, verified=False, margin="none", reason=evidence.reason)
 
 
 def _saved(one: Checked, folder: Path) -> Evidence:

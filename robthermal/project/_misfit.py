@@ -97,14 +97,14 @@ def effective_count(e: Array) -> float:
 
 
 def noise_of_readings(readings: Array) -> float:
-    """Noise of a sensor that states none [K]: from differences of neighbors, in which slow temperatures cancel.
+    """Noise of a sensor that states none [K]: from second differences, in which slow temperatures cancel.
 
     Parameters
     ----------
     readings : ndarray, shape (n,)
         Measured [K].
     """
-    steps = np.diff(readings[np.isfinite(readings)])
+    steps = np.diff(readings[np.isfinite(readings)], n=2)
     robust = 1.4826 * float(np.median(np.abs(steps))) if steps.size else 0.0
     spread = robust or (float(np.sqrt(np.mean(steps**2))) if steps.size else 0.0)
-    return max(spread / np.sqrt(2.0), _LEAST_NOISE)
+    return max(float(spread / np.sqrt(6.0)), _LEAST_NOISE)

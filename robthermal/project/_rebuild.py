@@ -28,7 +28,7 @@ from ..verification import Certificate, Verdict, same_system, verify
 from ._assumptions import ARITHMETIC
 from ._codes import GateCode
 from ._currents import CODES, box_stays_inside, current_reasons, rest_on_certificates, within_usable
-from ._evidence import checker, judged
+from ._evidence import checker, judged, twice_checked
 from ._now import now
 from ._words import claim_of
 
@@ -76,7 +76,7 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     for i, one in enumerate(stored.evidence):
         progress(i, len(stored.evidence))
         found.append(_checked_again(one, folder))
-    found = _of_one_machine(found)
+    found = _checked_twice(_of_one_machine(found), {claim.file for claim in stored.claims})
     good = {one.evidence.file: one.certificate for one in found if one.evidence.good and one.certificate is not None}
     usable = tuple(rest_on_certificates(stored.usable, good))
     inside = box_stays_inside(good, [claim.file for claim in stored.claims if claim.kind == "invariance"],
@@ -138,6 +138,14 @@ def _of_one_machine(found: list[_Found]) -> list[_Found]:
             replace(one, evidence=replace(one.evidence, valid=False, margins={}, reason="valid by itself, but about "
                                           f"another machine ({one.evidence.machine}) than the first claim"))
             for one in found]
+
+
+def _checked_twice(found: list[_Found], files: set[str]) -> list[_Found]:
+    """What the second checker says of the certificates of the claims, where it is installed."""
+    asked = {one.evidence.file: one.certificate for one in found
+             if one.certificate is not None and one.evidence.good and one.evidence.file in files}
+    evidence = twice_checked([one.evidence for one in found], asked)
+    return [replace(one, evidence=checked) for one, checked in zip(found, evidence, strict=True)]
 
 
 _NETWORK = ("name", "lumps", "ambients", "links", "modules")

@@ -60,6 +60,7 @@ def write_html(report: Report, path: str | Path) -> Path:
         paired=any(claim.parameters == "ranges" for claim in report.claims),
         about=": about the model, which the data contradict" if report.contradicted else "",
         machine={one.file: one.machine for one in report.evidence},
+        twice={one.file for one in report.evidence if one.good and one.second == "valid"},
         claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
     return save_text(printable(page), path)
 

@@ -161,9 +161,10 @@ def test_main_job_on_measured_data(tclab: Path, tmp_path: Path) -> None:
     assert validation.rmse(validation.calibrated)["T1"] < 2.5  # another day
     rt.project.write_job(result, tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert all(claim["valid"] for claim in summary["claims"]) and len(summary["claims"]) == 6
-    assert summary["verdict"] == "FAIL"  # another day, another room temperature: the data contradict the prediction
-    assert "validation_misfit" in {one["code"] for one in summary["reasons"] if one["level"] == "fail"}
+    nominal = [claim["valid"] for claim in summary["claims"] if claim["parameters"] == "nominal"]
+    assert nominal == [True, True, True] and summary["verdict"] == "FAIL"
+    # Another day, another room temperature, and one step alone does not determine five parameters
+    assert {one["code"] for one in summary["reasons"]} >= {"validation_misfit", "not_robust", "undetermined_parameter"}
     assert "SHA-256 of step_50_run_2.csv" in summary["provenance"]
     # No lump above the steady state at full power in the warmest room, within a kelvin: T = room + α 100 / U_a
     hottest = max(high for _, high in result.certification.safe.temperature.values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -30,6 +31,9 @@ seebeck = 0.05
 resistance = 4.0
 conductance = 0.3
 current_limits = [-3.0, 3.0]
+[sensors.T1]
+lump = "stage"
+noise = 0.02
 [fit]
 "links.plate-room.conductance" = { lower = 0.1, upper = 5.0 }
 """
@@ -72,13 +76,17 @@ def test_every_key_of_the_documentation_is_read(folder: Path) -> None:
     assert project.system.fit["modules.m1.resistance.value"].sigma == 0.5
     assert project.boxes == rt.project.Boxes(
         temperature=(278.15, 358.15), ambient={"room": (288.15, 303.15)}, current={"m1": (0.0, 1.2)},
-        heat={"plate": (0.0, 2.0)}, setpoint={"m1": 283.15}, method="energy")
+        heat={"plate": (0.0, 2.0)}, setpoint={"m1": 283.15}, method="energy", parameters="calibration", confidence=0.95,
+        set="ellipsoid", temperature_lower="reported")
+    assert project.gate == rt.project.Gate({"T1": 0.1, "default": 0.05}, "pass")
+    assert project.diagnose and not project.session_gain
 
 
 def test_every_key_is_documented() -> None:
     page = PAGE.read_text(encoding="utf-8")
     tables = rt.project._schema._File.model_fields
-    keys = [key for table in tables.values() for key in table.annotation.model_fields]
+    kinds = [next(iter(get_args(table.annotation)), table.annotation) for table in tables.values()]
+    keys = [key for kind in kinds for key in kind.model_fields]
     assert len(keys) > 10
     assert not [key for key in keys if not re.search(rf"^(?:{key} = |\[\w+\.{key}\])", page, re.M)]
 
@@ -114,6 +122,12 @@ def changed(old: str, new: str) -> str:
     (PROJECT + "setpoint = { m1 = 283.15 }\n", ["setpoint.m1", "283.15", "kelvin"]),
     (PROJECT + "ambient = { room = [290.0, 300.0] }\n", ["ambient.room", "290", "kelvin"]),
     (PROJECT + 'method = "magic"\n', ["certify.method", "magic", "energy"]),
+    (PROJECT + 'parameters = "guess"\n', ["certify.parameters", "guess"]),
+    (PROJECT + 'set = "ball"\n', ["certify.set", "ball", "ellipsoid"]),
+    (PROJECT + '[gate]\ntolerance = { T7 = 0.1 }\n', ["[gate] tolerance", "T7", "T1"]),
+    (PROJECT + '[gate]\ntolerance = -0.1\n', ["gate.tolerance", "-0.1"]),
+    (PROJECT + '[gate]\nconfidence = 95.0\n', ["gate.confidence", "95"]),
+    (PROJECT + '[gate]\nremarks = "shrug"\n', ["gate.remarks", "shrug"]),
     (PROJECT + '[calibrate]\nloss = "magic"\n', ["calibrate.loss", "magic", "soft_l1"]),
     (PROJECT + '[calibrate.parameters]\n"links.a-b.conductance" = { lower = 0.0, upper = 1.0 }\n',
      ["[calibrate.parameters]", "links.a-b.conductance"]),
