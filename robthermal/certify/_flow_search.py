@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._conic import Inequality, inside
+from ..conic import Inequality, inside
 from ._flow import Case, Channel
 
 Array = NDArray[np.floating[Any]]
