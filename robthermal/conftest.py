@@ -5,6 +5,11 @@ from pathlib import Path
 
 import pytest
 
+# Loaded as Python loads them: pytest, which imports file by file, would set the submodules `effects` and `diagnose` in
+# the place of the functions of the same name.
+import robthermal.diagnosis
+import robthermal.thermal  # noqa: F401
+
 os.environ["MPLBACKEND"] = "Agg"  # read when matplotlib is first imported
 
 

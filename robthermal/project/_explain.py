@@ -11,10 +11,8 @@ from difflib import get_close_matches
 from .. import errors
 from ..diagnosis import Effect, Quantity, effects
 from ..errors import InputError
-from ..thermal import effects as effect_kinds
 from ..verification._kinds import KINDS
 from ._assumptions import ARITHMETIC, kind_assumptions
-from ._meanings import EFFECT_MEANINGS
 from ._outcomes import Said, outcome_codes
 
 _PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency"), "linear_certificates")}
@@ -117,12 +115,11 @@ def _all(name: str) -> Iterator[Explanation]:
 
 
 def _effect(effect: Effect) -> Explanation:
-    kind = effect_kinds().get(effect.name)
-    details = {"Acts on": kind.where if kind else (), "Quantities": tuple(map(_quantity, effect.quantities)),
+    details = {"Acts on": effect.where, "Quantities": tuple(map(_quantity, effect.quantities)),
                "Confused with": tuple(f"{name}, at another place" if name == effect.name else name
                                       for name in effect.confused_with),
                "Told apart by": (effect.separated_by,) if effect.separated_by else ()}
-    return Explanation(effect.name, "effect", (EFFECT_MEANINGS.get(effect.name, "An effect of your own."),),
+    return Explanation(effect.name, "effect", (effect.meaning,),
                        {heading: texts for heading, texts in details.items() if texts},
                        "docs/explanations/effects.md")
 

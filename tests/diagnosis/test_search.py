@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from robthermal.diagnosis.effects._effect import Candidate
 
 import robthermal as rt
-from robthermal.diagnosis.effects._effect import Candidate
 from robthermal.diagnosis.evidence._score import Scores, columns, explains
 from robthermal.diagnosis.fit._descent import Point, descend
 from robthermal.diagnosis.fit._refit import Refit

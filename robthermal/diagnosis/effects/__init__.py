@@ -1,14 +1,14 @@
-"""Effects that a model may lack: what they are, where they act, how they would show."""
+"""Candidate effects of a diagnosis; the effects themselves are in `robthermal.thermal.effects`."""
 
-from ._catalogue import candidates as candidates
-from ._catalogue import effects as effects
-from ._catalogue import forget_effect as forget_effect
-from ._catalogue import register_effect as register_effect
-from ._effect import Candidate as Candidate
-from ._effect import Effect as Effect
-from ._effect import Quantity as Quantity
-from ._response import Response as Response
-from ._response import Seen as Seen
+from ...thermal.effects import Effect as Effect
+from ...thermal.effects import Quantity as Quantity
+from ...thermal.effects import Response as Response
+from ...thermal.effects import TrialContext as TrialContext
+from ...thermal.effects import effects as effects
+from ...thermal.effects import forget_effect as forget_effect
+from ...thermal.effects import register_effect as register_effect
+from ._candidate import Candidate as Candidate
+from ._candidate import candidates as candidates
 
-__all__ = ["Candidate", "Effect", "Quantity", "Response", "Seen", "candidates", "effects", "forget_effect",
+__all__ = ["Candidate", "Effect", "Quantity", "Response", "TrialContext", "candidates", "effects", "forget_effect",
            "register_effect"]

@@ -20,11 +20,6 @@ Array = NDArray[np.float64]
 _STEP = 1e-4  # relative; the differences below are of second order
 _MOST_SPLINES = 8
 _PROBE = "extra heat"
-_CONSTANT = "constant in time: a frequency response does not show it"
-_ALTERED = "not linear and time-invariant: a frequency response does not show it"
-INVISIBLE = {"heat_source": _CONSTANT, "ambient_gradient": _CONSTANT, "sensor_self_heating": _CONSTANT,
-             "sensor_offset": _CONSTANT, "periodic_load": _ALTERED, "conductance_step": _ALTERED,
-             "condensation": _ALTERED, "hysteresis": _ALTERED}
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +105,7 @@ def along_response(system: System, one: ResponseData) -> AlongResponse:
 
 def hidden_from_response(system: System, candidate: Candidate) -> str:
     """Why a frequency response cannot show an effect; empty if it can."""
-    if candidate.effect.name == "input_offset" and candidate.where[0] in system.inputs:
-        return _CONSTANT
-    if candidate.effect.size.name == "clip":
-        return _ALTERED
-    return INVISIBLE.get(candidate.effect.name, "")
+    return candidate.effect.hidden(system, candidate.where)
 
 
 def response_slopes(model: Callable[[Array], Array], v: Array, steps: Array, bounds: tuple[Array, Array]) -> Array:

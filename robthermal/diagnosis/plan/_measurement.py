@@ -9,22 +9,6 @@ from ..._fitting import Ranges
 from ..effects import Candidate
 
 _ACCURACY = {"resistance.value": 0.005, "seebeck.value": 0.01}  # four-wire at a known temperature; open-circuit voltage
-_INSTEAD = {
-    "ambient_gradient": "a second ambient sensor beside {0}",
-    "heat_source": "switch off what could heat {0}, or a heat-flux sensor there",
-    "sensor_self_heating": "read {0} with another excitation current",
-    "sensor_offset": "compare {0} with a reference thermometer in an isothermal soak",
-    "sensor_gain": "compare {0} with a reference thermometer at two temperatures",
-    "input_offset": "measure the current or power of {0} itself",
-    "input_gain": "measure the current or power of {0} itself",
-    "input_delay": "record the current or power of {0} itself, sampled faster",
-    "input_lag": "record the current or power of {0} itself, sampled faster",
-    "joule_split": "measure the voltage of {0}: it gives its resistance alone",
-    "resistance_slope": "measure the voltage of {0}: it gives its resistance alone",
-    "lead_heating": "measure the voltage across the leads of {1} and across {1} alone",
-    "thomson": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
-    "seebeck_slope": "measure the voltage of {0} at zero current: it gives its Seebeck coefficient alone",
-}
 
 
 @dataclass(frozen=True)
@@ -61,8 +45,7 @@ def instead(candidates: Iterable[Candidate]) -> str:
 
 
 def _instead(candidate: Candidate) -> str:
-    said = _INSTEAD.get(candidate.effect.name, "")
-    return said.format(*candidate.where) if said else candidate.effect.separated_by
+    return candidate.effect.measure.format(*candidate.where) or candidate.effect.separated_by
 
 
 def most_telling(worth: Mapping[Measurement, float], least: float) -> Measurement | None:

@@ -1,27 +1,23 @@
-"""Effect: one kind of physics that a model may lack, and how it would show."""
+"""Effect: one kind of physics that a model may lack, all that is known about it in one object."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import product
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from ...errors import InputError
-from ...thermal import System
-from ._response import Response, Seen
+from .._system import System
+from ._builders import Builder
+from ._response import Signature, Values, Where
 
-if TYPE_CHECKING:
-    from ..path import Along
+Add = Callable[[System, Where, Values], System]
+Grid = tuple[float, ...] | Callable[[Any, Where], Sequence[float]]  # of a `TrialContext`, or a `RecordContext`
+LAST = 10_000  # place in the catalogue of an effect that asks for none
 
-Array = NDArray[np.float64]
-Where = tuple[str, ...]
-Add = Callable[[System, Where, Mapping[str, float]], System]
-Grid = tuple[float, ...] | Callable[[Any, Where], Sequence[float]]  # of an `Along` or `AlongResponse`
-Signature = Callable[["Along", Where, Mapping[str, float]], Response]
+
+def _visible(system: System, where: Where) -> str:
+    return ""
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ class Quantity:
     lower, upper : float
         What is physically possible; the same number twice: known.
     grid : tuple of float or callable
-        Values tried when candidates are scored, or ``grid(along, where)`` that finds them. For a size it is empty if
+        Values tried when candidates are scored, or ``grid(record, where)`` that finds them. For a size it is empty if
         the readings are nearly linear in it.
     typical : float
         Size that is certainly small enough to be linear, for effects without a signature of their own.
@@ -57,12 +53,12 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Effect:
-    """One kind of missing physics. Make your own, then pass it to `register_effect`.
+    """One kind of missing physics. Make your own, then pass it to `rt.diagnosis.register_effect`.
 
     Parameters
     ----------
     name : str
-        As in ``diagnosis.json``.
+        Name as in ``diagnosis.json``.
     places : callable
         System to the `where` tuples at which the effect is possible and not yet present.
     quantities : tuple of Quantity
@@ -70,14 +66,31 @@ class Effect:
     add : callable
         ``add(system, where, values)`` returns the system with the effect; `values` has every quantity.
     signature : callable, optional
-        ``signature(along, where, values)`` returns the `Response` of the readings per unit of the size, linearised
+        ``signature(record, where, values)`` returns the `Response` of the readings per unit of the size, linearized
         along the simulated record. Default: a small effect is added and the record simulated again (slower).
     confused_with : tuple of str
         Effects with a similar signature.
     separated_by : str
-        The excitation that tells them apart.
+        The excitation that separates them.
     paired : str
         An angle among the quantities, with the grid (0, π/2): any other is a combination of these two.
+    where : tuple of str
+        Kinds of the parts that it names, in order: "module", "lump", "ambient", "link", "sensor", "input", or
+        "input or module"; empty for an effect of your own.
+    meaning : str
+        One sentence that says what physics it is.
+    measure : str
+        What to measure instead where no input separates it; ``{0}`` stands for the first part of `where`.
+    nonnegative : tuple of str
+        Quantities that a system refuses below zero.
+    units : mapping
+        Units of quantities that are more general in a system than in the search.
+    hidden : callable
+        ``hidden(system, where)`` says why a frequency response cannot show the effect; empty if it can.
+    forms : tuple of Effect
+        Further forms of the same effect under the same name.
+    rank : int
+        Place in the catalogue: of effects whose signatures are the same, the first is named.
 
     Examples
     --------
@@ -92,16 +105,26 @@ class Effect:
     ...     confused_with=("sensor_lag",), separated_by="frequencies above 0.3/delay")
     >>> late.size.unit
     's'
+    >>> rt.thermal.effects()["lead_heating"].where
+    ('lump', 'module')
     """
 
     name: str
     places: Callable[[System], Iterable[Where]]
     quantities: tuple[Quantity, ...]
-    add: Add
+    add: Add | Builder
     signature: Signature | None = None
     confused_with: tuple[str, ...] = ()
     separated_by: str = ""
     paired: str = ""
+    where: tuple[str, ...] = field(default=(), kw_only=True)
+    meaning: str = field(default="An effect of your own.", kw_only=True)
+    measure: str = field(default="", kw_only=True)
+    nonnegative: tuple[str, ...] = field(default=(), kw_only=True)
+    units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    hidden: Callable[[System, Where], str] = field(default=_visible, kw_only=True)
+    forms: tuple[Effect, ...] = field(default=(), kw_only=True)
+    rank: int = field(default=LAST, kw_only=True)
 
     @property
     def size(self) -> Quantity:
@@ -113,79 +136,36 @@ class Effect:
         """Quantities that a refit estimates."""
         return tuple(q for q in self.quantities if q.lower < q.upper)
 
+    @property
+    def all_forms(self) -> Iterator[Effect]:
+        """The effect, then its further forms."""
+        yield self
+        yield from self.forms
 
-@dataclass(frozen=True)
-class Candidate:
-    """An effect at a place, with trial values of the quantities that shape it.
+    @property
+    def parameters(self) -> dict[str, str]:
+        """Quantity of any form to its unit."""
+        return {q.name: self.units.get(q.name, q.unit) for form in self.all_forms for q in form.quantities}
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """Quantities that are zero when the effect is absent (a clip: when it is left out), one per form."""
+        return tuple(form.size.name for form in self.all_forms)
+
+
+def check_effect(effect: Effect) -> None:
+    """Refuse an effect that cannot work.
 
     Parameters
     ----------
     effect : Effect
-        What.
-    where : tuple of str
-        Parts of the system it acts on.
-    shape : dict
-        Trial values of the quantities that have a grid.
+        Effect of a user.
+
+    Raises
+    ------
+    InputError
+        Not an effect, no quantity, a quantity without trial values, a size that cannot be zero.
     """
-
-    effect: Effect
-    where: Where
-    shape: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def key(self) -> tuple[str, Where]:
-        """What makes two candidates the same name."""
-        return self.effect.name, self.where
-
-    @property
-    def label(self) -> str:
-        """For tables: ``sensor_lag(T6)``."""
-        return f"{self.effect.name}({', '.join(self.where)})"
-
-    def add(self, system: System, size: float) -> System:
-        """System with this effect at its trial values.
-
-        Parameters
-        ----------
-        system : System
-            Without it.
-        size : float
-            Value of the effect's first quantity.
-
-        Returns
-        -------
-        System
-        """
-        return self.effect.add(system, self.where, {**self.shape, self.effect.size.name: size})
-
-    def trials(self, path: Seen) -> list[Candidate]:
-        """The same with every combination of trial values, for one record.
-
-        Parameters
-        ----------
-        path : Along or AlongResponse
-            Simulated record, or frequency response.
-
-        Returns
-        -------
-        list of Candidate
-        """
-        gridded = [q for q in self.effect.quantities if q.grid]
-        values = [_possible(q, q.grid(path, self.where) if callable(q.grid) else q.grid, path) for q in gridded]
-        return [replace(self, shape=dict(zip([q.name for q in gridded], combination, strict=True)))
-                for combination in product(*values)]
-
-
-def _possible(quantity: Quantity, grid: Sequence[float], path: Seen) -> list[float]:
-    """Trial values; times only if the record can resolve them."""
-    if quantity.unit != "s" or callable(quantity.grid):
-        return list(grid)
-    longest = path.span / 3
-    return [value for value in grid if path.h / 2 <= value <= longest]
-
-
-def check_effect(effect: Effect) -> None:
-    """Refuse an effect that cannot work."""
     if not isinstance(effect, Effect):
         raise InputError(f"effect is a {type(effect).__name__}", where="argument effect",
                          expected="a robthermal.diagnosis.Effect")

@@ -1,0 +1,132 @@
+"""Candidates: every effect of the catalogue at every place of a system where it is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+from ...errors import InputError
+from ...thermal import System
+from ...thermal.effects import Effect, Quantity, TrialContext, effects
+
+Where = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place, with trial values of the quantities that shape it.
+
+    Parameters
+    ----------
+    effect : Effect
+        What.
+    where : tuple of str
+        Parts of the system it acts on.
+    shape : dict
+        Trial values of the quantities that have a grid.
+    """
+
+    effect: Effect
+    where: Where
+    shape: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, Where]:
+        """What makes two candidates the same name."""
+        return self.effect.name, self.where
+
+    @property
+    def label(self) -> str:
+        """For tables: ``sensor_lag(T6)``."""
+        return f"{self.effect.name}({', '.join(self.where)})"
+
+    def add(self, system: System, size: float) -> System:
+        """System with this effect at its trial values.
+
+        Parameters
+        ----------
+        system : System
+            Without it.
+        size : float
+            Value of the effect's first quantity.
+
+        Returns
+        -------
+        System
+        """
+        return self.effect.add(system, self.where, {**self.shape, self.effect.size.name: size})
+
+    def trials(self, context: TrialContext) -> list[Candidate]:
+        """The same with every combination of trial values, for one record.
+
+        Parameters
+        ----------
+        context : TrialContext
+            Simulated record, or frequency response at its steady state.
+
+        Returns
+        -------
+        list of Candidate
+        """
+        gridded = [q for q in self.effect.quantities if q.grid]
+        values = [_possible(q, q.grid(context, self.where) if callable(q.grid) else q.grid, context) for q in gridded]
+        return [replace(self, shape=dict(zip([q.name for q in gridded], combination, strict=True)))
+                for combination in product(*values)]
+
+
+def _possible(quantity: Quantity, grid: Sequence[float], context: TrialContext) -> list[float]:
+    """Trial values; times only if the record can resolve them."""
+    if quantity.unit != "s" or callable(quantity.grid):
+        return list(grid)
+    longest = context.span / 3
+    return [value for value in grid if context.h / 2 <= value <= longest]
+
+
+def chosen_effects(names: Iterable[str] | None) -> list[Effect]:
+    """Effects by name in all their forms; all of them by default."""
+    known = effects()
+    names = list(known) if names is None else list(names)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InputError(f"there is no effect {unknown[0]!r}", where="argument effects",
+                         expected="some of " + ", ".join(known),
+                         remedy="Register your own with robthermal.diagnosis.register_effect.")
+    return [form for name in names for form in known[name].all_forms]
+
+
+def candidates(system: System, names: Iterable[str] | None = None) -> list[Candidate]:
+    """Every effect at every place where it is possible.
+
+    Parameters
+    ----------
+    system : System
+        Nominal.
+    names : iterable of str, optional
+        Effects; default all.
+
+    Returns
+    -------
+    list of Candidate
+        Without trial values; scoring tries the grid of each.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> found = rt.diagnosis.candidates(rt.systems.two_module(), ["thomson", "seebeck_slope"])
+    >>> [candidate.label for candidate in found if candidate.effect.name == "seebeck_slope"]
+    ['seebeck_slope(m1)', 'seebeck_slope(m2)']
+    """
+    return [Candidate(_with_units(effect, system, tuple(where)), tuple(where))
+            for effect in chosen_effects(names) for where in effect.places(system)]
+
+
+def _with_units(effect: Effect, system: System, where: tuple[str, ...]) -> Effect:
+    """With the unit of the column it acts on, where that is known: A of a module, W of a heater with gain 1."""
+    heater = system.inputs.get(where[0]) if where else None
+    unit = "A" if where and where[0] in system.modules else "W" if heater is not None and heater.gain == 1.0 else "unit"
+    if unit == "unit" or not any("unit" in quantity.unit for quantity in effect.quantities):
+        return effect
+    return replace(effect, quantities=tuple(replace(quantity, unit=quantity.unit.replace("unit", unit))
+                                            for quantity in effect.quantities))
+

@@ -1,0 +1,46 @@
+"""A heat into a lump that comes and goes with a fixed period."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._builders import subtable
+from ._effect import Effect, Quantity
+from ._places import lumps_without
+from ._response import RecordContext, Response, TrialContext, Values, Where
+from ._signatures import altered, into
+
+_FASTEST = 30  # periods in a record: faster ones are left to the whiteness test
+_add = subtable("lumps", "periodic", ("heat", "period", "phase"), period=600.0, phase=0.0)
+
+
+def _periods(context: TrialContext, where: Where) -> list[float]:
+    """Half a cycle of the whole record apart: closer ones are the same to it (Davies 1977)."""
+    length = len(context.x) * context.h
+    return [length / (0.5 * halves) for halves in range(3, 2 * _FASTEST)]
+
+
+def _sine(record: RecordContext, where: Where, values: Values) -> Response:
+    """A sine of one watt."""
+    rate = 2.0 * np.pi / values["period"]
+    return into(record, {where[0]: (np.sin(rate * record.time + values["phase"]),
+                                    np.sin(rate * (record.time + record.h) + values["phase"]))})
+
+
+EFFECT = Effect(
+    name="periodic_load",
+    rank=160,
+    meaning="A heat into a lump that comes and goes with a fixed period.",
+    where=("lump",),
+    places=lumps_without("periodic"),
+    quantities=(Quantity("heat", "W", 0.0, 1e3),
+                Quantity("period", "s", 1e-3, 1e9, grid=_periods),
+                Quantity("phase", "rad", -20.0, 20.0, grid=(0.0, np.pi / 2))),
+    nonnegative=("period",),
+    add=_add,
+    signature=_sine,
+    paired="phase",
+    hidden=altered,
+    confused_with=("hidden_mass",),
+    separated_by="a longer record",
+)
