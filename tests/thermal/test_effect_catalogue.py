@@ -61,7 +61,7 @@ def test_one_file_is_a_new_effect(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "toy_draught.py").write_text(TOY)
     package = importlib.import_module("robthermal.thermal.effects")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
-    monkeypatch.setattr("robthermal.thermal.effects._catalogue._BUILT_IN", {})
+    monkeypatch.setattr(sys.modules["robthermal.thermal.effects._catalogue"], "_BUILT_IN", {})
     try:
         assert list(rt.thermal.effects())[0] == "toy_draught" and len(rt.diagnosis.effects()) == len(ORDER) + 1
         added = rt.thermal.add_effect(bar(), "toy_draught", ["bar"], {"heat": -1.0})
