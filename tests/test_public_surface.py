@@ -77,7 +77,7 @@ SURFACE = {
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module
     """,
     "thermal": """
-        AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive Effect EffectKind Equations Equilibrium
+        AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
         Feedthrough FitRange Hysteresis Input Layer Lead Linear Link LoadCurve Lump Material MatrixImport Module
         ModuleParameters Natural Periodic PolynomialFit Polynomials Reduction Sensor SteadyState Step Stepper
         System Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from ..diagnosis import Along, Diagnosis, diagnose
-from ..diagnosis.path._frequency_model import AlongResponse
+from ..diagnosis.path import AlongResponse
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..signals import Record

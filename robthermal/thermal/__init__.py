@@ -55,16 +55,15 @@ from ._steady import steady_state as steady_state
 from ._stepping import Stepper as Stepper
 from ._system import System as System
 from .effects import AddedEffect as AddedEffect
-from .effects import Effect as Effect
-from .effects import Effect as EffectKind  # its name until 0.1
+from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Effect`
 from .effects import add_effect as add_effect
 from .effects import effects as effects
 
-__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "Effect",
-           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer",
-           "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters",
-           "Natural", "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step",
-           "Stepper", "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
+           "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
+           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
+           "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
+           "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
            "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
            "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
            "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_modelica", "write_system"]

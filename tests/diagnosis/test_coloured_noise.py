@@ -14,7 +14,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import robthermal as rt
-from robthermal._fitting._data import Data, as_data
+from robthermal.diagnosis.data import RecordData, as_measured
 from robthermal.diagnosis.fit._levels import Levels, refined, with_slow_part
 from robthermal.diagnosis.path._along import Along, along
 from robthermal.diagnosis.path._whitening import SlowNoise, settled_cost, whitener
@@ -39,7 +39,7 @@ def bar() -> rt.System:
 def at_rest(system: rt.System, n: int = N) -> Along:
     record = rt.Record(sample_time=H, inputs=np.full(n, 300.0), outputs=np.full((n, 1), 300.0), input_names=["room"],
                        output_names=["T"])
-    return along(system, as_data(system, record, "records")[0])
+    return along(system, as_measured(system, record, "records")[0])
 
 
 def dense(heat: Array, n: int) -> Array:
@@ -71,7 +71,7 @@ def test_a_missing_reading_counts_for_nothing(bar: rt.System) -> None:
     path = at_rest(bar)
     missing = np.zeros((N, 1), bool)
     missing[40] = True
-    path = replace(path, one=Data(path.one.record, path.one.sensors, path.one.columns, path.one.readings, missing))
+    path = replace(path, one=RecordData(path.one.record, path.one.sensors, path.one.columns, path.one.readings, missing))
     r = np.repeat(np.random.default_rng(0).standard_normal((N, 1, 1)), 2, axis=2)
     r[40, 0, 1] += 7.0
     z = whitener(path, NOISE, np.zeros(1), SLOW)(r)
@@ -102,7 +102,7 @@ def test_levels_keep_and_say_the_slow_part(bar: rt.System) -> None:
     path = at_rest(bar, 800)
     r = 0.02 * np.random.default_rng(3).standard_normal((800, 1))
     one = coloured(path.one.record.with_outputs(path.readings + r), 0.01, 4)
-    path = replace(path, one=as_data(bar, one, "records")[0])
+    path = replace(path, one=as_measured(bar, one, "records")[0])
     floor = rt.diagnosis.noise_floor(bar, one)
     floor = replace(floor, disturbance={"bar": 0.0})
     levels = with_slow_part([path], floor, Levels(1.0, {}))

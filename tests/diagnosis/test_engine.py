@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal._fitting._data import as_data
+from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.data._glitches import outliers
 from robthermal.diagnosis.fit._descent import descend
 from robthermal.diagnosis.fit._refitting import extended
@@ -211,7 +211,7 @@ def test_a_missing_reading_counts_for_nothing(plant: rt.System, hide: Hide) -> N
     # Any value at the place of a missing reading gives the same innovations everywhere else.
     moving = plant.model_copy(update={"lumps": {name: lump.model_copy(update={"disturbance": 0.05})
                                                 for name, lump in plant.lumps.items()}})
-    one = as_data(moving, hide(n=100)[0], "records")[0]
+    one = as_measured(moving, hide(n=100)[0], "records")[0]
     missing = np.zeros(one.readings.shape, bool)
     missing[40, 0] = True
     path = along(moving, type(one)(one.record, one.sensors, one.columns, one.readings, missing))

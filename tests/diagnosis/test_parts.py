@@ -11,8 +11,7 @@ import pytest
 from scipy.optimize import lsq_linear, nnls
 
 import robthermal as rt
-from robthermal._fitting._data import as_data
-from robthermal.diagnosis.evidence import _score
+from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.fit._descent import descend
 from robthermal.diagnosis.path._along import Along, along
 from robthermal.diagnosis.path._whitening import gathered, whitener
@@ -38,7 +37,7 @@ def path(cooler: rt.System) -> Along:
                                    298.15 + rng.normal(0.0, 1.0, 12)]), 12, axis=0)
     record = rt.Record(sample_time=2.0, inputs=u, outputs=np.full((144, 2), 298.15),
                        input_names=["heater", "m1", "room"], output_names=["Tc", "Th"])
-    return along(cooler, as_data(cooler, record, "records")[0])
+    return along(cooler, as_measured(cooler, record, "records")[0])
 
 
 def test_catalogue_is_the_contract() -> None:
@@ -86,7 +85,7 @@ def test_noise_gathered_in_a_sample_of_one_lump() -> None:
                     links=[{"between": ("bar", "room"), "conductance": 2.0}], sensors={"T": {"lump": "bar"}})
     record = rt.Record(sample_time=3.0, inputs=np.full(4, 300.0), outputs=np.full((4, 1), 300.0), input_names=["room"],
                        output_names=["T"])
-    Q = gathered(along(bar, as_data(bar, record, "records")[0]), np.array([0.7]))
+    Q = gathered(along(bar, as_measured(bar, record, "records")[0]), np.array([0.7]))
     exact = (0.7 / 10.0) ** 2 * (1 - np.exp(-2 * 0.2 * 3.0)) / (2 * 0.2)
     assert Q[0, 0, 0] == pytest.approx(exact, rel=1e-6)
 
@@ -98,7 +97,7 @@ def test_signature_is_the_derivative_of_the_simulation(path: Along, name: str) -
         trials = candidate.trials(path)
         trial = trials[len(trials) // 2]
         step = trial.shape.get(trial.effect.size.name, trial.effect.size.typical)
-        linear = _score.columns(path, [trial])[..., 0]
+        linear = path.columns([trial])[..., 0]
         added = rt.thermal.trajectory(trial.add(path.system, step), path.one.record, tolerance=1e-7).readings
         without = rt.thermal.trajectory(path.system, path.one.record, tolerance=1e-7).readings
         true = (added - without) / step
@@ -158,7 +157,7 @@ def test_scores_of_noise_follow_their_distribution(plant: rt.System, hide: Calla
     rng = np.random.default_rng(11)
     tested = rt.diagnosis.candidates(fit.system, ["missing_ambient_link", "sensor_offset", "sensor_gain", "heat_source",
                                                   "natural_convection"])
-    J = fit.project(fit.whiten([_score.columns(path, [c.trials(path)[0] for c in tested]) for path in fit.paths]))
+    J = fit.project(fit.whiten([path.columns([c.trials(path)[0] for c in tested]) for path in fit.paths]))
     J /= np.linalg.norm(J, axis=0)
     z = fit.project(rng.standard_normal((J.shape[0], 400)))
     T = (J.T @ z) ** 2 / (np.sum(z**2, axis=0) / fit.degrees_of_freedom)

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from robthermal.diagnosis.effects._effect import Candidate
 
 import robthermal as rt
-from robthermal.diagnosis.evidence._score import Scores, columns, explains
+from robthermal.diagnosis.effects import Candidate
+from robthermal.diagnosis.evidence._score import Scores, explains
 from robthermal.diagnosis.fit._descent import Point, descend
 from robthermal.diagnosis.fit._refit import Refit
 from robthermal.diagnosis.fit._refitting import extended
@@ -92,7 +92,7 @@ def test_the_phase_of_a_load_is_that_of_least_squares(plant: rt.System, convecte
     assert len(scores.candidates) == 2
     for i, found in enumerate(scores.candidates):
         pair = [replace(found, shape={**found.shape, "phase": phase}) for phase in (0.0, np.pi / 2)]
-        both = fit.whiten([columns(path, pair) for path in fit.paths])
+        both = fit.whiten([path.columns(pair) for path in fit.paths])
         sine, cosine = np.linalg.lstsq(np.column_stack([both, fit.J]), fit.z, rcond=None)[0][:2]
         assert np.angle(np.exp(1j * (found.shape["phase"] - np.arctan2(cosine, sine)))) == pytest.approx(0.0, abs=1e-6)
         assert scores.size[i] == pytest.approx(np.hypot(sine, cosine), rel=1e-6)

@@ -64,7 +64,7 @@ def test_derivatives_by_session_gains_are_those_of_the_simulation(plant: rt.Syst
     for k, own in ((v.size - 2, 0), (v.size - 1, 1)):
         moved = v.copy()
         moved[k] += step
-        before, after = structure.runs(v), structure.runs(moved)
+        before, after = structure.paths(v), structure.paths(moved)
         change = -(after[own].residual - before[own].residual) / step
         slopes = structure.slopes(v)
         assert np.allclose(slopes[own][..., k], change, rtol=1e-2, atol=1e-3 * np.abs(change).max())

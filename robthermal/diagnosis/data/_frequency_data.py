@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Data, OperatingPoint, as_data, sampled_response
+from ..._fitting import Initial, OperatingPoint, Start, sampled_response
 from ...errors import Diverged, InputError
 from ...identify import FrequencyResponse
-from ...signals import Record
 from ...thermal import System
+from ..effects import Candidate
 from ._frequency_whitening import ResponseWhitener, as_complex, as_real, kept_bins, response_whitener
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Measured = Record | FrequencyResponse
+NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,32 @@ class ResponseData:
     def label(self) -> str:
         """Name for tables."""
         return f"response ({self.response.method})"
+
+    @property
+    def missing(self) -> None:
+        """No reading is missing: bins that cannot be used are left out."""
+        return None
+
+    @property
+    def n_sessions(self) -> int:
+        """A response has no input gains of its own."""
+        return 0
+
+    def initial(self, system: System, start: Start) -> Initial:
+        """As `DataSet.initial`: none."""
+        return NO_START
+
+    def started(self, system: System, temperatures: Array) -> System:
+        """As `DataSet.started`: the system as it is."""
+        return system
+
+    def hides(self, system: System, candidate: Candidate) -> str:
+        """As `DataSet.hides`: what is constant, or not linear and time-invariant."""
+        return candidate.effect.hidden(system, candidate.where)
+
+    def without_outliers(self, system: System, noise: Mapping[str, float]) -> ResponseData:
+        """As `DataSet.without_outliers`: the estimate has averaged them."""
+        return self
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -114,9 +140,9 @@ class ResponseData:
         Parameters
         ----------
         system : System
-            With any lumps.
+            System with any lumps.
         inputs : tuple of str, optional
-            Other inputs of it.
+            Inputs of the system instead of those of the response.
 
         Returns
         -------
@@ -149,32 +175,6 @@ class ResponseData:
             last = np.array([known.get(name, room) for name in names]) if self._points else None
             self._points[names] = OperatingPoint(self.operating_point, last)
         return self._points[names]
-
-
-def as_measured(system: System, data: Measured | Sequence[Measured], where: str,
-                operating_point: Mapping[str, float] | None = None) -> list[Data | ResponseData]:
-    """Check records and frequency responses, records first."""
-    items = [data] if isinstance(data, Record | FrequencyResponse) else data
-    if not isinstance(items, Sequence) or not any(isinstance(item, FrequencyResponse) for item in items):
-        if operating_point is not None and where == "records":  # records may validate what responses taught
-            raise InputError("operating_point is given with records", where="argument operating_point",
-                             remedy="Leave it out: a record brings its own inputs.")
-        return list(as_data(system, _records(data, where), where))
-    records = [item for item in items if not isinstance(item, FrequencyResponse)]
-    responses = [item for item in items if isinstance(item, FrequencyResponse)]
-    checked: list[Data | ResponseData] = list(as_data(system, _records(records, where), where)) if records else []
-    return checked + [response_data(system, G, where, operating_point or {}) for G in responses]
-
-
-def _records(data: Measured | Sequence[Measured], where: str) -> Sequence[Record]:
-    """Say what is wrong with a response that is only numbers."""
-    for item in data if isinstance(data, list | tuple) else [data]:
-        if not isinstance(item, Record) and (hasattr(item, "frdata") or isinstance(item, np.ndarray)):
-            raise InputError(f"{where} holds a {type(item).__name__}, a response without covariance",
-                             where=f"argument {where}", expected="a Record or a FrequencyResponse",
-                             remedy="Estimate the response with rt.identify.lpm or lrmp: without its covariance no "
-                                    "misfit can be called large.")
-    return data  # type: ignore[return-value]  # what else is wrong `as_data` says
 
 
 def response_data(system: System, G: FrequencyResponse, where: str, operating_point: Mapping[str, float]

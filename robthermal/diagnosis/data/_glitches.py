@@ -7,7 +7,7 @@ is called a spike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ..._fitting import Data, residual
 from ...errors import Diverged, InputError
 from ...thermal import System, trajectory
-from ._frequency_data import ResponseData
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,29 +28,12 @@ _PASSES = 5
 MOST = 0.05
 
 
-def without_glitches(system: System, data: Sequence[Data | ResponseData], noise: Mapping[str, float]
-                     ) -> list[Data | ResponseData]:
-    """Records with their isolated outliers marked as missing, and interpolated for display.
-
-    Parameters
-    ----------
-    system : System
-        Nominal; its simulation is subtracted before outliers are looked for.
-    data : sequence of Data or ResponseData
-        Records; frequency responses are left as they are.
-    noise : mapping
-        Standard deviation of every sensor [K].
-    """
-    return [_cleaned(system, one, np.array([noise[name] for name in one.sensors])) if isinstance(one, Data) else one
-            for one in data]
-
-
-def counted(data: Sequence[Data | ResponseData]) -> dict[str, int]:
+def counted(data: Sequence[Data]) -> dict[str, int]:
     """Number of outliers of every sensor that has any; refuse more than a few per cent."""
     readings: dict[str, int] = {}
     found: dict[str, int] = {}
     for one in data:
-        if isinstance(one, Data) and one.missing is not None:
+        if one.missing is not None:
             for name, n in zip(one.sensors, one.missing.sum(axis=0).tolist(), strict=True):
                 found[name] = found.get(name, 0) + n
                 readings[name] = readings.get(name, 0) + len(one.missing)
@@ -63,7 +45,18 @@ def counted(data: Sequence[Data | ResponseData]) -> dict[str, int]:
     return {name: n for name, n in found.items() if n}
 
 
-def _cleaned(system: System, one: Data, noise: Array) -> Data:
+def cleaned(system: System, one: Data, noise: Array) -> Data:
+    """The record with its isolated outliers marked as missing, and interpolated for display.
+
+    Parameters
+    ----------
+    system : System
+        Nominal model; its simulation is subtracted before outliers are looked for.
+    one : Data
+        Record with its readings.
+    noise : ndarray, shape (n_sensors,)
+        Standard deviation of every sensor [K].
+    """
     try:
         model = np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
     except Diverged:  # the refit will say so

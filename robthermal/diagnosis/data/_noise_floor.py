@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..._fitting import SMALLEST, Data, declared_noise, quantum
 from ...errors import InputError, Outcome
 from ...thermal import System
-from ._frequency_data import Measured, ResponseData, as_measured
-from ._glitches import counted, without_glitches
+from ._glitches import counted
+from ._measured import Measured, as_measured, records_of, responses_of
 
 Array = NDArray[np.float64]
 _SHORTEST = 50  # samples
@@ -110,9 +110,9 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     ('estimated', 0.02)
     """
     measured = as_measured(system, records, "records", operating_point)
-    relative = {name: float(level) for one in measured if isinstance(one, ResponseData)
+    relative = {name: float(level) for one in responses_of(measured)
                 for name, level in zip(one.sensors, one.noise, strict=True)}
-    data = [one for one in measured if isinstance(one, Data)]
+    data: list[Data] = [*records_of(measured)]
     if not data and noise is not None:
         raise InputError("noise is given with a frequency response", where="argument noise",
                          remedy="Leave it out: the response brings its covariance.")
@@ -126,7 +126,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     _refuse_invisible({name: rough[name] for name in unknown})
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
-    glitches = counted(without_glitches(system, data, noise_of))
+    glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
     return NoiseFloor({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
                       _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
 

@@ -15,7 +15,6 @@ from ._locate import locate as locate
 from ._score import ALPHA as ALPHA
 from ._score import BIC_GAP as BIC_GAP
 from ._score import Scores as Scores
-from ._score import columns as columns
 from ._score import explains as explains
 from ._score import promised as promised
 from ._score import promising as promising
@@ -25,5 +24,5 @@ from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Gap", "HoldOut", "Location", "Scores", "UnknownHeat",
-           "ValidationResiduals", "adequacy", "columns", "expected_rms", "explains", "hold_out", "locate", "promised",
+           "ValidationResiduals", "adequacy", "expected_rms", "explains", "hold_out", "locate", "promised",
            "promising", "refuse_seen", "score", "score_candidates", "surprises", "unknown_heat", "unseen_data"]

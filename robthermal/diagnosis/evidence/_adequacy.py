@@ -8,19 +8,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from ...errors import Outcome
 from ..fit import Refit
-from ..path import Along, AlongResponse
+from ..path import N_SPLINES, Linearized
 from ._frequency_tails import inflation, sureness
 
 Array = NDArray[np.float64]
 LAGS = 60
 SMALLEST_P = 1e-3
-N_SPLINES = 16
 
 
 @dataclass(frozen=True)
@@ -117,30 +115,11 @@ def _portmanteau(segments: list[Array]) -> tuple[float, int]:
     return Q, total
 
 
-def splines(time: Array, count: int = N_SPLINES) -> Array:
-    """Cubic B-splines on even knots over the record, (n, count)."""
-    t = (time - time[0]) / (time[-1] - time[0])
-    inner = np.linspace(0.0, 1.0, count - 2)
-    knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
-
-
-def spline_response(path: Along | AlongResponse, lump: int) -> Array:
-    """Readings (n, n_sensors, count) to a spline of heat of 1 W into one lump; of a response, see `splines` there."""
-    if isinstance(path, AlongResponse):
-        return path.splines(lump)
-    basis = splines(path.time)
-    start = np.zeros((*path.x.shape, basis.shape[1]))
-    end = np.zeros_like(start)
-    start[:, lump], end[:, lump] = basis, np.concatenate([basis[1:], basis[-1:]])
-    return path.answer(start, end)
-
-
-def side_by_side(columns: list[Array], paths: Sequence[Along | AlongResponse]) -> list[Array]:
+def side_by_side(columns: list[Array], paths: Sequence[Linearized]) -> list[Array]:
     """Give every frequency response columns of its own; records share theirs."""
-    places, at = [], N_SPLINES if any(isinstance(path, Along) for path in paths) else 0
+    places, at = [], N_SPLINES if any(path.in_time for path in paths) else 0
     for column, path in zip(columns, paths, strict=True):
-        start = 0 if isinstance(path, Along) else at
+        start = 0 if path.in_time else at
         places.append(slice(start, start + column.shape[2]))
         at = max(at, places[-1].stop)
     out = [np.zeros((*column.shape[:2], at)) for column in columns]
@@ -153,7 +132,7 @@ def spline_tests(fit: Refit) -> dict[str, tuple[float, float]]:
     """F statistic and p-value of a spline of extra heat into every lump, after the unknowns of the fit."""
     out = {}
     for i, lump in enumerate(fit.system.lumps):
-        J = fit.project(fit.whiten(side_by_side([spline_response(path, i) for path in fit.paths], fit.paths)))
+        J = fit.project(fit.whiten(side_by_side([path.splines(i) for path in fit.paths], fit.paths)))
         out[lump] = f_test(fit, J)
     return out
 

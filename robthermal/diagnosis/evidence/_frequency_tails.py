@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ..data import ResponseData
 from ..fit import Refit
-from ..path import AlongResponse
 
 Array = NDArray[np.float64]
 
@@ -56,8 +55,5 @@ def _windows(fit: Refit, U: Array) -> Iterator[tuple[ResponseData, Array]]:
     row = 0
     for path in fit.paths:
         size = path.one.readings.size
-        if isinstance(path, AlongResponse):
-            block = U[row:row + size].reshape(2, len(path.one.index), -1, U.shape[1])
-            for places in path.one.windows:
-                yield path.one, block[:, places].reshape(-1, U.shape[1])
+        yield from path.noise_windows(U[row:row + size])
         row += size

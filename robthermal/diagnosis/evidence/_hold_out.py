@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from ..._fitting import Data, Start, free_run, refuse_same, rmse
+from ..._fitting import Start, free_run, refuse_same, rmse
 from ...errors import Diverged, InputError, Outcome
 from ...thermal import System
-from ..data import Measured, ResponseData, as_measured, without_glitches
-from ..fit import Point, Refit, Structure, White, Whitened, descend, filters, paths_of, start_of
-from ..path import Along, gathered
-from ._frequency_locate import response_rms
+from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
+from ..fit import Point, Refit, Structure, Whitened, descend, filters
+from ..path import Linearized, White, gathered, linearized_records
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -142,7 +141,7 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     'predicted'
     """
     data = unseen_data(after, validation, operating_point)
-    residuals = _residuals(before, after, [one for one in data if isinstance(one, Data)])
+    residuals = _residuals(before, after, records_of(data))
     gap = _unseen_gap(before, after, data, residuals)
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
@@ -155,46 +154,44 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
 
 
 def unseen_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
-                ) -> list[Data | ResponseData]:
+                ) -> list[DataSet]:
     """Validation data without glitches; refused if the fit has seen them."""
     base = fit.structure.base
-    data = without_glitches(base, as_measured(base, validation, "validation", operating_point), fit.floor.noise)
+    data = without_outliers(base, as_measured(base, validation, "validation", operating_point), fit.floor.noise)
     refuse_seen(fit.structure.data, data)
     return list(data)
 
 
-def refuse_seen(training: Sequence[Data | ResponseData], validation: Sequence[Data | ResponseData]) -> None:
+def refuse_seen(training: Sequence[DataSet], validation: Sequence[DataSet]) -> None:
     """Data validate nothing that was fitted to them; a record's noise must be known from training records."""
-    if not any(isinstance(one, Data) for one in training) and any(isinstance(one, Data) for one in validation):
+    if not records_of(training) and records_of(validation):
         raise InputError("a record is to validate what only frequency responses taught", where="argument validation",
                          expected="a frequency response", remedy="Estimate one from that record with rt.identify.lpm, "
                          "or train on a record too.")
-    seen, unseen = ([one for one in data if isinstance(one, Data)] for data in (training, validation))
-    refuse_same(seen, unseen)
-    for new in validation:
-        for old in training:
-            if (isinstance(new, ResponseData) and isinstance(old, ResponseData)
-                    and np.array_equal(new.readings, old.readings)):
+    refuse_same([*records_of(training)], [*records_of(validation)])
+    for new in responses_of(validation):
+        for old in responses_of(training):
+            if np.array_equal(new.readings, old.readings):
                 raise InputError("the validation response is the training response", where="argument validation",
                                  expected="data the fit has not seen", remedy="Estimate it from another record.")
 
 
-def _unseen_gap(before: Refit, after: Refit, data: Sequence[Data | ResponseData],
+def _unseen_gap(before: Refit, after: Refit, data: Sequence[DataSet],
                 residuals: Sequence[ValidationResiduals]) -> Gap:
     if not residuals:
         return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
-    records = [one for one in data if isinstance(one, Data)]
+    records = records_of(data)
     return Gap(rmse(e for one in residuals for e in one.before.values()),
                rmse(e for one in residuals for e in one.after.values()), expected_rms(after, records))
 
 
-def _residuals(before: Refit, after: Refit, records: Sequence[Data]) -> tuple[ValidationResiduals, ...]:
+def _residuals(before: Refit, after: Refit, records: Sequence[RecordData]) -> tuple[ValidationResiduals, ...]:
     runs = (_free_runs(fit, records) for fit in (before, after))
     return tuple(ValidationResiduals(one.label, one.record.time, old, new)
                  for one, old, new in zip(records, *runs, strict=True))
 
 
-def _free_runs(fit: Refit, records: Sequence[Data]) -> list[dict[str, Array]]:
+def _free_runs(fit: Refit, records: Sequence[RecordData]) -> list[dict[str, Array]]:
     """Residuals of every record by sensor; NaN where the model runs away."""
     try:
         systems = _session_systems(fit, records)
@@ -203,18 +200,18 @@ def _free_runs(fit: Refit, records: Sequence[Data]) -> list[dict[str, Array]]:
     return [_one_run(fit, system, one) for system, one in zip(systems, records, strict=True)]
 
 
-def _one_run(fit: Refit, system: System, one: Data) -> dict[str, Array]:
+def _one_run(fit: Refit, system: System, one: RecordData) -> dict[str, Array]:
     try:
         return free_run(system, one, "free", fit.floor.noise).by_sensor
     except Diverged:
         return _ran_away(one)
 
 
-def _ran_away(one: Data) -> dict[str, Array]:
+def _ran_away(one: RecordData) -> dict[str, Array]:
     return dict.fromkeys(one.sensors, np.full(len(one.readings), np.nan))
 
 
-def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:
+def _session_systems(fit: Refit, data: Sequence[RecordData]) -> list[System]:
     """Trained system in every unseen session: a new session has a gain of its own, estimated on all of it."""
     sessions = fit.structure.sessions
     if not sessions.inputs:
@@ -223,7 +220,7 @@ def _session_systems(fit: Refit, data: Sequence[Data]) -> list[System]:
     return [sessions.applied(fit.system, g) for g in structure.gains(own.v)]
 
 
-def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[float, float]:
+def predicted(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[float, float]:
     """Whitened variance with trained parameters, and the p-value of the prediction, with the noise of `reference`.
 
     The trained parameters enter as a prior with the covariance of their training, what is the records' own (initial
@@ -241,7 +238,7 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData])
     return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
 
 
-def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[Data | ResponseData]) -> list[float]:
+def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[DataSet]) -> list[float]:
     """-2 log predictive densities of unseen records given the trained parameters' covariance, but for one constant.
 
     Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
@@ -252,14 +249,14 @@ def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[Data | Res
     return [float("inf") if whiteners is None else _surprise(fit, whiteners, reference, data) for fit in fits]
 
 
-def _surviving(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...] | None:
+def _surviving(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[White, ...] | None:
     try:
         return _filters(fit, reference, data)
     except Diverged:
         return None
 
 
-def _surprise(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[Data | ResponseData]) -> float:
+def _surprise(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[DataSet]) -> float:
     try:
         _, only, n = _own_unknowns(fit, data, whiteners)
     except Diverged:
@@ -277,15 +274,15 @@ def _log_volume(J: Array) -> float:
     return 2.0 * float(np.sum(np.log(np.maximum(s, 1e-9))))
 
 
-def _over(fit: Refit, data: Sequence[Data | ResponseData], start: Start = "free") -> tuple[Structure, Array]:
+def _over(fit: Refit, data: Sequence[DataSet], start: Start = "free") -> tuple[Structure, Array]:
     """The structure over unseen data, and its unknowns: those trained, the data's own at zero."""
-    starts = tuple(start_of(fit.system, one, start) for one in data)
+    starts = tuple(one.initial(fit.system, start) for one in data)
     structure = replace(fit.structure, data=tuple(data), starts=starts)
     p = structure.n_parameters + structure.n_effects
     return structure, np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
 
 
-def _filters(fit: Refit, reference: Refit, data: Sequence[Data | ResponseData]) -> tuple[White, ...]:
+def _filters(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[White, ...]:
     """Whiteners of unseen data along the trained model, with the noise of `reference`."""
     return filters(*_over(fit, data), reference.floor, reference.levels)[1]
 
@@ -316,7 +313,7 @@ class _Unseen:
         return np.concatenate([self.of.slopes(v)[self._kept], prior])
 
 
-def _own_unknowns(fit: Refit, data: Sequence[Data | ResponseData], whiteners: Sequence[White]
+def _own_unknowns(fit: Refit, data: Sequence[DataSet], whiteners: Sequence[White]
                   ) -> tuple[Structure, Point, int]:
     """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
     structure, v = _over(fit, data)
@@ -335,13 +332,30 @@ def _information_root(J: Array, p: int) -> Array:
     return R[rest:, rest:]
 
 
-def expected_rms(fit: Refit, data: Sequence[Data] | None = None) -> float:
+def response_rms(fit: Refit, data: Sequence[DataSet]) -> float:
+    """Whitened root mean square on frequency responses the fit has not seen [standard deviations of their noise].
+
+    Parameters
+    ----------
+    fit : Refit
+        Trained fit.
+    data : sequence of DataSet
+        Validation data; records among them are left out.
+    """
+    own = responses_of(data)
+    structure, v = _over(fit, own)
+    z = Whitened(structure, [one.white for one in own]).residual(v)
+    return rmse([z[:structure.n_readings]])
+
+
+def expected_rms(fit: Refit, data: Sequence[RecordData] | None = None) -> float:
     """Free-run rms that sensor noise and random heat alone would give [K]; 1 of frequency responses alone."""
-    paths = fit.paths if data is None else paths_of(*_over(fit, data, "measured"))
+    paths: Sequence[Linearized] = fit.paths
+    if data is not None:
+        structure, v = _over(fit, data, "measured")
+        paths = structure.paths(v)
     total, count = 0.0, 0
-    for path in paths:
-        if not isinstance(path, Along):
-            continue
+    for path in linearized_records(paths):
         noise, disturbance = fit.levels.of(path, fit.floor)
         slow = fit.levels.slow(path, fit.floor)
         spread = float(noise @ noise) + (0.0 if slow is None else float(slow.std @ slow.std))

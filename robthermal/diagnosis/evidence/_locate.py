@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fit import Refit
-from ..path import Along
 from ._adequacy import adequacy, spline_tests
-from ._frequency_locate import bands
 
 Array = NDArray[np.float64]
 _BINS = 5
@@ -87,7 +85,7 @@ def locate(fit: Refit) -> Location:
     """
     tests = spline_tests(fit)
     return Location({name: p for name, (_, p) in tests.items()}, {name: F for name, (F, _) in tests.items()},
-                    adequacy(fit).sensors, (*_conditions(fit), *bands(fit)))
+                    adequacy(fit).sensors, (*_conditions(fit), *_bands(fit)))
 
 
 def _conditions(fit: Refit) -> tuple[str, ...]:
@@ -95,8 +93,7 @@ def _conditions(fit: Refit) -> tuple[str, ...]:
     paths = fit.along
     if not paths:
         return ()
-    sizes = [np.mean(z**2, axis=1) for z, path in zip(fit.innovations(), fit.paths, strict=True)
-             if isinstance(path, Along)]
+    sizes = [np.mean(z**2, axis=1) for z, _ in fit.record_innovations]
     out = [_worst("time [s]", [path.time for path in paths], sizes)]
     for column, name in enumerate(fit.system.exogenous_names):
         values = [path.u[:, column] for path in paths]
@@ -108,6 +105,11 @@ def _conditions(fit: Refit) -> tuple[str, ...]:
         out.append(_worst(f"{name} [K]", [value for value, _ in kept], [size for _, size in kept]))
     out.append(_frequency(fit))
     return tuple(out)
+
+
+def _bands(fit: Refit) -> list[str]:
+    """The band with the largest misfit of every element of every frequency response, in words."""
+    return [line for z, path in zip(fit.innovations(), fit.paths, strict=True) for line in path.bands(z)]
 
 
 def _worst(what: str, values: list[Array], sizes: list[Array]) -> str:
@@ -122,9 +124,7 @@ def _worst(what: str, values: list[Array], sizes: list[Array]) -> str:
 
 def _frequency(fit: Refit) -> str:
     power = []
-    for z, path in zip(fit.innovations(), fit.paths, strict=True):
-        if not isinstance(path, Along):
-            continue
+    for z, path in fit.record_innovations:
         spectrum = np.mean(np.abs(np.fft.rfft(z, axis=0)[1:]) ** 2, axis=1) / len(z)
         frequency = np.fft.rfftfreq(len(z), path.h)[1:]
         for low, high in zip(np.geomspace(frequency[0], frequency[-1], _BINS + 1)[:-1],

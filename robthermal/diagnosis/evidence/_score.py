@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
-from ...thermal import trajectory
-from ..effects import Candidate, Response, candidates
+from ..effects import Candidate, candidates
 from ..fit import Refit
-from ..path import Along, AlongResponse
 from ._frequency_tails import inflation, tail
 
 Array = NDArray[np.float64]
@@ -26,7 +24,6 @@ POWER = 0.9
 ALIAS = 1e-3  # sine of the angle below which two signatures are the same, and one is no signature
 BIC_GAP = 10.0
 _DIGITS = 6  # of the logarithm of a statistic
-_BLOCK = 32  # signatures at once: they stay in the cache
 Pair = tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]
 
 
@@ -179,7 +176,7 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
 def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     """Score these candidates, each at the best of its trial values."""
     trials = [(number, trial) for number, candidate in enumerate(tested) for trial in candidate.trials(fit.paths[0])]
-    J = (fit.whiten([columns(path, [trial for _, trial in trials]) for path in fit.paths]) if trials else
+    J = (fit.whiten([path.columns([trial for _, trial in trials]) for path in fit.paths]) if trials else
          np.zeros((fit.z.size, 0)))
     explained = fit.basis.T @ J
     J = fit.project(J - fit.basis @ explained)
@@ -310,26 +307,3 @@ def _possible(trial: Candidate, size: float, std: float) -> bool:
     """Within the physical bounds, give or take two standard deviations."""
     bounds = trial.effect.size
     return bounds.lower - 2 * std < size < bounds.upper + 2 * std and (size != 0)
-
-
-def columns(path: Along | AlongResponse, trials: Sequence[Candidate]) -> Array:
-    """Change of the readings (n, n_sensors, k) per unit of size of every trial; of a response (2 n_b, m, k)."""
-    if isinstance(path, AlongResponse):
-        return path.columns(trials)
-    linear = [i for i, trial in enumerate(trials) if trial.effect.signature is not None]
-    out = np.zeros((*path.one.readings.shape, len(trials)))
-    for first in range(0, len(linear), _BLOCK):
-        some = linear[first:first + _BLOCK]
-        out[..., some] = path.readings_of([_response(path, trials[i]) for i in some])
-    for i in set(range(len(trials))) - set(linear):
-        step = trials[i].shape.get(trials[i].effect.size.name, trials[i].effect.size.typical)
-        run = trajectory(trials[i].add(path.system, step), path.one.record)
-        out[..., i] = (run.readings - path.readings)[:, path.one.columns] / step
-    return out
-
-
-def _response(path: Along, trial: Candidate) -> Response:
-    """Per unit of the size of a trial with a signature."""
-    signature = trial.effect.signature
-    assert signature is not None
-    return signature(path, trial.where, trial.shape)

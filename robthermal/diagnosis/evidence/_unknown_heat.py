@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from ..._fitting import Data
 from ...errors import Diverged, InputError, Outcome
 from ...signals import Record
 from ...thermal import Input
-from ..data import ResponseData
+from ..data import DataSet, RecordData, records_of
 from ..fit import Refit, Whitened, filters
 from ..path import Along
 from ._locate import locate
@@ -163,22 +162,23 @@ def _heated(fit: Refit, v: Array, lump: str, knots: list[Array], heat: tuple[Arr
     """The fit at other unknowns and with an extra heat into one lump, as one more input of every record."""
     base = fit.structure.base
     base = base.model_copy(update={"inputs": {**base.inputs, _PROBE: Input(lump=lump)}})
-    data: list[Data | ResponseData] = []
-    parts = iter(zip(knots, heat, strict=True))
-    for one in fit.structure.data:
-        if isinstance(one, Data):
-            middle = one.record.time + 0.5 * one.record.sample_time
-            q = np.interp(middle, *next(parts))  # held: its mean over the sample
-            record = Record(sample_time=one.record.sample_time, inputs=np.column_stack([one.record.inputs, q]),
-                            outputs=one.record.outputs, input_names=[*one.record.input_names, _PROBE],
-                            output_names=one.record.output_names, start_time=one.record.start_time)
-            data.append(replace(one, record=record))
-        else:
-            data.append(one)
+    driven = {id(one): _driven(one, t, q)
+              for one, t, q in zip(records_of(fit.structure.data), knots, heat, strict=True)}
+    data = [driven.get(id(one), one) for one in fit.structure.data]
     structure = replace(fit.structure, base=base, data=tuple(data))
     paths, whiteners = filters(structure, v, fit.floor, fit.levels)
     z = Whitened(structure, whiteners).residual(v)
     return replace(fit, structure=structure, v=v, paths=paths, whiteners=whiteners, z=z)
+
+
+def _driven(one: RecordData, knots: Array, heat: Array) -> DataSet:
+    """The record with the extra heat as one more input: held, its mean over every sample."""
+    middle = one.record.time + 0.5 * one.record.sample_time
+    q = np.interp(middle, knots, heat)
+    record = Record(sample_time=one.record.sample_time, inputs=np.column_stack([one.record.inputs, q]),
+                    outputs=one.record.outputs, input_names=[*one.record.input_names, _PROBE],
+                    output_names=one.record.output_names, start_time=one.record.start_time)
+    return replace(one, record=record)
 
 
 def _knots(time: Array) -> Array:
@@ -195,14 +195,15 @@ def _walk(t: Array) -> Array:
 
 def _whitened_response(fit: Refit, lump: int, knots: list[Array]) -> Array:
     """Whitened readings to one watt at every knot (m, k)."""
-    total, at, columns = sum(t.size for t in knots), 0, []
-    own = iter(knots)
+    ends = np.cumsum([t.size for t in knots])
+    own = {id(path): (t, int(end)) for path, t, end in zip(fit.along, knots, ends, strict=True)}
+    records = {id(path): path for path in fit.along}
+    columns = []
     for path in fit.paths:
-        out = np.zeros((*path.one.readings.shape, total))
-        if isinstance(path, Along):
-            t = next(own)
-            out[..., at:at + t.size] = _response(path, lump, t)
-            at += t.size
+        out = np.zeros((*path.one.readings.shape, int(ends[-1])))
+        if (record := records.get(id(path))) is not None:
+            t, end = own[id(path)]
+            out[..., end - t.size:end] = _response(record, lump, t)
         columns.append(out)
     return fit.whiten(columns)
 

@@ -12,15 +12,11 @@ from ._refitting import LIMIT as LIMIT
 from ._refitting import extended as extended
 from ._refitting import filters as filters
 from ._refitting import fitted as fitted
-from ._refitting import paths_of as paths_of
 from ._refitting import refit as refit
 from ._refitting import relinearised as relinearised
 from ._sessions import SessionGain as SessionGain
 from ._structure import Structure as Structure
-from ._structure import start_of as start_of
-from ._whitened import White as White
 from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "Levels", "Point", "Refit", "SessionGain", "Structure", "WIDE",
-           "White", "Whitened", "descend", "extended", "filters", "fitted", "paths_of", "refit", "relinearised",
-           "start_of", "with_slow_part"]
+           "Whitened", "descend", "extended", "filters", "fitted", "refit", "relinearised", "with_slow_part"]

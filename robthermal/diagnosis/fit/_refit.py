@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import residual, rmse
+from ..._fitting import rmse
 from ...errors import Outcome
 from ...thermal import System
 from ..data import NoiseFloor
 from ..effects import Candidate
-from ..path import Along, AlongResponse
+from ..path import Along, Linearized, White, linearized_records
 from ._levels import Levels
 from ._sessions import session_table
 from ._structure import Structure
-from ._whitened import White, Whitened
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
-Path = Along | AlongResponse
 _FLAT = 1e-9  # relative size of a direction of J that counts as none
 _CONTRADICTED = 6.0  # standard deviations of a prior
 
@@ -41,7 +40,7 @@ class Refit:
         Where the noise levels came from.
     levels : Levels
         Factors on them, re-estimated within limits.
-    paths : tuple of Along or AlongResponse
+    paths : tuple of Linearized
         Linearisation along every record; the modelled frequency response beside every measured one.
     whiteners : tuple of Whitener or ResponseWhitener
         One per record or frequency response.
@@ -55,7 +54,7 @@ class Refit:
     v: Array
     floor: NoiseFloor
     levels: Levels
-    paths: tuple[Path, ...]
+    paths: tuple[Linearized, ...]
     whiteners: tuple[White, ...]
     z: Array
     outcome: Outcome
@@ -144,7 +143,7 @@ class Refit:
     @cached_property
     def residuals(self) -> tuple[Array, ...]:
         """Free-run residual, measured - modelled, of every record (n, n_sensors) [K]; of a response (2 n_b, m)."""
-        return tuple(residual(path.one.readings, path.readings[:, path.one.columns]) for path in self.paths)
+        return tuple(path.residual for path in self.paths)
 
     @property
     def rms(self) -> float:
@@ -154,12 +153,18 @@ class Refit:
         """
         if not self.along:
             return rmse([self.z[:self.n_readings]])
-        return rmse(r for path, r in zip(self.paths, self.residuals, strict=True) if isinstance(path, Along))
+        return rmse(path.residual for path in self.along)
 
     @property
     def along(self) -> tuple[Along, ...]:
         """Linearisations along the records, without the frequency responses."""
-        return tuple(path for path in self.paths if isinstance(path, Along))
+        return linearized_records(self.paths)
+
+    @property
+    def record_innovations(self) -> list[tuple[Array, Along]]:
+        """Whitened residuals of every record with its linearization; without the frequency responses."""
+        of = dict(zip(map(id, self.paths), self.innovations(), strict=True))
+        return [(of[id(path)], path) for path in self.along]
 
     @property
     def unit(self) -> str:
@@ -213,7 +218,8 @@ class Refit:
         values = ranges.values(self.v[:len(ranges.names)])
         lines = [f"{name} = {value:.6g}" for name, value in zip(ranges.names, values, strict=True)]
         labels = [path.one.label for path in self.along]
-        gains = [g for path, g in zip(self.paths, self.structure.gains(self.v), strict=True) if isinstance(path, Along)]
+        own = zip(self.structure.data, self.structure.gains(self.v), strict=True)
+        gains = [g for one, g in own if one.n_sessions]
         lines += session_table(self.structure.sessions, labels, gains)
         lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), rms {self.rms:.4g} {self.unit}")
         return "\n".join([*lines, str(self.levels), *self.contradictions, str(self.outcome)])

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from ..._fitting import NONE, Choice, chosen_ranges
 from ...errors import Diverged, InputError, Outcome
 from ...thermal import System
-from ..data import Measured, NoiseFloor, ResponseData, as_measured, noise_floor, without_glitches
-from ..path import Along, AlongResponse, along, along_response, whitener
+from ..data import Measured, NoiseFloor, as_measured, noise_floor, without_outliers
+from ..path import Linearized, White, linearized_records
 from ._descent import Descent, descend
 from ._levels import Levels, refined
-from ._refit import Path, Refit
+from ._refit import Refit
 from ._sessions import SessionGain, sessions_of
-from ._structure import Structure, start_of, structure_of
-from ._whitened import White, Whitened
+from ._structure import Structure, structure_of
+from ._whitened import Whitened
 
 Array = NDArray[np.float64]
 LIMIT = 40  # evaluations of a refit
@@ -73,9 +73,9 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFl
     True
     """
     floor = noise_floor(system, records) if floor is None else floor
-    data = without_glitches(system, as_measured(system, records, "records", operating_point), floor.noise)
+    data = without_outliers(system, as_measured(system, records, "records", operating_point), floor.noise)
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
-    starts = [start_of(system, one) for one in data]
+    starts = [one.initial(system, "free") for one in data]
     structure = structure_of(system, ranges, data, starts, sessions_of(system, session_gain))
     n_unknown = structure.n_parameters + structure.n_own
     if structure.n_readings <= 2 * n_unknown:
@@ -94,7 +94,7 @@ def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) ->
         paths, whiteners = filters(structure, v, floor, levels)
         found = minimised(structure, v, whiteners)
         v = found.at.v
-        paths = paths_of(structure, v)
+        paths = structure.paths(v)
         new = _refined(paths, floor, levels)
         if new.close_to(levels):
             break
@@ -112,26 +112,20 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
 
 def relinearised(fit: Refit) -> Refit:
     """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
-    return replace(fit, paths=paths_of(fit.structure, fit.v))
+    return replace(fit, paths=fit.structure.paths(fit.v))
 
 
 def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
-            ) -> tuple[tuple[Path, ...], tuple[White, ...]]:
-    """Linearisation and filter of every record; whitener of every response."""
-    paths = paths_of(structure, v)
-    return paths, tuple(path.one.white if isinstance(path, AlongResponse) else
-                        whitener(path, *levels.of(path, floor), levels.slow(path, floor)) for path in paths)
+            ) -> tuple[tuple[Linearized, ...], tuple[White, ...]]:
+    """The model beside all data, linearized there, and what makes the errors of each data set white."""
+    paths = structure.paths(v)
+    return paths, tuple(path.white(lambda record: (*levels.of(record, floor), levels.slow(record, floor)))
+                        for path in paths)
 
 
-def paths_of(structure: Structure, v: Array) -> tuple[Path, ...]:
-    """Linearisation along every record; the modelled response beside every measured one."""
-    return tuple(along_response(system, one) if isinstance(one, ResponseData) else run.path or along(system, one)
-                 for system, one, run in zip(structure.systems(v), structure.data, structure.runs(v), strict=True))
-
-
-def _refined(paths: Sequence[Path], floor: NoiseFloor, levels: Levels) -> Levels:
+def _refined(paths: Sequence[Linearized], floor: NoiseFloor, levels: Levels) -> Levels:
     """Noise levels of the records; those of responses come with them."""
-    records = [path for path in paths if isinstance(path, Along)]
+    records = linearized_records(paths)
     if not records:
         return levels
     sensors = {name for path in records for name in path.one.sensors}

@@ -61,7 +61,7 @@ class Sessions:
         -------
         System
         """
-        if not self.inputs:
+        if not g.size:
             return system
         return system.with_parameters({name: system.parameter(name) + sigma * float(value)
                                        for name, sigma, value in zip(self.numbers, self.sigma, g, strict=True)})

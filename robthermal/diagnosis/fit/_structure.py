@@ -5,45 +5,32 @@ A record's own are its initial temperatures and its session gains; a frequency r
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Data, Initial, Ranges, Start, initial_of, residual, start_values
+from ..._fitting import Initial, Ranges
 from ...errors import InputError
-from ...thermal import System, Trajectory, trajectory
-from ..data import ResponseData
+from ...thermal import System
+from ..data import DataSet
 from ..effects import Candidate
-from ..path import Along, along, hidden_from_response, response_slopes
+from ..path import Linearized, Unknowns, linearize
 from ._sessions import Sessions
 
 Array = NDArray[np.float64]
 _KEPT = 2
 _STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
-NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One record simulated: residual measured - modelled, (n, n_sensors) [K].
-
-    Of a frequency response: (2 n_b, m), see `ResponseData.readings`.
-    """
-
-    residual: Array
-    trajectory: Trajectory | None = None
-    path: Along | None = None
 
 
 @dataclass(eq=False)
 class _Lately:
     """What has been computed at some unknowns."""
 
-    runs: list[Run]
+    paths: tuple[Linearized, ...]
     slopes: list[Array] | None = None
 
 
@@ -57,7 +44,7 @@ class Structure:
         Nominal system with its starting values.
     ranges : Ranges
         Nominal parameters that may change.
-    data : tuple of Data or ResponseData
+    data : tuple of DataSet
         Records and frequency responses.
     starts : tuple of Initial
         Prior of every record's initial temperatures.
@@ -71,7 +58,7 @@ class Structure:
 
     base: System
     ranges: Ranges
-    data: tuple[Data | ResponseData, ...]
+    data: tuple[DataSet, ...]
     starts: tuple[Initial, ...]
     effects: tuple[Candidate, ...] = ()
     tolerance: float = 1e-4
@@ -96,8 +83,7 @@ class Structure:
     @property
     def certainty(self) -> float:
         """Degrees of freedom of the sum of squares, per reading: below 1 where the noise is itself an estimate."""
-        sure = [one.readings.size * (one.certainty if isinstance(one, ResponseData) else 1.0) for one in self.data]
-        return sum(sure) / self.n_readings
+        return sum(one.readings.size * one.certainty for one in self.data) / self.n_readings
 
     @property
     def n_starts(self) -> int:
@@ -107,7 +93,7 @@ class Structure:
     @property
     def n_own(self) -> int:
         """Number of unknowns that belong to one record each: initial temperatures, then session gains."""
-        return self.n_starts + self.sessions.n_free * sum(isinstance(one, Data) for one in self.data)
+        return self.n_starts + self.sessions.n_free * sum(one.n_sessions for one in self.data)
 
     def quantities(self, v: Array) -> list[dict[str, float]]:
         """Quantities of every effect by name."""
@@ -152,7 +138,7 @@ class Structure:
                 log = quantity.lower > 0
                 lower.append(np.log(quantity.lower) if log else quantity.lower)
                 upper.append(np.log(quantity.upper) if log else quantity.upper)
-        n_sessions = sum(isinstance(one, Data) for one in self.data)
+        n_sessions = sum(one.n_sessions for one in self.data)
         reach = np.concatenate([np.full(self.n_starts, 20.0), np.tile(self.sessions.reach, n_sessions)])
         q = self.ranges.coordinates
         return (np.concatenate([q(self.ranges.lower), lower, -reach]),
@@ -178,28 +164,27 @@ class Structure:
     def systems(self, v: Array) -> list[System]:
         """System of every record, with its initial temperatures and session gains; of a response, the common one."""
         system = self.system(v)
-        return [system if isinstance(one, ResponseData) else
-                self.sessions.applied(system.with_parameters(start_values(system, T)), g)
+        return [self.sessions.applied(one.started(system, T), g)
                 for one, T, g in zip(self.data, self.temperatures(v), self.gains(v), strict=True)]
 
     def gains(self, v: Array) -> list[Array]:
         """Session gains of every record, in units of their priors; empty for a frequency response."""
         out, at = [], v.size - (self.n_own - self.n_starts)
         for one in self.data:
-            n = self.sessions.n_free if isinstance(one, Data) else 0
+            n = self.sessions.n_free * one.n_sessions
             out.append(v[at:at + n])
             at += n
         return out
 
-    def runs(self, v: Array) -> list[Run]:
-        """All records simulated; the last few are kept: filters and noise levels change more often than unknowns."""
-        return self._lately(v).runs
+    def paths(self, v: Array) -> tuple[Linearized, ...]:
+        """The model beside all data; the last few are kept: filters and noise change more often than unknowns."""
+        return self._lately(v).paths
 
     def slopes(self, v: Array) -> list[Array]:
-        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all records; kept too."""
+        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all data sets; kept too."""
         lately = self._lately(v)
         if lately.slopes is None:
-            lately.slopes = self._slopes(v, lately.runs)
+            lately.slopes = [path.slopes(own) for path, own in zip(lately.paths, self._unknowns(v), strict=True)]
         return lately.slopes
 
     def _lately(self, v: Array) -> _Lately:
@@ -207,42 +192,21 @@ class Structure:
         if key not in self._last:
             while len(self._last) >= _KEPT:
                 del self._last[next(iter(self._last))]
-            self._last[key] = _Lately([self._run(*each) for each in zip(self.systems(v), self.data, strict=True)])
+            self._last[key] = _Lately(tuple(linearize(system, one, self.tolerance)
+                                            for system, one in zip(self.systems(v), self.data, strict=True)))
         return self._last[key]
 
-    def _run(self, system: System, one: Data | ResponseData) -> Run:
-        if isinstance(one, ResponseData):
-            return Run(residual(one.readings, one.model(system)))
-        run = trajectory(system, one.record, tolerance=self.tolerance)
-        return Run(residual(one.readings, run.readings[:, one.columns]), run, along(system, one, run))
-
-    def _slopes(self, v: Array, runs: Sequence[Run]) -> list[Array]:
+    def _unknowns(self, v: Array) -> Iterator[Unknowns]:
+        """The unknowns as every data set sees them."""
         names, chain = self._chain(v)
-        at, gain_at, out = self.n_parameters + self.n_effects, v.size - (self.n_own - self.n_starts), []
-        own = [number for number in self.sessions.numbers if number not in names]
-        gains = [[*names, *own].index(number) for number in self.sessions.numbers]
-        for run, one, start in zip(runs, self.data, self.starts, strict=True):
-            if isinstance(one, ResponseData):
-                out.append(self._response_slopes(v, one))
-                continue
-            assert run.trajectory is not None
-            initial = [f"lumps.{lump}.initial" for lump in run.trajectory.system.lumps] if start.n_free else []
-            J = run.trajectory.derivative([*names, *own, *initial])[:, one.columns]
-            slopes = np.zeros((*J.shape[:2], v.size))
-            slopes[..., :chain.shape[1]] = J[..., :len(names)] @ chain
-            slopes[..., at:at + start.n_free] = J[..., len(names) + len(own):] * start.sigma
-            slopes[..., gain_at:gain_at + len(gains)] = J[..., gains] * self.sessions.sigma
-            out.append(slopes)
-            at, gain_at = at + start.n_free, gain_at + len(gains)
-        return out
-
-    def _response_slopes(self, v: Array, one: ResponseData) -> Array:
-        """Of a frequency response: differences of second order."""
         n = self.n_parameters + self.n_effects
         steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
-        slopes = np.zeros((*one.readings.shape, v.size))
-        slopes[..., :n] = response_slopes(lambda moved: one.model(self.system(moved)), v, steps, self.bounds)
-        return slopes
+        at, gain_at = n, v.size - (self.n_own - self.n_starts)
+        for one, start in zip(self.data, self.starts, strict=True):
+            n_gains = self.sessions.n_free * one.n_sessions
+            yield Unknowns(v, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start.sigma,
+                           slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma)
+            at, gain_at = at + start.n_free, gain_at + n_gains
 
     @property
     def _typical(self) -> Array:
@@ -251,7 +215,7 @@ class Structure:
                          for quantity in candidate.effect.free])
 
     def prior(self, v: Array) -> tuple[Array, Array]:
-        """Distances from the priors' centres, in standard deviations, with the sign of `Run`, and their derivatives."""
+        """Priors' centres less the unknowns, in standard deviations, and the derivatives of the unknowns."""
         known = np.flatnonzero(np.isfinite(self.ranges.sigma))
         n_free = self.n_own
         first = self.n_parameters + self.n_effects
@@ -270,8 +234,8 @@ class Structure:
         system = self.base
         for candidate in effects:
             system = candidate.add(system, candidate.effect.size.typical)
-        starts = tuple(start if isinstance(one, ResponseData) or start.mean.size == len(system.lumps) else
-                       initial_of(system, one, "free" if start.n_free else "measured")
+        starts = tuple(start if start.mean.size == len(system.lumps) else
+                       one.initial(system, "free" if start.n_free else "measured")
                        for one, start in zip(self.data, self.starts, strict=True))
         return replace(self, effects=effects, starts=starts)
 
@@ -289,8 +253,8 @@ class Structure:
         """
         if any(part in self._added for part in candidate.where):
             return "it would act on a part that another effect has added"
-        responses = all(isinstance(one, ResponseData) for one in self.data)
-        return (responses and hidden_from_response(self.base, candidate)) or self.sessions.hides(candidate)
+        reasons = [one.hides(self.base, candidate) for one in self.data]
+        return reasons[0] if all(reasons) else self.sessions.hides(candidate)
 
     @cached_property
     def _added(self) -> frozenset[str]:
@@ -349,12 +313,7 @@ def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], 
     return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
 
 
-def start_of(system: System, one: Data | ResponseData, start: Start = "free") -> Initial:
-    """Prior of the initial temperatures; a frequency response has none."""
-    return NO_START if isinstance(one, ResponseData) else initial_of(system, one, start)
-
-
-def structure_of(system: System, ranges: Ranges, data: Sequence[Data | ResponseData], starts: Sequence[Initial],
+def structure_of(system: System, ranges: Ranges, data: Sequence[DataSet], starts: Sequence[Initial],
                  sessions: Sessions) -> Structure:
     """Nominal structure, checked: the system must be small enough for derivatives."""
     if len(system.lumps) > 100:

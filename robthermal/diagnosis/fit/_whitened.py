@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data import ResponseWhitener
-from ..path import Whitener
+from ..path import White
 from ._structure import Structure
 
 Array = NDArray[np.float64]
-White = Whitener | ResponseWhitener
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +22,7 @@ class Whitened:
     ----------
     structure : Structure
         Unknowns.
-    whiteners : sequence of Whitener or ResponseWhitener
+    whiteners : sequence of White
         One per record or frequency response.
     """
 
@@ -33,8 +31,8 @@ class Whitened:
 
     def residual(self, v: Array) -> Array:
         """Residuals (m,): measured - modelled."""
-        runs = zip(self.structure.runs(v), self.whiteners, strict=True)
-        return np.concatenate([*(white(run.residual).ravel() for run, white in runs), self.structure.prior(v)[0]])
+        each = zip(self.structure.paths(v), self.whiteners, strict=True)
+        return np.concatenate([*(white(path.residual).ravel() for path, white in each), self.structure.prior(v)[0]])
 
     def slopes(self, v: Array) -> Array:
         """Derivatives (m, p) of the model."""

@@ -6,21 +6,28 @@ is exact, δ(k+1) = A δ(k) + h φ₁(Mh) q₀ + h φ₂(Mh)(q₁ - q₀). All c
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 from scipy.linalg import expm
 
-from ..._fitting import Data
+from ..._fitting import residual
 from ...errors import InputError
 from ...thermal import Equations, System, Trajectory, trajectory
-from ..effects import Response
+from ..data import RecordData, ResponseData
+from ..effects import Candidate, Response
+from ._linearized import Unknowns
+from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
+N_SPLINES = 16
+_BLOCK = 32  # signatures at once: they stay in the cache
 _SAME = 1e-4  # change of a rate times the sample time [-]
 
 
@@ -32,7 +39,7 @@ class Along:
     ----------
     system : System
         With the record's initial temperatures.
-    one : Data
+    one : RecordData
         The record and its sensors.
     x : ndarray, shape (n, n_lumps)
         Simulated lump temperatures [K].
@@ -40,13 +47,16 @@ class Along:
         Simulated readings of all sensors of the system [K].
     u : ndarray, shape (n, n_u)
         Held inputs, in the order of `System.exogenous_names`.
+    run : Trajectory
+        The simulation, for its derivatives.
     """
 
     system: System
-    one: Data
+    one: RecordData
     x: Array
     readings: Array
     u: Array
+    run: Trajectory
 
     @property
     def h(self) -> float:
@@ -80,6 +90,66 @@ class Along:
         """
         ax.plot(self.time, r, linewidth=0.7, label=self.one.sensors)
         ax.set(xlabel="time [s]", ylabel="measured − model [K]")
+
+    @property
+    def in_time(self) -> bool:
+        """A record."""
+        return True
+
+    @cached_property
+    def residual(self) -> Array:
+        """Free-run residual, measured − modelled, (n, n_sensors) [K]."""
+        return residual(self.one.readings, self.readings[:, self.one.columns])
+
+    def white(self, noise: Callable[[Along], tuple[Any, ...]]) -> Whitener:
+        """As `Linearized.white`: a Kalman filter along the record."""
+        return whitener(self, *noise(self))
+
+    def bands(self, z: Array) -> list[str]:
+        """As `Linearized.bands`: the conditions of records are looked at together."""
+        return []
+
+    def noise_windows(self, block: Array) -> Iterator[tuple[ResponseData, Array]]:
+        """As `Linearized.noise_windows`: none."""
+        return iter(())
+
+    def slopes(self, unknowns: Unknowns) -> Array:
+        """As `Linearized.slopes`: exact, by the simulation's own derivatives."""
+        names, chain = unknowns.names, unknowns.chain
+        own = [number for number in unknowns.gain_names if number not in names]
+        initial = ([f"lumps.{lump}.initial" for lump in self.run.system.lumps]
+                   if unknowns.start.stop > unknowns.start.start else [])
+        J = self.run.derivative([*names, *own, *initial])[:, self.one.columns]
+        out = np.zeros((*J.shape[:2], unknowns.v.size))
+        out[..., :chain.shape[1]] = J[..., :len(names)] @ chain
+        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
+        at = [[*names, *own].index(number) for number in unknowns.gain_names]
+        out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
+        return out
+
+    def columns(self, trials: Sequence[Candidate]) -> Array:
+        """As `Linearized.columns`: by signatures, or by simulating again with a small effect."""
+        signed = [(i, trial, trial.effect.signature) for i, trial in enumerate(trials)]
+        linear = [(i, trial, signature) for i, trial, signature in signed if signature is not None]
+        out = np.zeros((*self.one.readings.shape, len(trials)))
+        for first in range(0, len(linear), _BLOCK):
+            some = linear[first:first + _BLOCK]
+            out[..., [i for i, _, _ in some]] = self.readings_of(
+                [signature(self, trial.where, trial.shape) for _, trial, signature in some])
+        for i, trial, signature in signed:
+            if signature is None:
+                step = trial.shape.get(trial.effect.size.name, trial.effect.size.typical)
+                run = trajectory(trial.add(self.system, step), self.one.record)
+                out[..., i] = (run.readings - self.readings)[:, self.one.columns] / step
+        return out
+
+    def splines(self, lump: int) -> Array:
+        """As `Linearized.splines`: a spline in time of 1 W."""
+        basis = heat_splines(self.time)
+        start = np.zeros((*self.x.shape, basis.shape[1]))
+        end = np.zeros_like(start)
+        start[:, lump], end[:, lump] = basis, np.concatenate([basis[1:], basis[-1:]])
+        return self.answer(start, end)
 
     @cached_property
     def equations(self) -> Equations:
@@ -208,7 +278,15 @@ class Along:
         return self.C @ state
 
 
-def along(system: System, one: Data, run: Trajectory | None = None) -> Along:
+def heat_splines(time: Array, count: int = N_SPLINES) -> Array:
+    """Cubic B-splines on even knots over the record, (n, count)."""
+    t = (time - time[0]) / (time[-1] - time[0])
+    inner = np.linspace(0.0, 1.0, count - 2)
+    knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
+    return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
+
+
+def along(system: System, one: RecordData, run: Trajectory | None = None) -> Along:
     """Simulate a record, unless it has been, and prepare its linearisation."""
     run = trajectory(system, one.record) if run is None else run
     columns = [one.record[name] if name in one.record.input_names
@@ -216,7 +294,7 @@ def along(system: System, one: Data, run: Trajectory | None = None) -> Along:
     if not np.isfinite(run.lumps).all():
         raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
     return Along(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
-                 np.column_stack(columns))
+                 np.column_stack(columns), run)
 
 
 def _heat_slopes(equations: Equations, x: Array, u: Array) -> Array:

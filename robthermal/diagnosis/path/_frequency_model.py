@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from ..._fitting import residual
 from ...errors import Diverged, InputError
 from ...thermal import Input, System
-from ..data import Complex, ResponseData, as_complex, as_real
+from ..data import Complex, ResponseData, ResponseWhitener, as_complex, as_real
 from ..effects import Candidate
+from ._linearized import Unknowns
 
 Array = NDArray[np.float64]
 _STEP = 1e-4  # relative; the differences below are of second order
 _MOST_SPLINES = 8
+_BANDS = 5
 _PROBE = "extra heat"
 
 
@@ -50,6 +53,40 @@ class AlongResponse:
         """Longest period seen [s]."""
         return float(1.0 / self.one.frequencies[0])
 
+    @property
+    def in_time(self) -> bool:
+        """A frequency response."""
+        return False
+
+    @cached_property
+    def residual(self) -> Array:
+        """Measured − modelled, (2 n_b, m)."""
+        return residual(self.one.readings, self.readings)
+
+    def white(self, noise: Callable[..., Any]) -> ResponseWhitener:
+        """As `Linearized.white`: estimated with the response."""
+        return self.one.white
+
+    def bands(self, z: Array) -> list[str]:
+        """As `Linearized.bands`: the band with the largest misfit of every element."""
+        power = (z**2).reshape(2, -1, z.shape[1]).mean(axis=0)
+        return [_worst(name, self.one.frequencies, column)
+                for name, column in zip(self.one.sensors, power.T, strict=True)]
+
+    def noise_windows(self, block: Array) -> Iterator[tuple[ResponseData, Array]]:
+        """As `Linearized.noise_windows`: window by window."""
+        rows = block.reshape(2, len(self.one.index), -1, block.shape[1])
+        for places in self.one.windows:
+            yield self.one, rows[:, places].reshape(-1, block.shape[1])
+
+    def slopes(self, unknowns: Unknowns) -> Array:
+        """As `Linearized.slopes`: differences of second order."""
+        n = unknowns.steps.size
+        out = np.zeros((*self.one.readings.shape, unknowns.v.size))
+        out[..., :n] = response_slopes(lambda moved: self.one.model(unknowns.system(moved)), unknowns.v,
+                                       unknowns.steps, unknowns.bounds)
+        return out
+
     @cached_property
     def x(self) -> Array:
         """Steady state, (1, n_lumps) [K]; nominal temperatures of a linear network."""
@@ -67,7 +104,7 @@ class AlongResponse:
         """Change of the response (2 n_b, m, k) per unit of size of every trial; zero for what it cannot show."""
         out = np.zeros((*self.readings.shape, len(trials)))
         for k, trial in enumerate(trials):
-            if not hidden_from_response(self.system, trial):
+            if not self.one.hides(self.system, trial):
                 out[..., k] = self._column(trial)
         return out
 
@@ -103,9 +140,13 @@ def along_response(system: System, one: ResponseData) -> AlongResponse:
     return AlongResponse(system, one, one.model(system))
 
 
-def hidden_from_response(system: System, candidate: Candidate) -> str:
-    """Why a frequency response cannot show an effect; empty if it can."""
-    return candidate.effect.hidden(system, candidate.where)
+def _worst(name: str, frequencies: Array, power: Array) -> str:
+    edges = np.geomspace(frequencies[0], frequencies[-1] * (1 + 1e-12), _BANDS + 1)
+    place = np.clip(np.searchsorted(edges, frequencies, side="right") - 1, 0, _BANDS - 1)
+    means = [float(power[place == b].mean()) if np.any(place == b) else 0.0 for b in range(_BANDS)]
+    worst = int(np.argmax(means))
+    return (f"{name}: largest between {edges[worst]:.3g} and {edges[worst + 1]:.3g} Hz, {means[worst]:.3g} times the "
+            "noise power there")
 
 
 def response_slopes(model: Callable[[Array], Array], v: Array, steps: Array, bounds: tuple[Array, Array]) -> Array:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.signal import lfilter
 
-from ._along import Along
+if TYPE_CHECKING:
+    from ._along import Along
 
 Array = NDArray[np.float64]
 _IGNORED = 1e6  # K: standard deviation of a missing reading

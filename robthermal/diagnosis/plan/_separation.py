@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
 
-from ..._fitting import Data
 from ...signals import Record
+from ..data import RecordData
 from ..fit import Structure, Whitened, filters
 from ..search import Entry
 from ._measurement import Measurement
@@ -42,7 +42,7 @@ class Hypothesis:
     v: Array
     present: Array
 
-    def on(self, trial: Data, setting: Setting) -> tuple[Structure, Array]:
+    def on(self, trial: RecordData, setting: Setting) -> tuple[Structure, Array]:
         """The structure and its unknowns on one new record."""
         start = setting.start(self.structure, self.structure.system(self.v))
         own = replace(self.structure, data=(trial,), starts=(start,))
@@ -123,7 +123,8 @@ def separation(hypotheses: Sequence[Hypothesis], setting: Setting, record: Recor
         Inputs to apply.
     """
     one = setting.one
-    trial = Data(record, one.sensors, one.columns, np.zeros((len(record), len(one.sensors))))  # only differences count
+    readings = np.zeros((len(record), len(one.sensors)))  # only differences count
+    trial = RecordData(record, one.sensors, one.columns, readings)
     on = [hypothesis.on(trial, setting) for hypothesis in hypotheses]
     _, whiteners = filters(*on[0], setting.floor, setting.levels)
     n, z, rows = trial.readings.size, [], []

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..._fitting import Data, Initial, initial_of
+from ..._fitting import Initial
 from ...signals import Record
 from ...thermal import System, steady_state
-from ..data import NoiseFloor, ResponseData
+from ..data import NoiseFloor, RecordData, records_of, responses_of
 from ..fit import Levels, Refit, Structure
 
 _MOST = 2000  # samples planned after a frequency response: its record may have had a million
@@ -21,7 +21,7 @@ class Setting:
 
     Parameters
     ----------
-    one : Data
+    one : RecordData
         Its sensors, its number of samples, and the inputs that cannot be chosen.
     place : int or None
         Of the present record that it continues; None after frequency responses.
@@ -31,25 +31,24 @@ class Setting:
         Factors on it.
     """
 
-    one: Data
+    one: RecordData
     place: int | None
     floor: NoiseFloor
     levels: Levels
 
     def start(self, structure: Structure, system: System) -> Initial:
         """Prior of the initial temperatures."""
-        return initial_of(system, self.one, "free") if self.place is None else structure.starts[self.place]
+        return self.one.initial(system, "free") if self.place is None else structure.starts[self.place]
 
 
 def setting_of(fit: Refit) -> Setting | None:
     """As the first record; after frequency responses, as their record was, if the system declares sensor noise."""
-    for place, one in enumerate(fit.structure.data):
-        if isinstance(one, Data):
-            return Setting(one, place, fit.floor, fit.levels)
-    first, system = fit.structure.data[0], fit.system
+    for one in records_of(fit.structure.data):
+        return Setting(one, fit.structure.data.index(one), fit.floor, fit.levels)
+    first, system = responses_of(fit.structure.data)[0], fit.system
     noise = {name: sensor.noise for name, sensor in system.sensors.items() if sensor.noise}
-    found = steady_state(system, first.operating_point) if isinstance(first, ResponseData) else None
-    if not isinstance(first, ResponseData) or found is None or not noise or not found.equilibria:
+    found = steady_state(system, first.operating_point)
+    if not noise or not found.equilibria:
         return None
     n = min(first.response.n_samples, _MOST)
     nominal = {name: ambient.temperature for name, ambient in system.ambients.items()}
@@ -57,7 +56,7 @@ def setting_of(fit: Refit) -> Setting | None:
     seen = [found.equilibria[0].temperatures[system.sensors[name].lump] for name in noise]
     record = Record(sample_time=first.response.sample_time * first.response.n_samples / n, inputs=np.tile(held, (n, 1)),
                     outputs=np.tile(seen, (n, 1)), input_names=list(system.exogenous_names), output_names=list(noise))
-    one = Data(record, tuple(noise), np.array([system.sensor_names.index(name) for name in noise], np.intp),
+    one = RecordData(record, tuple(noise), np.array([system.sensor_names.index(name) for name in noise], np.intp),
                record.outputs)
     heat = {name: lump.disturbance for name, lump in system.lumps.items()}
     return Setting(one, None, replace(fit.floor, noise=noise, disturbance=heat), Levels(1.0, {}))

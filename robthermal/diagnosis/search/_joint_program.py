@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...conic import group_sparse
 from ..effects import Candidate
-from ..evidence import Scores, columns
+from ..evidence import Scores
 from ..fit import Refit
 
 Array = NDArray[np.float64]
@@ -173,4 +173,4 @@ def _block(fit: Refit, scores: Scores, i: int) -> Array:
         along = float(scores.signatures[:, i] @ fit.rest)
         return scores.signatures[:, i:i + 1] * (along / scores.size[i])
     pair = [replace(candidate, shape={**candidate.shape, candidate.effect.paired: angle}) for angle in (0.0, np.pi / 2)]
-    return fit.project(fit.whiten([columns(path, pair) for path in fit.paths]))
+    return fit.project(fit.whiten([path.columns(pair) for path in fit.paths]))

@@ -11,10 +11,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Data
 from ...errors import Diverged, InputError
-from ...thermal import System, trajectory
-from ..data import ResponseData
 from ..effects import Candidate
 from ..fit import LIMIT, Refit, extended
 
@@ -164,7 +161,7 @@ def _linearized(fit: Refit, pooled: EffectSet) -> _Pool:
     ends = structure.n_parameters + np.cumsum([len(c.effect.free) for c in structure.effects])
     own = [np.arange(end - len(c.effect.free), end) for c, end in zip(structure.effects, ends, strict=True)][first:]
     rest = np.setdiff1d(np.arange(pooled.fit.J.shape[1]), np.concatenate(own))
-    here = [modelled(one, system) for one, system in zip(structure.data, structure.systems(pooled.fit.v), strict=True)]
+    here = [one.model(system) for one, system in zip(structure.data, structure.systems(pooled.fit.v), strict=True)]
     return _Pool(pooled, values, own, rest, [_without(fit, pooled, here, i) for i in range(len(own))])
 
 
@@ -191,16 +188,9 @@ def _without(fit: Refit, pooled: EffectSet, here: Sequence[Array], gone: int) ->
     structure = old.with_effects(old.effects[:place] + old.effects[place + 1:])
     values = old.quantities(pooled.fit.v)
     v = structure.carried(old, pooled.fit.v, values[:place] + values[place + 1:])
-    change = [(with_it - modelled(one, system))[..., None] for one, with_it, system in
+    change = [(with_it - one.model(system))[..., None] for one, with_it, system in
               zip(old.data, here, structure.systems(v), strict=True)]
     return pooled.fit.whiten(change)[:, 0]
-
-
-def modelled(one: Data | ResponseData, system: System) -> Array:
-    """Readings of one record, or of one frequency response, as the system would have them."""
-    if isinstance(one, ResponseData):
-        return one.model(system)
-    return np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
 
 
 def near_trial(candidate: Candidate, size: float) -> float:

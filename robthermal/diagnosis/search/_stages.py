@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..._fitting import Data
-from ..data import ResponseData
+from ..data import DataSet
 from ..evidence import Scores, explains, promising, score
 from ..fit import Refit
 from ._decide import Accepted, decide
@@ -114,14 +113,14 @@ def compare(state: SearchState) -> SearchState:
     return replace(state, rounds=rounds, fit=fit, joint=joint)
 
 
-def validate(state: SearchState, data: Sequence[Data | ResponseData]) -> SearchState:
+def validate(state: SearchState, data: Sequence[DataSet]) -> SearchState:
     """Take effects back that validation data speak against, and resolve sets of alternatives where the data can.
 
     Parameters
     ----------
     state : SearchState
         State from `compare`.
-    data : sequence of Data or ResponseData
+    data : sequence of DataSet
         Validation data, from `validation_data`; nothing is fitted to them.
     """
     rounds, fit = state.rounds, state.fit

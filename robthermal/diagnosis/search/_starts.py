@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ...errors import Diverged, InputError
 from ..effects import Candidate
-from ..evidence import BIC_GAP, columns
-from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended, paths_of
+from ..evidence import BIC_GAP
+from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended
 
 Array = NDArray[np.float64]
 _SETTLING = 2  # evaluations before what shapes an effect is moved
@@ -46,7 +46,7 @@ class Origin:
         structure = self.fit.structure
         v = structure.start(structure.ranges.start, structure.quantities(self.fit.v))
         z = Whitened(structure, self.fit.whiteners).residual(v)
-        return replace(self.fit, v=v, z=z, paths=paths_of(structure, v))
+        return replace(self.fit, v=v, z=z, paths=structure.paths(v))
 
 
 def in_reach(delta_bic: float, best: float) -> bool:
@@ -152,7 +152,7 @@ def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: floa
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
     """Optimum of the linearised problem for a size within its bounds, and its sum of squares."""
     size = _believable(candidate, size)
-    target = fit.z - size * fit.whiten([columns(path, [candidate]) for path in fit.paths])[:, 0]
+    target = fit.z - size * fit.whiten([path.columns([candidate]) for path in fit.paths])[:, 0]
     shift = np.linalg.lstsq(fit.J, target, rcond=1e-9)[0]
     left = target - fit.J @ shift
     return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
@@ -168,7 +168,7 @@ def _believable(candidate: Candidate, size: float) -> float:
 def _best_trial(fit: Refit, candidate: Candidate) -> tuple[Candidate, float]:
     """Trial values and size that explain most."""
     trials = [candidate] if candidate.effect.paired else candidate.trials(fit.paths[0])
-    J = fit.project(fit.whiten([columns(path, trials) for path in fit.paths]))
+    J = fit.project(fit.whiten([path.columns(trials) for path in fit.paths]))
     power, along = np.sum(J**2, axis=0), J.T @ fit.rest
     sizes = np.array([_believable(trial, size) for trial, size in zip(trials, along / np.maximum(power, 1e-300),
                                                                       strict=True)])

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..._fitting import Data
-from ..data import ResponseData
+from ..data import DataSet
 from ..effects import Candidate
 from ..evidence import BIC_GAP, surprises
 from ..fit import Refit, fitted
@@ -14,7 +13,7 @@ from ._decide import Accepted, Decision
 from ._short_list import Entry, Key, delta_bic, refiltered
 
 
-def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data | ResponseData]
+def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet]
                ) -> tuple[tuple[Accepted, ...], Refit]:
     """Order the names of every ambiguous set by the evidence of all records, and drop those beyond doubt worse.
 
@@ -27,7 +26,7 @@ def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data | R
         In the order of the effects of the fit.
     fit : Refit
         With them.
-    data : sequence of Data or ResponseData
+    data : sequence of DataSet
         Unseen.
     """
     for round_ in rounds:
@@ -44,7 +43,7 @@ def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
     return tuple(entry.candidate for round_ in rounds for entry in round_.ruled_out)
 
 
-def _weighed(round_: Accepted, rivals: Sequence[Entry], fit: Refit, data: Sequence[Data | ResponseData]
+def _weighed(round_: Accepted, rivals: Sequence[Entry], fit: Refit, data: Sequence[DataSet]
              ) -> tuple[Accepted, Refit]:
     """One set with all records, and the fit with its best name."""
     best = round_.best

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..._fitting import Data
-from ..data import ResponseData
+from ..data import DataSet
 from ..evidence import BIC_GAP, surprises
 from ..fit import Refit, fitted
 from ._decide import Accepted
 from ._revise import without
 
 
-def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Sequence[Data | ResponseData]
+def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Sequence[DataSet]
               ) -> tuple[tuple[Accepted, ...], Refit]:
     """Drop effects, the worst first, without which the unseen records are predicted beyond doubt better.
 
@@ -22,7 +21,7 @@ def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Se
         In the order of the effects of the fit.
     fit, nominal : Refit
         With them, without any.
-    data : sequence of Data or ResponseData
+    data : sequence of DataSet
         Unseen. They only take names back: no parameter and no name comes from them.
     """
     while rounds:

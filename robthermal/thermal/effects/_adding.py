@@ -49,7 +49,7 @@ def add_effect(system: System, effect: str, where: Sequence[str], values: Values
     effect : str
         A name of `effects`.
     where : sequence of str
-        Parts that it names, in the order of `Effect.where`.
+        Parts that it names, in the order of `EffectKind.where`.
     values : mapping, optional
         Parameters; what is left out is zero, or for a shape a usual value (exponent 0.25, time constant 60 s, period
         600 s, dew point 283.15 K). A hidden mass cannot be zero: it starts at a millionth of its lump's capacity.

@@ -1,0 +1,41 @@
+"""Linearize a model beside any data set, and find the records among what is linearized."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...thermal import System, trajectory
+from ..data import DataSet, RecordData, ResponseData
+from ._along import Along, along
+from ._frequency_model import along_response
+from ._linearized import Linearized
+
+
+def linearize(system: System, one: DataSet, tolerance: float = 1e-4) -> Linearized:
+    """Simulate a record, or compute a frequency response, and prepare the linearization there.
+
+    Parameters
+    ----------
+    system : System
+        Model with its initial temperatures.
+    one : DataSet
+        Record or frequency response.
+    tolerance : float
+        Tolerance of the simulation [K].
+    """
+    if isinstance(one, ResponseData):
+        return along_response(system, one)
+    if isinstance(one, RecordData):
+        return along(system, one, trajectory(system, one.record, tolerance=tolerance))
+    raise TypeError(f"{type(one).__name__} is neither a record nor a frequency response")
+
+
+def linearized_records(paths: Sequence[Linearized]) -> tuple[Along, ...]:
+    """The linearized records, without the frequency responses.
+
+    Parameters
+    ----------
+    paths : sequence of Linearized
+        Models beside all data sets of a fit.
+    """
+    return tuple(path for path in paths if isinstance(path, Along))
