@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,13 @@ import pandas as pd
 
 from .._fleet import fleet
 from ..errors import InputError, Outcome
-from ..thermal import System, fold, format_system, steady_state
+from ..thermal import System, format_system, steady_state
 from ._contraction import Method
-from ._limits import CurrentLimit, largest_current
-from ._sections import Temperatures
+from ._sections import Interval, Temperatures, parameter_box
+from ._usable import box_bound, headline, question_of
+from ._usable_bounds import Lower, Question, contraction_bound, rating_bound
+from ._usable_result import CurrentBound, UsableCurrent
+from ._usable_runaway import OF_FOLD, fold_current
 
 _AXES = ("ambient [K]", "setpoint [K]", "load [W]")
 _QUIET = 1e-6  # A: a current this small is none
@@ -24,31 +27,41 @@ _QUIET = 1e-6  # A: a current this small is none
 
 @dataclass(frozen=True)
 class LimitMap:
-    """Current limits of a machine over its operating conditions.
+    """Usable currents of a machine over its operating conditions.
 
     Parameters
     ----------
     data : DataFrame
-        A row per condition: "ambient [K]", "setpoint [K]", "load [W]" on every cold face; "needed [A]", the largest
-        current, cooling or heating, a module needs to hold it (nan: no equilibrium does); "runaway [A]", the smallest
-        I* of the modules; "certified [A]", up to which arbitrary currents are certified; "limit [A]", the smaller of
-        the two; "safe", whether the needed current is within the limit.
-    certified : CurrentLimit
-        The certified limit with its certificate: it holds for every condition whose temperatures stay in its box. Its
-        direction is "cooling", or "symmetric" when some condition needs a heating current.
+        A row per condition: "ambient [K]", "setpoint [K]", "load [W]" on every cold face; "needed [A]", the current of
+        the module that needs most to hold it, negative if it heats (nan: no equilibrium does); "runaway [A]", the
+        smallest I* of the modules; "contraction [A]", the contraction limit inside the stated box, which is not a limit
+        for use; "usable [A]", the usable current: the smallest of 0.98 I*, contraction, invariant box and rating;
+        "allowed", whether the needed current is within the usable one.
+    contraction : CurrentBound
+        The contraction limit inside the stated box; not a limit for use.
+    boxes : dict
+        (ambient [K], load [W]) to the `UsableCurrent` for all set-points of the map: the largest usable current of its
+        conditions, with the box that is never left and its two certificates. Its direction is "cooling", or "symmetric"
+        when some condition of the map needs a heating current.
     outcome : Outcome
-        How many conditions are safe.
+        How many conditions are allowed.
     """
 
     data: pd.DataFrame
-    certified: CurrentLimit
+    contraction: CurrentBound
+    boxes: dict[tuple[float, float], UsableCurrent]
     outcome: Outcome
+
+    @property
+    def direction(self) -> str:
+        """"cooling", or "symmetric" when some condition of the map needs a heating current."""
+        return next(iter(self.boxes.values())).direction
 
     def __str__(self) -> str:
         return f"{self.outcome.text}\n{self.data.round(3).to_string(index=False)}"
 
     def plot(self) -> Any:
-        """Plot needed and allowed current over the load, a panel per set-point; returns the array of axes."""
+        """Plot needed and usable current over the load, a panel per set-point; returns the array of axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         panels = list(self.data.groupby("setpoint [K]"))
@@ -56,9 +69,10 @@ class LimitMap:
         for ax, (setpoint, panel) in zip(axes[0], panels, strict=True):
             for k, (ambient, part) in enumerate(panel.groupby("ambient [K]")):
                 ax.plot(part["load [W]"], part["needed [A]"], f"C{k % 6}o-", ms=3, label=f"{ambient - 273.15:.3g} °C")
-                ax.plot(part["load [W]"], part["limit [A]"], f"C{k % 6}--", lw=0.9)
+                for sign in (1, -1) if self.direction == "symmetric" else (1,):
+                    ax.plot(part["load [W]"], sign * part["usable [A]"], f"C{k % 6}--", lw=0.9)
             ax.set(xlabel="load on every cold face [W]", title=f"set-point {setpoint - 273.15:.3g} °C")
-        axes[0, 0].set(ylabel="current needed (line), allowed (dashed) [A]")
+        axes[0, 0].set(ylabel="current needed (line), usable (dashed) [A]")
         lines = [line for line in axes[0, 0].get_lines() if not line.get_label().startswith("_")]
         figure.legend(handles=lines, title="ambient", ncols=6, fontsize="small", loc="outside upper center")
         return axes[0]
@@ -67,12 +81,13 @@ class LimitMap:
 def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[float], load: Sequence[float],
               temperature: Temperatures, method: Method = "energy", jobs: int = 2,
               progress: Callable[[int, int], None] = lambda done, total: None,
-              store: str | Path | None = None) -> LimitMap:
-    """Map the allowed current over ambient temperature, set-point and load.
+              store: str | Path | None = None, parameters: Mapping[str, Interval] | None = None,
+              lower: Lower = "reported") -> LimitMap:
+    """Map the usable current over ambient temperature, set-point and load.
 
-    A saturated controller runs on a given current, so the limit must pass the contraction certificate; the regulated
-    loop must stay below its fold I*. The limit is the smaller of the two. Where a condition needs heating, the
-    certificate is for currents of both signs.
+    For every ambient and load the bounds of `usable_current` are found: contraction in the stated box, the invariant
+    box inside it, the rating; and for every ambient and set-point I* of the network, of which 0.98 are used. Where a
+    condition needs heating, all of it is for currents of both signs.
 
     Parameters
     ----------
@@ -85,15 +100,19 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     load : sequence of float
         Heat into every cold face [W].
     temperature : tuple or mapping
-        Box of the contraction certificate [K].
+        The stated box, which the machine must not leave [K].
     method : {"energy", "sum", "max", "lyapunov"}
-        Of the contraction certificate.
+        Of the contraction certificates.
     jobs : int
         Processes.
     progress : callable, optional
         Called with the number of ambients and set-points that are done, and how many there are.
     store : str or path, optional
         File that keeps what is done, as in `rt.fleet`: a map that was stopped continues where it was.
+    parameters : mapping, optional
+        Ranges of uncertain numbers of the system as in `usable_current`; the needed current is the nominal one.
+    lower : {"reported", "inside"}
+        Whether the lower ends of the boxes must lie inside the stated one, as in `usable_current`.
 
     Returns
     -------
@@ -102,49 +121,59 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     Raises
     ------
     InputError
-        No modules, empty or non-finite axes, Celsius.
+        No modules, empty or non-finite axes, Celsius, a stated box that excludes an ambient.
 
     Examples
     --------
     >>> import robthermal as rt
     >>> found = rt.certify.limit_map(rt.systems.two_module(), ambient=[298.15], setpoint=[283.15], load=[1.0, 5.0],
     ...                              temperature=(273.15, 358.15), jobs=1)
-    >>> found.data["safe"].tolist()
+    >>> found.data["allowed"].tolist()
     [True, False]
     """
     axes = [_axis(values, name) for values, name in zip((ambient, setpoint, load), ("ambient", "setpoint", "load"),
                                                         strict=True)]
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise InputError(f"jobs = {jobs!r}", where="argument jobs", expected="a whole number, at least 1")
-    certified = largest_current(system, temperature=temperature, direction="cooling", method=method)
+    ranges = parameter_box(system, parameters or {})
+    nominal = question_of(system, temperature=temperature, parameters=parameters, lower=lower, method=method, heat={},
+                          ambient=dict.fromkeys(system.ambient_names, (min(axes[0]), max(axes[0]))))
     points = [{"ambient": T, "setpoint": target, "loads": axes[2]} for T in axes[0] for target in axes[1]]
-    run = fleet(partial(_rows, system), points, store=store, setting="" if store is None else format_system(system),
-                jobs=jobs, progress=progress)
+    setting = "" if store is None else f"{format_system(system)}{sorted(ranges.items())}"
+    run = fleet(partial(_rows, nominal), points, store=store, setting=setting, jobs=jobs, progress=progress)
     data = pd.DataFrame([row for rows in run.results for row in rows])
-    if (data.pop("lowest [A]") < 0).any():  # [0, c] proves nothing about the heating current of a warm set-point
-        certified = largest_current(system, temperature=temperature, direction="symmetric", method=method)
-    data["certified [A]"] = certified.current
-    data["limit [A]"] = data[["runaway [A]", "certified [A]"]].min(axis=1)
-    data["safe"] = data["needed [A]"] <= data["limit [A]"]
-    return LimitMap(data, certified, Outcome(
-        certified.outcome.ok, "mapped" if certified.outcome.ok else "not_certified",
-        f"{int(data['safe'].sum())} of {len(data)} conditions need no more than the allowed current. "
-        f"{certified.outcome.text}"))
+    heats = (data["needed [A]"] < -_QUIET).any()  # [0, c] proves nothing about the heating current of a warm set-point
+    asked = replace(nominal, direction="symmetric" if heats else "cooling")
+    contraction, rating = contraction_bound(asked), rating_bound(asked)
+    boxes = {}
+    for (T, watts), part in data.groupby(["ambient [K]", "load [W]"]):
+        condition = replace(asked, ambient=dict.fromkeys(system.ambient_names, (T, T)),
+                            heat={module.cold: (watts, watts) for module in system.modules.values()})
+        highest = CurrentBound(OF_FOLD * float(part["runaway [A]"].max()), None, "computed",
+                               "0.98 I*, the fold of the network, at the set-point of the map where it is largest.")
+        boxes[T, watts] = headline(condition, {"contraction": contraction, "box": box_bound(condition),
+                                               "runaway": highest, "rating": rating})
+    data["contraction [A]"] = contraction.current
+    headlines = [boxes[T, watts].current for T, watts in zip(data["ambient [K]"], data["load [W]"], strict=True)]
+    data["usable [A]"] = np.minimum(OF_FOLD * data["runaway [A]"], headlines)
+    data["allowed"] = data["needed [A]"].abs() <= data["usable [A]"]
+    allowed = int(data["allowed"].sum())
+    return LimitMap(data, contraction, boxes, Outcome(allowed > 0, "mapped" if allowed else "none",
+                    f"{allowed} of {len(data)} conditions need no more than the usable current."))
 
 
-def _rows(system: System, point: Mapping[str, Any]) -> list[dict[str, float]]:
-    ambient, setpoint, loads = point["ambient"], point["setpoint"], point["loads"]
-    surroundings = dict.fromkeys(system.ambient_names, ambient)
-    targets = dict.fromkeys(system.module_names, setpoint)
-    limit = float(np.min(fold(system, targets, ambient=surroundings).current[-1]))
+def _rows(question: Question, point: Mapping[str, Any]) -> list[dict[str, float]]:
+    system, ambient, setpoint, loads = question.system, point["ambient"], point["setpoint"], point["loads"]
+    surroundings, targets = dict.fromkeys(system.ambient_names, ambient), dict.fromkeys(system.module_names, setpoint)
+    limit = fold_current(replace(question, ambient={name: (T, T) for name, T in surroundings.items()}), targets)
     rows = []
     for load in loads:
         heat = {module.cold: load for module in system.modules.values()}
         states = steady_state(system, surroundings, setpoint=targets, heat=heat)
         stable = [list(e.currents.values()) for e in states.equilibria if e.stable]
         best = min(stable, key=lambda currents: max(map(abs, currents)), default=[float("nan")])
-        rows.append({**dict(zip(_AXES, (ambient, setpoint, load), strict=True)), "needed [A]": max(map(abs, best)),
-                     "runaway [A]": limit, "lowest [A]": min([i for i in best if i < -_QUIET], default=0.0)})
+        rows.append({**dict(zip(_AXES, (ambient, setpoint, load), strict=True)), "needed [A]": max(best, key=abs),
+                     "runaway [A]": limit})
     return rows
 
 

@@ -19,6 +19,7 @@ _UNCERTAIN = (".capacity", ".conductance", *(f".{name}.{part}" for name in ("see
                                              for part in ("value", "slope")))
 
 _NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
+_HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to the network
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
@@ -89,13 +90,14 @@ def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[st
     """{parameter name: [lo, hi]} around the values of the system, of those that the claim depends on.
 
     What only sensors, heaters or a start know is left out: no claim about the network in given ranges of currents,
-    heats and ambients depends on it. A conductance cannot be negative: its range is cut at 0.
+    heats and ambients depends on it.
     """
     every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
     ranges = {}
     for name, (low, high) in every.items():
         where, value = f"argument parameters[{name!r}]", system.parameter(name)
-        if name.startswith(_NOT_OF_THE_NETWORK) or name.endswith((".disturbance", ".initial")):
+        outside = name.startswith(_NOT_OF_THE_NETWORK) and not name.endswith(_HEATING)
+        if outside or name.endswith((".disturbance", ".initial")):
             continue
         if not name.endswith(_UNCERTAIN):
             raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
@@ -104,10 +106,9 @@ def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[st
         if not low <= value <= high:
             raise InputError(f"({low}, {high}) excludes the system's own value {value}", where=where,
                              expected="lower <= value <= upper")
-        if name.startswith("links."):
-            low = max(low, 0.0)
-        elif low <= 0 and not name.endswith(".slope"):
-            raise InputError(f"({low}, {high})", where=where, expected="positive numbers")
+        positive = low > 0 or (low == 0 and name.startswith("links."))
+        if not positive and not name.endswith(".slope"):
+            raise InputError(f"({low}, {high})", where=where, expected="positive numbers; of links also 0")
         ranges[name] = [low, high]
     return ranges
 

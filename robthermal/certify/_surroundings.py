@@ -8,6 +8,8 @@ from ..errors import InputError
 from ..thermal import System
 from ._sections import Interval, named_ranges
 
+_HARMLESS = ("gain", "drive.delay", "drive.time_constant")  # ranges that are counted, or keep heat within its limits
+
 
 def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
     """Heat range of every heated lump from the declared limits of the heaters.
@@ -27,7 +29,7 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Raises
     ------
     InputError
-        A heater without limits.
+        A heater without limits; a range of a heater's parameter that does more than scale its heat.
 
     Examples
     --------
@@ -45,6 +47,10 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
         if heater.limits is None:
             raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
                              remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
+        for key in parameters or {}:
+            if key.startswith(f"inputs.{name}.") and key.removeprefix(f"inputs.{name}.") not in _HARMLESS:
+                raise InputError(f"a range of {key} cannot be covered: limits do not tell what it does to the heat",
+                                 where=f"argument parameters[{key!r}]", remedy="Pass heat={lump: (lower, upper)}.")
         gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
         ends = sorted(gain * limit for gain in gains for limit in heater.limits)
         low, high = heat.get(heater.lump, (0.0, 0.0))

@@ -5,26 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate
 from ._contraction import METHODS, Method, contraction
-from ._enclosure import named_box, no_box
-from ._invariance import invariance
 from ._limits import DIRECTIONS, Direction, current_range
 from ._regulated import SetPoints
 from ._sections import Interval, Temperatures, parameter_box, system_section
 from ._surroundings import ambient_ranges, heater_heat
 from ._usable_bounds import Lower, Question, contraction_bound, largest_box_current, rating_bound
-from ._usable_result import BOUNDS, CurrentBound, UsableCurrent
+from ._usable_result import CurrentBound, UsableCurrent
 from ._usable_runaway import runaway_bound
 
 _BACK_OFF = (0.0, 1e-3, 1e-2, 0.05, 0.2)
-_ABOVE = 1.02  # of the limit, where the parameter that binds is looked for
-_MEANING = {"contraction": "Contraction limit inside the stated box; not a limit for use.",
-            "box": "Up to it a box inside the stated one is never left, for all ambients and heats, and contracts."}
 
 
 def usable_current(system: System, *, direction: Direction = "cooling", temperature: Temperatures,
@@ -82,56 +75,59 @@ def usable_current(system: System, *, direction: Direction = "cooling", temperat
     >>> round(found.current, 2), found.limited_by, found.invariance.holds, found.contraction.holds
     (1.48, 'runaway', True, True)
     """
+    question = question_of(system, direction=direction, temperature=temperature, ambient=ambient, heat=heat,
+                           parameters=parameters, lower=lower, method=method)
+    runaway, costly = runaway_bound(question, setpoint)
+    limits = {"contraction": contraction_bound(question), "box": box_bound(question), "runaway": runaway,
+              "rating": rating_bound(question)}
+    return headline(question, limits, costly)
+
+
+def question_of(system: System, *, direction: Direction = "cooling", temperature: Temperatures,
+                ambient: Mapping[str, Interval] | None, heat: Mapping[str, Interval] | None,
+                parameters: Mapping[str, Interval] | None, lower: Lower, method: Method) -> Question:
+    """Arguments of `usable_current`, checked."""
     _check(system, direction, method, lower)
     question = Question(system, direction, temperature, ambient_ranges(system, ambient, parameters),
                         heater_heat(system, parameters) if heat is None else heat,
                         parameter_box(system, parameters or {}), lower, method)
     question.check_box()
-    runaway, costly = runaway_bound(question, setpoint)
-    inside = largest_box_current(question)
-    limits = {"contraction": contraction_bound(question), "box": _box_bound(question, inside), "runaway": runaway,
-              "rating": rating_bound(question)}
-    limits = {name: limits[name] for name in BOUNDS}
-    limited_by = min(BOUNDS, key=lambda name: limits[name].current)
+    return question
+
+
+def headline(question: Question, limits: dict[str, CurrentBound], costly: str | None = None) -> UsableCurrent:
+    """The smallest of the bounds with its certificates; `costly`: the parameter that costs most of the runaway bound."""
+    q = question
+    limited_by = min(limits, key=lambda name: limits[name].current)
     for back_off in _BACK_OFF:
         c = limits[limited_by].current * (1 - back_off)
-        box, stays, shrinks = _certified(question, c)
+        box, stays = q.certified_box(c)
+        shrinks = stays if not box else contraction(q.system, current=current_range(q.system, q.direction, c),
+                                                    temperature=box, method=q.method, parameters=q.parameters)
         if stays.holds and shrinks.holds:
             break
-    proven = stays.holds and shrinks.holds
-    current = c if proven else 0.0
-    if limited_by in ("contraction", "box"):
-        costly = _limiting_parameter(question, limited_by, limits[limited_by].current)
-    return UsableCurrent(current, direction, limited_by, limits, current_range(system, direction, current), box, stays,
-                         shrinks, _outcome(current, proven, limited_by, limits, stays, shrinks), costly)
+    c = c if stays.holds and shrinks.holds else 0.0
+    if limited_by != "runaway":
+        costly = _limiting_parameter(q, limited_by, limits[limited_by].current)
+    return UsableCurrent(c, q.direction, limited_by, limits, current_range(q.system, q.direction, c), box, stays,
+                         shrinks, _outcome(c, limited_by, limits, stays, shrinks), costly)
 
 
-def _certified(question: Question, c: float) -> tuple[dict[str, Interval], Certificate, Certificate]:
-    """Smallest box at a current with its two certificates."""
-    q, current = question, current_range(question.system, question.direction, c)
-    box = q.box(c)
-    if box is None:
-        refused = no_box(q.system, current)
-        return {}, refused, refused
-    named = named_box(q.system, box)
-    stays = invariance(q.system, current=current, temperature=named, ambient=q.ambient, heat=q.heat or None,
-                       parameters=q.parameters)
-    return named, stays, contraction(q.system, current=current, temperature=named, method=q.method,
-                                     parameters=q.parameters)
-
-
-def _box_bound(question: Question, current: float) -> CurrentBound:
+def box_bound(question: Question) -> CurrentBound:
+    """Largest current with an invariant box inside the stated one, in which the network contracts."""
+    largest = largest_box_current(question)
     for back_off in _BACK_OFF:
-        c = current * (1 - back_off)
-        box, stays, shrinks = _certified(question, c)
-        if stays.holds and shrinks.holds:
-            return CurrentBound(c, stays, "proven", _MEANING["box"])
+        c = largest * (1 - back_off)
+        _, stays = question.certified_box(c)
+        if stays.holds:
+            return CurrentBound(c, stays, "proven", "Up to it a box inside the stated one is never left, for all "
+                                "ambients and heats.")
     return CurrentBound(0.0, stays, "proven", "Not even without current is a box inside the stated one proven.")
 
 
 def _limiting_parameter(question: Question, limited_by: str, current: float) -> str | None:
     """The parameter without whose range the binding bound would be largest."""
-    if not question.parameters:
+    if not question.parameters or limited_by == "rating":
         return None
     find: Any = largest_box_current if limited_by == "box" else lambda q: contraction_bound(q).current
     found = {name: find(question.without(name)) for name in question.parameters}
@@ -151,13 +147,12 @@ def _check(system: System, direction: str, method: str, lower: str) -> None:
                          remedy="Without modules use rt.certify.runaway_free with current={}.")
 
 
-def _outcome(current: float, proven: bool, limited_by: str, limits: Mapping[str, CurrentBound], stays: Certificate,
+def _outcome(current: float, limited_by: str, limits: Mapping[str, CurrentBound], stays: Certificate,
              shrinks: Certificate) -> Outcome:
     bound = limits[limited_by]
     if current > 0:
         return Outcome(True, "usable", f"Usable current {current:.4g} A in every module, limited by {limited_by}: "
                        f"{bound.text}")
-    missing = stays if not stays.holds else shrinks
-    why = bound.text if proven or not np.isfinite(bound.current) or bound.current == 0 else missing.reason
+    why = bound.text if bound.current == 0 else (shrinks if stays.holds else stays).reason
     return Outcome(False, "none", f"No current is usable, limited by {limited_by}: {why} Widen the stated box, narrow "
                    "ambients and heats, or improve the heat sink.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,10 +11,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..thermal import System
+from ..verification import Certificate
 from ._contraction import Method
-from ._enclosure import RESERVE, RESERVE_OF_RANGES, named_box
+from ._enclosure import RESERVE, RESERVE_OF_RANGES, named_box, no_box
 from ._energy import energy_rate
 from ._faces import Array, Faces
+from ._invariance import invariance
 from ._jacobian import BoxJacobian, box_jacobian
 from ._limits import Direction, bisect, current_range, largest_current
 from ._lyapunov import largest_growth
@@ -25,6 +27,7 @@ from ._usable_result import CurrentBound
 from ._weights import has_weights
 
 Lower = Literal["inside", "reported"]
+_ROOM = 3.0  # times the reserve of the search, kept in the certified box where there is room for it
 
 
 @dataclass(frozen=True)
@@ -52,11 +55,14 @@ class Question:
         return Faces(self.system, self.ambient, self.heat, self.parameters,
                      RESERVE_OF_RANGES if self.parameters else RESERVE)
 
+    @cached_property
+    def roomy_faces(self) -> Faces:
+        """The same with a larger reserve, for boxes that have room in the stated one."""
+        return replace(self.faces, reserve=_ROOM * self.faces.reserve)
+
     def without(self, name: str) -> Question:
         """The same with one parameter at its value in the system."""
-        kept = {key: pair for key, pair in self.parameters.items() if key != name}
-        return Question(self.system, self.direction, self.temperature, self.ambient, self.heat, kept, self.lower,
-                        self.method)
+        return replace(self, parameters={key: pair for key, pair in self.parameters.items() if key != name})
 
     def check_box(self) -> None:
         """Refuse a stated box that excludes the ambients: the machine at rest would be outside it."""
@@ -69,10 +75,10 @@ class Question:
                     expected="a box with the whole range of the ambients inside",
                     remedy="Widen it, or narrow `ambient`.")
 
-    def box(self, c: float, start: Array | None = None) -> Array | None:
+    def box(self, c: float, start: Array | None = None, *, roomy: bool = False) -> Array | None:
         """Smallest invariant box for currents up to c, if it is inside the stated one and may contract."""
         current = current_range(self.system, self.direction, c)
-        box = smallest_box(self.faces, current, start)
+        box = smallest_box(self.roomy_faces if roomy else self.faces, current, start)
         if box is None or (box[1] > self.stated[1]).any():
             return None
         if self.lower == "inside" and (box[0] < self.stated[0]).any():
@@ -80,6 +86,17 @@ class Question:
         region = {"temperature": {name: list(pair) for name, pair in named_box(self.system, box).items()},
                   "current": current, "parameters": self.parameters}
         return box if may_contract(box_jacobian(self.system, region), self.method) else None
+
+    def certified_box(self, c: float) -> tuple[dict[str, Interval], Certificate]:
+        """Box at a current, by lump, and the certificate that it is never left; empty where there is none."""
+        current, box = current_range(self.system, self.direction, c), self.box(c, roomy=True)
+        if box is None:
+            box = self.box(c)
+        if box is None:
+            return {}, no_box(self.system, current)
+        named = named_box(self.system, box)
+        return named, invariance(self.system, current=current, temperature=named, ambient=self.ambient,
+                                 heat=self.heat or None, parameters=self.parameters)
 
 
 def may_contract(box: BoxJacobian, method: str) -> bool:

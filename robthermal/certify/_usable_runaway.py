@@ -15,7 +15,7 @@ from ._sections import Interval, named_ranges
 from ._usable_bounds import Question
 from ._usable_result import CurrentBound
 
-_OF_FOLD = 0.98  # share of I* that is used: it is computed, and at I* itself nothing is left
+OF_FOLD = 0.98  # share of I* that is used: it is computed, and at I* itself nothing is left
 
 
 def runaway_bound(question: Question, setpoint: SetPoints | None) -> tuple[CurrentBound, str | None]:
@@ -30,7 +30,7 @@ def runaway_bound(question: Question, setpoint: SetPoints | None) -> tuple[Curre
     def smallest(numbers: Mapping[str, float]) -> tuple[float, float]:
         """0.98 I* of the modules with set-points, and the coldest current of the others."""
         machine = system.with_parameters(dict(numbers))
-        return (_OF_FOLD * _fold_current(machine, held, question),
+        return (OF_FOLD * _fold_current(machine, held, question),
                 coldest_current(machine, free, question.ambient, question.heat) if free else float("inf"))
 
     nominal = smallest({})
@@ -38,6 +38,16 @@ def runaway_bound(question: Question, setpoint: SetPoints | None) -> tuple[Curre
     current = min(worst)
     proof = _proof(question, setpoint, current) if held else None
     return CurrentBound(current, proof, "computed", _text(worst, free, question)), costly
+
+
+def fold_current(question: Question, setpoint: SetPoints) -> float:
+    """I* of the modules with set-points for the worst set-points, ambients, heats and parameters [A]."""
+    held = _points(question.system, setpoint)
+
+    def smallest(numbers: Mapping[str, float]) -> tuple[float, float]:
+        return _fold_current(question.system.with_parameters(dict(numbers)), held, question), float("inf")
+
+    return _worst(question.parameters, smallest({}), smallest)[0][0]
 
 
 def _points(system: System, setpoint: SetPoints) -> dict[str, Interval]:
@@ -73,7 +83,7 @@ def _worst(parameters: Mapping[str, Any], nominal: tuple[float, float],
         cost[name] = abs(min(up) - min(nominal))
         for kind in (0, 1):
             worst[kind][name] = high if up[kind] < nominal[kind] else low
-    together = smallest(worst[0])[0], smallest(worst[1])[1]
+    together = min(nominal[0], smallest(worst[0])[0]), min(nominal[1], smallest(worst[1])[1])
     return together, max(cost, key=lambda name: cost[name])
 
 

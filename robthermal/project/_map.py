@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 from joblib import cpu_count
 
-from ..certify import LimitMap, limit_map, runaway
+from ..certify import LimitMap, UsableCurrent, limit_map, runaway
 from ..errors import InputError
 from ..report import Figure, Report, Section, Table, house_style
 from ..thermal import System
-from ..verification import verify
+from ..verification import Certificate, verify
 from ._arguments import boxes_from_text
 from ._assumptions import machine_assumptions
 from ._checked import Checked
@@ -113,7 +113,7 @@ def map_from_text(system: System, *, ambient: str | None = None, load: str | Non
 
 def map_system(system: System, request: MapRequest,
                progress: Callable[[int, int], None] = lambda done, total: None) -> LimitMap:
-    """Map the allowed current of a system.
+    """Map the usable current of a system.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def map_system(system: System, request: MapRequest,
     --------
     >>> import robthermal as rt
     >>> wanted = rt.project.MapRequest(ambient=(298.15,), setpoint=(283.15,), load=(1.0,))
-    >>> rt.project.map_system(rt.systems.two_module(), wanted).data["safe"].tolist()
+    >>> rt.project.map_system(rt.systems.two_module(), wanted).data["allowed"].tolist()
     [True]
     """
     loads = request.load
@@ -158,7 +158,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
     files : tuple of Path
         Input files, for their hashes.
     out : str or Path
-        Output folder: map.csv, report.html, junit.xml, summary.json, certificates/map.json.
+        Output folder: map.csv, report.html, junit.xml, summary.json, certificates/map_*.json.
 
     Returns
     -------
@@ -178,9 +178,11 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
     >>> rt.project.write_map(found, system, (), "map").holds
     True
     """
-    certificate = result.certified.certificate
-    checked = (Checked("map", f"Largest {result.certified.direction} current of the map", certificate,
-                       verify(certificate) if certificate.holds else None, True),)
+    checked = tuple(
+        _checked(f"map_{number}_{key}", f"{title}, {condition}", certificate)
+        for box, condition, number in _conditions(result, system)
+        for key, title, certificate in (("never_left", f"Box with {box.current:.4g} A is never left", box.invariance),
+                                        ("contraction", f"Contraction with {box.current:.4g} A", box.contraction)))
     data = in_unit(result.data, system.temperature_unit)
     report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system), label="",
                     claims=claims(checked), sections=(_section(result, data),),
@@ -192,11 +194,27 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
     return report
 
 
+def _conditions(result: LimitMap, system: System) -> list[tuple[UsableCurrent, str, int]]:
+    """Usable currents of the map with their condition in words and a number; one at least."""
+    found = [(box, _condition(ambient, load, system.temperature_unit), number)
+             for number, ((ambient, load), box) in enumerate(result.boxes.items(), 1)]
+    return [entry for entry in found if entry[0].holds] or found[:1]
+
+
+def _condition(ambient: float, load: float, unit: str) -> str:
+    value, name = (ambient, "K") if unit == "K" else (ambient - 273.15, "°C")
+    return f"ambient {value:.4g} {name}, load {load:.4g} W"
+
+
+def _checked(key: str, title: str, certificate: Certificate) -> Checked:
+    return Checked(key, title, certificate, verify(certificate) if certificate.holds else None, True)
+
+
 _ASSUMPTIONS = (
     "All modules hold their cold faces at one set-point, all ambients have one temperature, every cold face has the "
     "same load.",
-    "I* and the needed current are computed, not proven; the certified current holds while all lumps are in the "
-    "temperature box.",
+    "I* and the needed current are computed, not proven. The boxes of the usable currents are proven: never left, and "
+    "contracting in them.",
 )
 
 
@@ -211,13 +229,14 @@ def in_unit(data: pd.DataFrame, unit: str) -> pd.DataFrame:
 def _section(result: LimitMap, data: pd.DataFrame) -> Section:
     with house_style():
         axes = result.plot()
-        figure = Figure.draw(axes[0].figure, alt="Current needed and allowed over the load, a panel per set-point, a "
+        figure = Figure.draw(axes[0].figure, alt="Current needed and usable over the load, a panel per set-point, a "
                              "colour per ambient temperature.",
-                             caption="Needed (line) and allowed (dashed) current. A line ends where no stable "
+                             caption="Needed (line) and usable (dashed) current. A line ends where no stable "
                              "equilibrium holds more load.")
-    text = (f"{result.outcome.text} The allowed current is the smaller of the runaway limit I* of the regulated "
-            "machine and the current up to which everything is certified, whatever the current does. Conditions "
-            "without a needed current cannot be held. All rows are in map.csv.")
+    text = (f"{result.outcome.text} The usable current is the smallest of 0.98 I*, I* the runaway limit of the "
+            "regulated machine, the current up to which a box inside the stated one is never left, the contraction "
+            "limit inside the stated box (which is not a limit for use), and the rating. Conditions without a needed "
+            "current cannot be held. All rows are in map.csv.")
     return Section("Map of current limits", text, figures=(figure,), tables=(Table(data, "Conditions."),), anchor="map")
 
 
