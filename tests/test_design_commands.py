@@ -385,20 +385,22 @@ def test_map_writes_data_plot_and_certificate(run: Cli, file: Path, bench: rt.Sy
     law = rt.design.feedback_linearization(bench)
     needed = rt.design.reachable(law, 285.15).current["m1"]
     assert data["needed [A]"][0] == pytest.approx(needed, abs=1e-6) and np.isnan(data["needed [A]"][1])
-    assert data["safe"].tolist() == [True, False]
+    assert data["allowed"].tolist() == [True, False]
     assert "<svg" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert run("verify", tmp_path / "out").status == 0
 
 
-def test_heating_conditions_are_not_called_safe_by_a_cooling_certificate(bench: rt.System) -> None:
+def test_heating_conditions_are_not_allowed_by_a_cooling_certificate(bench: rt.System) -> None:
     told: list[tuple[int, int]] = []
     found = rt.certify.limit_map(bench, ambient=[283.15], setpoint=[303.15], load=[0.0],
                                  temperature=(273.15, 358.15), jobs=1,
                                  progress=lambda done, total: told.append((done, total)))
-    assert found.certified.direction == "symmetric" and told == [(0, 1), (1, 1)]
-    box = found.certified.certificate.region["current"]["m1"]
-    needed = found.data["needed [A]"].max()
-    assert found.data["safe"].all() and needed > 0.1 and float(box[0]) <= -needed
+    assert found.data["direction"].tolist() == ["symmetric"] and told == [(0, 1), (1, 1)]
+    needed, usable = found.data["needed [A]"][0], found.boxes[283.15, 0.0, "symmetric"]
+    assert needed < -0.1
+    for certificate in (usable.invariance, usable.contraction):
+        assert certificate.holds and float(certificate.region["current"]["m1"][0]) == -usable.current
+    assert found.data["allowed"].tolist() == [bool(-needed <= usable.current)]
 
 
 @pytest.mark.parametrize(("options", "words"), [

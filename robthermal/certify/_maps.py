@@ -36,26 +36,21 @@ class LimitMap:
         the module that needs most to hold it, negative if it heats (nan: no equilibrium does); "runaway [A]", the
         smallest I* of the modules; "contraction [A]", the contraction limit inside the stated box, which is not a limit
         for use; "usable [A]", the usable current: the smallest of 0.98 I*, contraction, invariant box and rating;
-        "allowed", whether the needed current is within the usable one.
-    contraction : CurrentBound
-        The contraction limit inside the stated box; not a limit for use.
+        "allowed", whether the needed current is within the usable one; "direction", "cooling" where currents in [0, c]
+        hold the condition, "symmetric" where a module must heat: [-c, c].
+    contraction : dict
+        Direction to the contraction limit inside the stated box; not a limit for use.
     boxes : dict
-        (ambient [K], load [W]) to the `UsableCurrent` for all set-points of the map: the largest usable current of its
-        conditions, with the box that is never left and its two certificates. Its direction is "cooling", or "symmetric"
-        when some condition of the map needs a heating current.
+        (ambient [K], load [W], direction) to the largest `UsableCurrent` of its conditions, with the box that is never
+        left and its two certificates.
     outcome : Outcome
         How many conditions are allowed.
     """
 
     data: pd.DataFrame
-    contraction: CurrentBound
-    boxes: dict[tuple[float, float], UsableCurrent]
+    contraction: dict[str, CurrentBound]
+    boxes: dict[tuple[float, float, str], UsableCurrent]
     outcome: Outcome
-
-    @property
-    def direction(self) -> str:
-        """"cooling", or "symmetric" when some condition of the map needs a heating current."""
-        return next(iter(self.boxes.values())).direction
 
     def __str__(self) -> str:
         return f"{self.outcome.text}\n{self.data.round(3).to_string(index=False)}"
@@ -69,8 +64,8 @@ class LimitMap:
         for ax, (setpoint, panel) in zip(axes[0], panels, strict=True):
             for k, (ambient, part) in enumerate(panel.groupby("ambient [K]")):
                 ax.plot(part["load [W]"], part["needed [A]"], f"C{k % 6}o-", ms=3, label=f"{ambient - 273.15:.3g} °C")
-                for sign in (1, -1) if self.direction == "symmetric" else (1,):
-                    ax.plot(part["load [W]"], sign * part["usable [A]"], f"C{k % 6}--", lw=0.9)
+                usable = part["usable [A]"].where(part["direction"] == "cooling", -part["usable [A]"])
+                ax.plot(part["load [W]"], usable, f"C{k % 6}--", lw=0.9)
             ax.set(xlabel="load on every cold face [W]", title=f"set-point {setpoint - 273.15:.3g} °C")
         axes[0, 0].set(ylabel="current needed (line), usable (dashed) [A]")
         lines = [line for line in axes[0, 0].get_lines() if not line.get_label().startswith("_")]
@@ -87,7 +82,7 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
 
     For every ambient and load the bounds of `usable_current` are found: contraction in the stated box, the invariant
     box inside it, the rating; and for every ambient and set-point I* of the network, of which 0.98 are used. Where a
-    condition needs heating, all of it is for currents of both signs.
+    condition needs heating, they are for currents of both signs.
 
     Parameters
     ----------
@@ -142,27 +137,29 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     setting = "" if store is None else f"{format_system(system)}{sorted(ranges.items())}"
     run = fleet(partial(_rows, nominal), points, store=store, setting=setting, jobs=jobs, progress=progress)
     data = pd.DataFrame([row for rows in run.results for row in rows])
-    heats = (data["needed [A]"] < -_QUIET).any()  # [0, c] proves nothing about the heating current of a warm set-point
-    asked = replace(nominal, direction="symmetric" if heats else "cooling")
-    contraction, rating = contraction_bound(asked), rating_bound(asked)
+    contraction: dict[str, CurrentBound] = {}
     boxes = {}
-    for (T, watts), part in data.groupby(["ambient [K]", "load [W]"]):
-        condition = replace(asked, ambient=dict.fromkeys(system.ambient_names, (T, T)),
+    for (T, watts, direction), part in data.groupby(["ambient [K]", "load [W]", "direction"]):
+        condition = replace(nominal, direction=direction, ambient=dict.fromkeys(system.ambient_names, (T, T)),
                             heat={module.cold: (watts, watts) for module in system.modules.values()})
+        if direction not in contraction:
+            contraction[direction] = contraction_bound(condition)
         highest = CurrentBound(OF_FOLD * float(part["runaway [A]"].max()), None, "computed",
                                "0.98 I*, the fold of the network, at the set-point of the map where it is largest.")
-        boxes[T, watts] = headline(condition, {"contraction": contraction, "box": box_bound(condition),
-                                               "runaway": highest, "rating": rating})
-    data["contraction [A]"] = contraction.current
-    headlines = [boxes[T, watts].current for T, watts in zip(data["ambient [K]"], data["load [W]"], strict=True)]
-    data["usable [A]"] = np.minimum(OF_FOLD * data["runaway [A]"], headlines)
+        boxes[T, watts, direction] = headline(condition, {
+            "contraction": contraction[direction], "box": box_bound(condition), "runaway": highest,
+            "rating": rating_bound(condition)})
+    data["contraction [A]"] = [contraction[direction].current for direction in data["direction"]]
+    keys = zip(data["ambient [K]"], data["load [W]"], data["direction"], strict=True)
+    data["usable [A]"] = np.minimum(OF_FOLD * data["runaway [A]"], [boxes[key].current for key in keys])
     data["allowed"] = data["needed [A]"].abs() <= data["usable [A]"]
+    data["direction"] = data.pop("direction")  # to the end
     allowed = int(data["allowed"].sum())
     return LimitMap(data, contraction, boxes, Outcome(allowed > 0, "mapped" if allowed else "none",
                     f"{allowed} of {len(data)} conditions need no more than the usable current."))
 
 
-def _rows(question: Question, point: Mapping[str, Any]) -> list[dict[str, float]]:
+def _rows(question: Question, point: Mapping[str, Any]) -> list[dict[str, Any]]:
     system, ambient, setpoint, loads = question.system, point["ambient"], point["setpoint"], point["loads"]
     surroundings, targets = dict.fromkeys(system.ambient_names, ambient), dict.fromkeys(system.module_names, setpoint)
     limit = fold_current(replace(question, ambient={name: (T, T) for name, T in surroundings.items()}), targets)
@@ -173,7 +170,7 @@ def _rows(question: Question, point: Mapping[str, Any]) -> list[dict[str, float]
         stable = [list(e.currents.values()) for e in states.equilibria if e.stable]
         best = min(stable, key=lambda currents: max(map(abs, currents)), default=[float("nan")])
         rows.append({**dict(zip(_AXES, (ambient, setpoint, load), strict=True)), "needed [A]": max(best, key=abs),
-                     "runaway [A]": limit})
+                     "runaway [A]": limit, "direction": "symmetric" if min(best) < -_QUIET else "cooling"})
     return rows
 
 

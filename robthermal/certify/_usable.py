@@ -96,7 +96,7 @@ def question_of(system: System, *, direction: Direction = "cooling", temperature
 
 
 def headline(question: Question, limits: dict[str, CurrentBound], costly: str | None = None) -> UsableCurrent:
-    """The smallest of the bounds with its certificates; `costly`: the parameter that costs most of the runaway bound."""
+    """The smallest bound with its certificates; `costly` is the parameter that costs most of the runaway bound."""
     q = question
     limited_by = min(limits, key=lambda name: limits[name].current)
     for back_off in _BACK_OFF:

@@ -196,8 +196,8 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
 
 def _conditions(result: LimitMap, system: System) -> list[tuple[UsableCurrent, str, int]]:
     """Usable currents of the map with their condition in words and a number; one at least."""
-    found = [(box, _condition(ambient, load, system.temperature_unit), number)
-             for number, ((ambient, load), box) in enumerate(result.boxes.items(), 1)]
+    found = [(box, f"{_condition(ambient, load, system.temperature_unit)}, {direction} currents", number)
+             for number, ((ambient, load, direction), box) in enumerate(result.boxes.items(), 1)]
     return [entry for entry in found if entry[0].holds] or found[:1]
 
 

@@ -51,14 +51,19 @@ def test_map_agrees_with_single_computations(two):
     found = rt.certify.limit_map(two, ambient=[298.15], setpoint=[278.15, 283.15], load=[0.0, 5.0],
                                  temperature=(273.15, 358.15), jobs=1)
     data = found.data.set_index(["setpoint [K]", "load [W]"])
-    certified = rt.certify.largest_current(two, temperature=(273.15, 358.15), direction="cooling")
-    assert found.certified.certificate.holds and (data["certified [A]"] == certified.current).all()
+    contraction = rt.certify.largest_current(two, temperature=(273.15, 358.15), direction="cooling")
+    assert (data["contraction [A]"] == contraction.current).all()
+    single = rt.certify.usable_current(two, temperature=(273.15, 358.15), lower="reported",
+                                       setpoint=dict.fromkeys(two.modules, 278.15))
+    assert data.loc[(278.15, 0.0), "usable [A]"] == pytest.approx(single.current, rel=1e-6)
+    assert all(box.invariance.holds and box.contraction.holds for box in found.boxes.values())
+    assert (data["usable [A]"] < data["runaway [A]"]).all()
     # errata: I* = 1.51 A at 5 °C; 5 W per module cannot be held at 10 °C
     assert data.loc[(278.15, 0.0), "runaway [A]"] == pytest.approx(1.51, rel=0.01)
-    assert np.isnan(data.loc[(283.15, 5.0), "needed [A]"]) and not data.loc[(283.15, 5.0), "safe"]
+    assert np.isnan(data.loc[(283.15, 5.0), "needed [A]"]) and not data.loc[(283.15, 5.0), "allowed"]
     state = rt.thermal.steady_state(two, {"room": 298.15}, setpoint=dict.fromkeys(two.modules, 278.15))
     needed = max(state.equilibria[0].currents.values())
-    assert data.loc[(278.15, 0.0), "needed [A]"] == pytest.approx(needed) and data.loc[(278.15, 0.0), "safe"]
+    assert data.loc[(278.15, 0.0), "needed [A]"] == pytest.approx(needed) and data.loc[(278.15, 0.0), "allowed"]
     assert found.outcome.code == "mapped"
 
 
