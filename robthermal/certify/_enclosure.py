@@ -35,7 +35,6 @@ from ._smallest_box import COLDEST, HOTTEST, smallest_box
 from ._surroundings import ambient_ranges, heater_heat
 
 RESERVE = 0.005  # share of every heat kept in reserve in boxes: three standard deviations of an ordinary calibration
-RESERVE_OF_RANGES = 0.001  # where ranges of the parameters say themselves how uncertain they are
 _TIGHTER = (1.0, 0.2, 0.0)  # shares of the reserve that are tried where there is no box with all of it
 
 
@@ -82,7 +81,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     """Certify that a machine cannot run away thermally.
 
     The box is chosen with a reserve of 0.5 % of every single heat (a link's, Peltier, Joule, conducted), where it
-    exists, so that the claim survives the errors of an ordinary calibration; 0.1 % where `parameters` are given.
+    exists, so that the claim survives the errors of an ordinary calibration.
 
     Parameters
     ----------
@@ -126,7 +125,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     heat = heater_heat(system, parameters) if heat is None else heat
 
     def faces(kept: Mapping[str, Any]) -> Faces:
-        return Faces(system, around, heat, kept, RESERVE_OF_RANGES if kept else RESERVE)
+        return Faces(system, around, heat, kept, RESERVE)
 
     box = box_with_reserve(faces(ranges), currents)
     if box is None:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate
 from ._contraction import Method
-from ._enclosure import RESERVE, RESERVE_OF_RANGES, named_box, no_box
+from ._enclosure import RESERVE, named_box, no_box
 from ._energy import energy_rate
 from ._faces import Array, Faces
 from ._invariance import invariance
@@ -52,8 +52,7 @@ class Question:
     @cached_property
     def faces(self) -> Faces:
         """Heat through the faces of boxes of this machine."""
-        return Faces(self.system, self.ambient, self.heat, self.parameters,
-                     RESERVE_OF_RANGES if self.parameters else RESERVE)
+        return Faces(self.system, self.ambient, self.heat, self.parameters, RESERVE)
 
     @cached_property
     def roomy_faces(self) -> Faces:

@@ -76,9 +76,8 @@ def test_robust_claim_covers_the_corners_and_costs_current() -> None:
         for current in (0.0, robust.current):
             _, states = network.run(np.where(rng.random(2) < 0.5, *box), 2000.0, np.array([current]))
             assert (states >= box[0] - 1e-5).all() and (states <= box[1] + 1e-5).all()
-        for c in robust.range["m"]:
-            single = rt.certify.usable_current(system.with_parameters(numbers), temperature=stated)
-            assert single.current >= robust.current * (1 - 2e-4) and c <= single.current * (1 + 2e-4)
+        single = rt.certify.usable_current(system.with_parameters(numbers), temperature=stated)
+        assert single.current >= robust.current * (1 - 2e-4)
 
 
 def test_the_parameter_that_limits_is_named() -> None:
