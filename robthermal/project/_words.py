@@ -17,8 +17,6 @@ _TITLES = {  # by key; the first is the one of a job
     "contraction": ("Contraction in the stated box", "Contraction at the current limits"),
     "box": ("The box is never left",), "box_contraction": ("Contraction in the box that is never left",),
     "observer": ("The observer's error shrinks",),
-    "map": ("Largest cooling current of the map", "Largest heating current of the map",
-            "Largest symmetric current of the map"),
 }
 _SENTENCES = {  # the exact sentences, with all numbers, are in the appendix, "Exact claims"
     "contraction": "For every lump temperature and module current in the box, however the currents change, any two "
@@ -29,8 +27,6 @@ _SENTENCES = {  # the exact sentences, with all numbers, are in the appendix, "E
     "box_contraction": "Inside those ranges any two temperature histories approach each other too.",
     "observer": "For every temperature, estimate and current in the box the error of the observer shrinks from sample "
                 "to sample, however the currents change.",
-    "map": "For every lump temperature in the box and every current up to the largest of the map, any two temperature "
-           "histories approach each other. That the temperatures stay in this box is not part of this claim.",
 }
 _WITHOUT_MODULES = {
     "contraction": "For every lump temperature in the box any two temperature histories under the same heats approach "
