@@ -21,7 +21,7 @@ class Data:
     Parameters
     ----------
     record : Record
-        Measured.
+        Measured inputs and readings.
     sensors : tuple of str
         Sensors of the system among its outputs, in the system's order.
     columns : ndarray of int

@@ -29,7 +29,7 @@ class FreeRun:
     initial_temperatures : ndarray, shape (n_lumps,)
         Where the model started [K].
     residual : ndarray, shape (n, n_sensors)
-        Measured − modelled [K].
+        Measured − modelled of every sensor [K].
     """
 
     one: Data

@@ -37,9 +37,9 @@ class Problem:
     Parameters
     ----------
     system : System
-        Whose parameters.
+        System whose parameters are estimated.
     data : list of Data
-        Records.
+        Records to be explained.
     ranges : Ranges
         Parameters to estimate.
     starts : list of Initial

@@ -73,7 +73,7 @@ def correlation_of(segments: list[Floats]) -> Correlation:
     Parameters
     ----------
     segments : list of ndarray
-        Weighted residuals.
+        Weighted residuals (n, n_sensors) of every record.
     """
     n_sensors = segments[0].shape[1]
     polynomials = tuple(burg([e[:, s] for e in segments]) for s in range(n_sensors))

@@ -26,7 +26,7 @@ class ConvectionLaw:
     Parameters
     ----------
     a, b, c : float
-        [W/(m² K)], [W/(m² K^(1+c))], [-].
+        Coefficients of the law: at rest [W/(m² K)], its rise [W/(m² K^(1+c))], exponent [-].
     covariance : ndarray, shape (3, 3)
         Of (a, b, c), from the scatter of the points; infinite with three points.
     area : float
@@ -79,11 +79,11 @@ def convection_law(record: Record, *, heater: str, sensor: str, ambient: str, ar
     Parameters
     ----------
     record : Record
-        Measured.
+        Measured staircase of heat.
     heater, sensor, ambient : str
         Columns: heat [unit], temperature of the body [K], temperature of the air [K].
     area : float
-        Surface [m²].
+        Surface that loses the heat [m²].
     gain : float
         Of the heater [W per unit].
 

@@ -64,7 +64,7 @@ def whitener(system: System, one: Data, noise: Floats) -> Whitener:
     system : System
         With the present parameters.
     one : Data
-        Record.
+        Record with its sensors.
     noise : ndarray, shape (n_sensors,)
         Standard deviation of the record's sensors [K].
     """

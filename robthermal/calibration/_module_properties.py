@@ -28,7 +28,7 @@ class ModuleProperties:
     conductance : float
         K [W/K], mean over the steady states.
     reference_temperature : float
-        [K].
+        Temperature about which S and R are linear [K].
     std : dict
         Standard deviations from the scatter of the points: "seebeck.value", "seebeck.slope", "resistance.value",
         "resistance.slope", "conductance".
@@ -74,7 +74,7 @@ def module_properties(record: Record, *, current: str, voltage: str, hot: str, c
     record : Record
         Sampled much faster than the faces move; the voltage read just after the current was set.
     current, voltage, hot, cold : str
-        Columns [A], [V], [K], [K].
+        Columns of the current [A], the voltage [V], and the temperatures of the hot and cold face [K].
     load : float
         Heat that flows into the cold face from elsewhere when steady [W]; 0 if it is insulated.
     reference_temperature : float

@@ -29,7 +29,7 @@ class Bins:
     outputs, inputs : tuple of str
         Names of what they are.
     measured : ndarray, shape (n_b, m)
-        vec G.
+        Measured vec G at the bins.
     root : ndarray, shape (n_b, m, m)
         L⁻¹ with covariance = L Lᴴ.
     """
@@ -49,9 +49,9 @@ class ResponseProblem:
     Parameters
     ----------
     system : System
-        Whose parameters.
+        System whose parameters are estimated.
     response : FrequencyResponse
-        Estimated.
+        Measured frequency response.
     bins : Bins
         What of it is fitted.
     ranges : Ranges

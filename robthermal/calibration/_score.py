@@ -17,7 +17,7 @@ class Score:
     Parameters
     ----------
     record : str
-        Its name.
+        Name of the record.
     rmse : dict
         Root mean square residual (measured − modelled) by sensor [K].
     fit_percent : dict

@@ -24,9 +24,9 @@ class VaryingModel:
     Parameters
     ----------
     system : System
-        Whose parameters vary.
+        System whose parameters vary.
     names : tuple of str
-        Parameters.
+        Parameters that vary with temperature.
     temperatures : ndarray, shape (n,)
         Operating points of the local models [K], increasing.
     values, std : ndarray, shape (n, p)
