@@ -122,7 +122,7 @@ def design_system(system: System, request: DesignRequest,
         raise _refusal(possible)
     progress("searching the runaway limit")
     fold = worst_runaway(system, request)
-    progress("searching the largest certified currents")
+    progress("searching the contraction limits")
     certified = certified_limits(system, request)
     check_given(system, request, fold, certified)
     progress("choosing the current limits")
@@ -135,12 +135,12 @@ def design_system(system: System, request: DesignRequest,
     box = contraction(system, current=pairs, temperature=request.temperature, method=request.method)
     safe = contain(system, request, pairs)
     found = [("contraction", "Contraction at the current limits", box, True),
-             ("box", "The box is never left", safe.invariance, safe.holds)]
+             ("box", "The box is never left", safe.invariance, True)]
     if safe.contraction is not safe.invariance:
-        found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, safe.holds))
+        found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
     if seen is not None:
         found.append(("observer", "The observer's error shrinks", seen, True))
-    found += [(f"limit_{li.method}_{li.direction}", f"Largest {li.direction} current, method {li.method}",
+    found += [(f"limit_{li.method}_{li.direction}", f"Contraction limit of {li.direction} currents, not a limit for use",
                li.certificate, False) for li in certified if li.certificate.holds]
     found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
               for name, cert in fold.certificates.items()]

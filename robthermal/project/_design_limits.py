@@ -15,10 +15,12 @@ from ..certify import (
     largest_current,
     runaway,
     runaway_free,
+    usable_current,
 )
 from ..errors import InputError
 from ..thermal import System
 from ._design_request import DesignRequest
+from ._schema import Method
 
 Pairs = dict[str, tuple[float, float]]
 BELOW_FOLD = 0.98  # of I*: at the fold itself the loop has no gain left
@@ -71,9 +73,23 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
                              remedy="Leave --current out for the largest certified limits.")
         if not _contracts(system, request, {**dict.fromkeys(system.modules, (0.0, 0.0)), name: (low, high)}):
             raise InputError("the range is not certified in the temperature box", where=where,
-                             expected=f"within {-certified[1].current:.3g}:{certified[1].current:.3g} (symmetric), or "
-                             f"0:{certified[0].current:.3g} (cooling only)",
+                             expected=f"within the contraction limits, {-certified[1].current:.3g}:{certified[1].current:.3g} "
+                             f"(symmetric) or 0:{certified[0].current:.3g} (cooling only), and the usable current",
                              remedy="Narrow it, or the box with --temperature.")
+    given = {**dict.fromkeys(system.modules, (0.0, 0.0)), **(request.current or {})}
+    if request.current and not _contained(system, request, given):
+        usable = usable_current(system, temperature=request.temperature, ambient=request.ambient,
+                                setpoint=request.setpoint, lower="reported", method=_fast(request))
+        name, (low, high) = max(request.current.items(), key=lambda item: max(-item[1][0], item[1][1]))
+        raise InputError("with these currents no box below the upper end of the temperature box is proven never to be "
+                         "left", where=f"--current {name}={low:g}:{high:g}",
+                         expected=f"at most the usable current, {usable.current:.3g} A when cooling, limited by "
+                         f"{usable.limited_by}", remedy="Leave --current out for the largest usable limits.")
+
+
+def _fast(request: DesignRequest) -> Method:
+    """Norm for searches: a full matrix at every step of a bisection may take hours."""
+    return "energy" if request.method == "lyapunov" else request.method
 
 
 def _widest(system: System, fold: Runaway, certified: tuple[CurrentLimit, CurrentLimit]) -> Pairs:

@@ -90,8 +90,9 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
     yield _observer_section(result.certification.system, result.observer, result.loop)
     if not result.certification.safe.holds:
         yield Section("No box that is never left", f"{result.certification.safe.outcome.text}\n\n"
-                      "Inside the temperature box the machine contracts at these currents; that it stays inside is not "
-                      "proven. Watch the temperatures and switch off outside of the box.", anchor="no-box")
+                      "The set-points need more current than is usable. Inside the temperature box the machine contracts "
+                      "at these currents, but that it stays inside is not proven: this design is not certified. Cool the "
+                      "hot side better, move the set-points, or narrow the room's range.", anchor="no-box")
     yield from certification_sections(result.certification)
 
 
@@ -103,8 +104,9 @@ def _controller_section(result: ControllerDesign) -> Section:
              "Kp [W/K]": c.proportional[i], "Ki [W/(K s)]": c.integral[i]}
             for i, name in enumerate(law.names)]
     own = " The limits are those that were asked for." if result.request.current else (
-        f" The upper limits are the smallest of {BELOW_FOLD:g} I*, the certified cooling current and the file's limit; "
-        "the lower ones are the largest with which the claims of the first screen still hold.")
+        f" The upper limits are the usable ones: the smallest of {BELOW_FOLD:g} I*, the contraction limit, the file's "
+        "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
+        "lower ones are the largest with which that box is still never left.")
     text = ("A linearising law turns the heat that the PI asks for into a current, within the limits; the PI works on "
             f"a linear cold side, every {c.sample_time:g} s, with a crossover of {result.request.bandwidth:g} rad/s. "
             f"{own}\n\ndesign.json has every number with its unit, and the equations to program.")
