@@ -181,7 +181,7 @@ class Integrator:
         name = self.eq.system.lump_names[worst]
         raise Diverged(f"the simulation runs away at {time:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
                        "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
-                       "limit the current (rt.certify.largest_current tells how much is safe).", time=time)
+                       "limit the current to what rt.certify.usable_current gives.", time=time)
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:
