@@ -20,6 +20,10 @@ from .errors import Outcome
 _PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+ColumnMap = Annotated[list[str] | None, typer.Option(
+    "--column", help="Which column of the file a name is, for example 'T1=NTC 1'; may repeat.", metavar="NAME=HEADER")]
+ReadOption = Annotated[list[str] | None, typer.Option(
+    "--record", help="How files are read: a key of [record], for example gaps=fill; may repeat.", metavar="KEY=VALUE")]
 SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
 Box = Annotated[tuple[float, float] | None, typer.Option(
     "--temperature", help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")]

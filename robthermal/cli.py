@@ -16,8 +16,10 @@ from . import _cli_learn, _cli_results
 from ._terminal import (
     AmbientRange,
     Box,
+    ColumnMap,
     Json,
     Out,
+    ReadOption,
     SystemFile,
     answer,
     drawing,
@@ -86,41 +88,48 @@ def _run(project: Path, out: Path, as_json: bool) -> None:
 
 
 @app.command()
-def check(system: SystemFile, records: Annotated[list[Path] | None, typer.Argument(metavar="[RECORD]...")] = None,
-          as_json: Json = False) -> None:
-    """Say whether a system file and its records are sound.
+def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml) and measured files, or these alone.",
+                                                      metavar="[SYSTEM.toml] [FILE]...")],
+          column: ColumnMap = None, record: ReadOption = None, as_json: Json = False) -> None:
+    """Say whether a system file and its records are sound, and how each measured file is understood.
 
     Example: robthermal check setup.toml run1.csv run2.csv
     """
-    found = rt.read_system(system)
-    read = [rt.read_record(path, found) for path in records or []]
-    constants = rt.thermal.time_constants(found)["time constant [s]"] if len(found.lumps) <= 2000 else None
-    summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links),
-               "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
-               "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
-               "records": [{"name": r.name, "samples": len(r), "sample_time_s": r.sample_time, "notes": list(r.notes)}
-                           for r in read]}
-    answer(summary, as_json, lambda: say(f"{found.name}: sound.", *map(str, read)))
+    system = files[0] if files[0].suffix.lower() == ".toml" else None
+    found = rt.read_system(system) if system else None
+    tables = rt.project.reading_from_text(record or [], column or [])
+    measured = files[1:] if system else files
+    reports = rt.project.import_reports(measured, found, tables=tables)
+    summary: dict[str, Any] = {"records": [{"file": str(file), "import": report.to_dict()}
+                           for file, report in zip(measured, reports, strict=True)]}
+    if found is not None:
+        constants = rt.thermal.time_constants(found)["time constant [s]"] if len(found.lumps) <= 2000 else None
+        summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links),
+                   "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
+                   "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
+                   **summary}
+    answer(summary, as_json, lambda: say(*([f"{found.name}: sound."] if found else []), *map(str, reports)))
 
 
 @app.command()
 def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.")],
              out: Annotated[Path, typer.Option("--out", callback=place,
                                                help="Record to write (.csv, .parquet, .mat).")],
-             as_json: Json = False) -> None:
+             column: ColumnMap = None, read: ReadOption = None, as_json: Json = False) -> None:
     """Simulate a system with the inputs of a record.
 
     Example: robthermal simulate setup.toml inputs.csv --out simulated.csv
     """
     found = rt.read_system(system)
-    given = rt.read_record(record, found)
+    parts = rt.project.read_files([record], found, tables=rt.project.reading_from_text(read or [], column or []))
     with progress() as stage:
         stage("simulating")
-        result = rt.thermal.simulate(found, given)
-    temperatures = [*result.output_names, *(n for n in result.input_names if n in found.ambients)]
-    result.save(out, temperature_unit=found.temperature_unit, temperatures=temperatures)
-    summary = {"out": str(out), "samples": len(result), "outputs": list(result.output_names)}
-    answer(summary, as_json, lambda: say(f"{len(result)} samples of {len(result.output_names)} outputs: {out}"))
+        results = [rt.thermal.simulate(found, part) for part in parts]
+    temperatures = [*results[0].output_names, *(n for n in results[0].input_names if n in found.ambients)]
+    rt.signals.save_records(results, out, temperature_unit=found.temperature_unit, temperatures=temperatures)
+    n, outputs = sum(map(len, results)), list(results[0].output_names)
+    summary = {"out": str(out), "samples": n, "parts": len(results), "outputs": outputs}
+    answer(summary, as_json, lambda: say(f"{n} samples of {len(outputs)} outputs: {out}"))
 
 
 @app.command()
@@ -131,7 +140,8 @@ def calibrate(system: SystemFile,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
               median_filter: MedianFilter = None,
-              operating_point: OperatingPoint = None, as_json: Json = False) -> None:
+              operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
+              as_json: Json = False) -> None:
     """Fit the parameters in the [fit] table of a system to records, or to a frequency response.
 
     Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
@@ -141,7 +151,8 @@ def calibrate(system: SystemFile,
     with progress() as stage:
         stage("calibrating")
         fit = rt.project.calibrate_files(found, records, validation or [], median_filter=median_filter,
-                                         operating_point=point)
+                                         operating_point=point,
+                                         tables=rt.project.reading_from_text(record or [], column or []))
     rt.thermal.write_system(fit.system, out)
     answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
     exit_unless(bool(fit.outcome))
@@ -156,14 +167,15 @@ def diagnose(system: SystemFile,
                  "--validation", help="Record or response that no fit sees, may repeat.")] = None,
              session_gain: Annotated[bool, typer.Option(
                  "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
-             operating_point: OperatingPoint = None,
+             operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
              out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
     """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
 
     Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
     """
     found = rt.read_system(system)
-    train, held_out = (rt.project.read_measured(paths, found) for paths in (records, validation or []))
+    tables = rt.project.reading_from_text(record or [], column or [])
+    train, held_out = (rt.project.read_measured(paths, found, tables=tables) for paths in (records, validation or []))
     point = rt.project.point_from_text(found, operating_point or [])
     rt.project.check_free(out)
     with progress() as stage:
@@ -192,7 +204,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
             "frf.json"),
         plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png, .pdf).",
                                                   callback=drawing)] = None,
-        as_json: Json = False) -> None:
+        column: ColumnMap = None, record: ReadOption = None, as_json: Json = False) -> None:
     """Estimate a frequency response with its covariance, from records that need not be in steady state.
 
     Example: robthermal frf run1.csv run2.csv --system setup.toml --method lrmp --out frf.json --plot frf.svg
@@ -202,7 +214,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         stage("estimating the frequency response")
         G = rt.project.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [],
                                          method=method, half_width=half_width, degree=degree, poles=poles or [],
-                                         band=band)
+                                         band=band, tables=rt.project.reading_from_text(record or [], column or []))
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)

@@ -309,14 +309,21 @@ def test_the_worst_ambient_counts(bench: rt.System) -> None:
     assert [float(value) for value in ambient] == [288.15, 308.15]
 
 
-def test_a_set_point_that_needs_heating_gets_it_without_the_box(bench: rt.System, tmp_path: Path) -> None:
-    """60 °C needs more heating than the box that is never left allows: that claim is given up, and said."""
+def test_a_set_point_that_needs_more_than_the_usable_current_is_not_certified(bench: rt.System, tmp_path: Path) -> None:
+    """60 °C needs more heating than the box that is never left allows: the design is written, its claim fails."""
     request = rt.project.design_from_text(bench, setpoint=["m1=60"], bandwidth=0.05, sample_time=2.0)
     done = rt.project.design_system(bench, request)
-    assert done.holds and done.loop.current.min() < -0.3 and not done.certification.safe.holds
+    assert not done.holds and done.loop.current.min() < -0.3 and not done.certification.safe.holds
     report = rt.project.write_design(done, (), tmp_path / "out")
+    assert not report.holds
     assert "No box that is never left" in [section.title for section in report.sections]
-    assert "box" not in [Path(claim.file).stem for claim in report.claims]
+    assert "box" in [Path(claim.file).stem for claim in report.claims]  # a claim that fails is never left out
+
+
+def test_currents_beyond_the_usable_one_are_refused_with_it(bench: rt.System) -> None:
+    request = rt.project.design_from_text(bench, setpoint=["m1=12"], current=["m1=-3:0.1"])
+    with pytest.raises(InputError, match=r"m1=-3:0.1: .*(never to be left.*usable current|not certified)"):
+        rt.project.design_system(bench, request)
 
 
 def test_not_certified_is_an_answer(run: Cli, tmp_path: Path) -> None:

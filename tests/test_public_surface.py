@@ -57,9 +57,9 @@ SURFACE = {
         Explanation FileCheck Gate GateCode JobResult MapRequest Misfit Project Residuals ResponseResiduals
         SecondVerdict boxes_from_text
         calibrate_files certificate_files certify_system check_free couple_subsystems demo_project design_excitation
-        design_from_text design_system diagnose_records estimate_response explain explainable map_from_text
-        map_system new_project output_folder point_from_text read_coupling read_measured read_project rebuild_report
-        run_job second_verdicts verify_files write_certify write_checks write_coupling write_design write_diagnosis
+        design_from_text design_system diagnose_records estimate_response explain explainable import_reports
+        map_from_text map_system new_project output_folder point_from_text read_coupling read_files read_measured
+        read_project reading_from_text rebuild_report run_job second_verdicts verify_files write_certify write_checks write_coupling write_design write_diagnosis
         write_excitation write_job write_map
     """,
     "report": """
@@ -71,7 +71,7 @@ SURFACE = {
         Declared DesignCheck Excitation Import ImportOptions Record
         celsius_to_kelvin crest_factor declared design_check find_glitches
         inspect_file kelvin_to_celsius median_filter multisine multisines noise
-        options_from_text prbs read_record read_records staircase
+        options_from_text prbs read_record read_records save_records staircase
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

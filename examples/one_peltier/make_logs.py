@@ -51,12 +51,14 @@ def write(path: Path, table: np.ndarray) -> None:
              "Zeitstempel;NTC Platte [°C];NTC heiß [°C];NTC Kühler [°C];Wasser [°C];Raum [°C];I_TEC [mA];Heizer [mW];"]
     for k, (current, load, water, room, plate, hot, sink) in enumerate(table):
         stamp = f"03.11.2025 {9 + k // 3600:02d}:{k // 60 % 60:02d}:{k % 60:02d}"
-        cells = [f"{T - ZERO:.3f}" for T in (plate, hot, sink, water, room)] + [f"{1e3 * current:.1f}", f"{1e3 * load:.1f}"]
+        cells = [f"{T - ZERO:.3f}" for T in (plate, hot, sink, water, room)]
+        cells += [f"{1e3 * current:.1f}", f"{1e3 * load:.1f}"]
         lines.append(";".join([stamp, *(cell.replace(".", ",") for cell in cells), ""]))
     path.write_bytes(("\r\n".join(lines) + "\r\n").encode("cp1252"))
 
 
 if __name__ == "__main__":
-    write(HERE / "train.csv", run([(0.0, 0.0), (1.0, 0.0), (2.2, 0.0), (0.5, 3.0), (0.0, 3.0), (-0.8, 0.0), (1.5, 1.5)], 300.0, 1))
+    steps = [(0.0, 0.0), (1.0, 0.0), (2.2, 0.0), (0.5, 3.0), (0.0, 3.0), (-0.8, 0.0), (1.5, 1.5)]  # A, W
+    write(HERE / "train.csv", run(steps, 300.0, 1))
     write(HERE / "validation.csv", run([(0.3, 0.0), (1.8, 1.0), (0.0, 2.0), (2.4, 0.0)], 240.0, 2))
     print("train.csv and validation.csv written; now: robthermal run project.toml --out results")

@@ -36,6 +36,9 @@ from ._frequency import design_excitation as design_excitation
 from ._frequency import estimate_response as estimate_response
 from ._frequency import read_measured as read_measured
 from ._frequency import write_excitation as write_excitation
+from ._import import import_reports as import_reports
+from ._import import read_files as read_files
+from ._import import reading_from_text as reading_from_text
 from ._job import run_job as run_job
 from ._job_result import Comparison as Comparison
 from ._job_result import JobResult as JobResult
@@ -60,7 +63,7 @@ __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign"
            "Misfit", "Project", "Residuals", "ResponseResiduals", "SecondVerdict", "boxes_from_text",
            "calibrate_files", "certificate_files", "certify_system", "check_free", "couple_subsystems",
            "demo_project", "design_excitation", "design_from_text", "design_system", "diagnose_records",
-           "estimate_response", "explain", "explainable", "map_from_text", "map_system", "new_project",
-           "output_folder", "point_from_text", "read_coupling", "read_measured", "read_project", "rebuild_report",
+           "estimate_response", "explain", "explainable", "import_reports", "map_from_text", "map_system", "new_project",
+           "output_folder", "point_from_text", "read_coupling", "read_files", "read_measured", "read_project", "reading_from_text", "rebuild_report",
            "run_job", "second_verdicts", "verify_files", "write_certify", "write_checks", "write_coupling",
            "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]

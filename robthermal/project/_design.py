@@ -140,7 +140,7 @@ def design_system(system: System, request: DesignRequest,
         found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
     if seen is not None:
         found.append(("observer", "The observer's error shrinks", seen, True))
-    found += [(f"limit_{li.method}_{li.direction}", f"Contraction limit of {li.direction} currents, not a limit for use",
+    found += [(f"limit_{li.method}_{li.direction}", f"Contraction limit, {li.direction}: not a limit for use",
                li.certificate, False) for li in certified if li.certificate.holds]
     found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
               for name, cert in fold.certificates.items()]

@@ -73,8 +73,9 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
                              remedy="Leave --current out for the largest certified limits.")
         if not _contracts(system, request, {**dict.fromkeys(system.modules, (0.0, 0.0)), name: (low, high)}):
             raise InputError("the range is not certified in the temperature box", where=where,
-                             expected=f"within the contraction limits, {-certified[1].current:.3g}:{certified[1].current:.3g} "
-                             f"(symmetric) or 0:{certified[0].current:.3g} (cooling only), and the usable current",
+                             expected="within the contraction limits, "
+                             f"{-certified[1].current:.3g}:{certified[1].current:.3g} (symmetric) or "
+                             f"0:{certified[0].current:.3g} (cooling only), and the usable current",
                              remedy="Narrow it, or the box with --temperature.")
     given = {**dict.fromkeys(system.modules, (0.0, 0.0)), **(request.current or {})}
     if request.current and not _contained(system, request, given):

@@ -90,9 +90,9 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
     yield _observer_section(result.certification.system, result.observer, result.loop)
     if not result.certification.safe.holds:
         yield Section("No box that is never left", f"{result.certification.safe.outcome.text}\n\n"
-                      "The set-points need more current than is usable. Inside the temperature box the machine contracts "
-                      "at these currents, but that it stays inside is not proven: this design is not certified. Cool the "
-                      "hot side better, move the set-points, or narrow the room's range.", anchor="no-box")
+                      "The set-points need more current than is usable. Inside the temperature box the machine "
+                      "contracts at these currents, but that it stays inside is not proven: this design is not "
+                      "certified. Cool the hot side better, move the set-points, or narrow the room's range.", anchor="no-box")
     yield from certification_sections(result.certification)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,17 @@ import numpy as np
 from ..calibration import Fit, ResponseFit, calibrate
 from ..errors import InputError
 from ..identify import FrequencyResponse, etfe, is_response, lpm, lrm, lrmp, read_response, spectral
-from ..signals import Excitation, Record, multisines, read_record
+from ..signals import Excitation, Record, multisines
 from ..thermal import System
+from ._import import ReadTable, read_files
 
 _METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
 
 
 def estimate_response(paths: Sequence[Path], *, system: System | None = None, inputs: Sequence[str] = (),
                       outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
-                      poles: Sequence[float] = (), band: tuple[float, float] | None = None) -> FrequencyResponse:
+                      poles: Sequence[float] = (), band: tuple[float, float] | None = None,
+                      tables: Sequence[ReadTable] = ()) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
     Parameters
@@ -40,10 +43,13 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         Prescribed poles [rad/s] for "lrmp"; empty: those of the system, else chosen from the data.
     band : tuple of float, optional
         Frequencies to keep [Hz].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
 
     Returns
     -------
     FrequencyResponse
+        Inputs that never change are left out, which a note says.
 
     Raises
     ------
@@ -62,25 +68,43 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     """
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
-    records = [_channels(path, system, inputs, outputs) for path in paths]
+    parts = [part for path in paths for part in _channels(path, system, inputs, outputs, tables)]
+    records, constant = _changing(parts, inputs)
     given: Any = list(poles) if poles else system if system is not None else "auto"
     G = {"etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
          "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
+    if constant:
+        G = replace(G, notes=(*G.notes, f"left out because they never change: {', '.join(constant)} (constant_input)"))
     return G.between(*band) if band else G
 
 
-def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str]) -> Record:
+def _changing(records: list[Record], asked: Sequence[str]) -> tuple[list[Record], list[str]]:
+    """Records without the inputs that are constant in all of them, unless they were asked for by name."""
+    names = records[0].input_names if records else ()
+    constant = [name for name in names if name not in asked and all(np.ptp(record[name]) == 0.0 for record in records)]
+    if not constant:
+        return records, []
+    left = [name for name in names if name not in constant]
+    if not left:
+        raise InputError(f"no input changes: {', '.join(constant)}", where=records[0].name,
+                         expected="at least one input that excites the machine", remedy="Record a step or a multisine.")
+    return [record.select(inputs=left) for record in records], constant
+
+
+def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str],
+              tables: Sequence[ReadTable]) -> list[Record]:
     if system is None:
         if not inputs or not outputs:
             raise InputError("the columns are not known", where=str(path),
                              remedy="Give --system, or --input and --output for each column.")
-        return read_record(path, inputs=list(inputs), outputs=list(outputs))
-    record = read_record(path, system)
-    if not record.output_names:
+        return read_files([path], inputs=list(inputs), outputs=list(outputs), tables=tables)
+    records = read_files([path], system, tables=tables)
+    if not records[0].output_names:
         raise InputError("has no sensor column", where=str(path), expected="one of " + ", ".join(system.sensor_names))
-    return record.select(inputs=list(inputs or record.input_names), outputs=list(outputs or record.output_names))
+    return [record.select(inputs=list(inputs or record.input_names), outputs=list(outputs or record.output_names))
+            for record in records]
 
 
 def design_excitation(names: Sequence[str], *, period: int, sample_time: float, band: tuple[float, float],
@@ -157,8 +181,8 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
     return written
 
 
-def read_measured(paths: Sequence[Path], system: System, *, median_filter: float | None = None
-                  ) -> list[Record | FrequencyResponse]:
+def read_measured(paths: Sequence[Path], system: System, *, median_filter: float | None = None,
+                  tables: Sequence[ReadTable] = ()) -> list[Record | FrequencyResponse]:
     """Read what a calibration or a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
 
     Parameters
@@ -169,6 +193,8 @@ def read_measured(paths: Sequence[Path], system: System, *, median_filter: float
         Gives the columns of records.
     median_filter : float, optional
         Length of a median filter over the sensors of records [s].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
 
     Returns
     -------
@@ -185,8 +211,11 @@ def read_measured(paths: Sequence[Path], system: System, *, median_filter: float
     >>> rt.project.read_measured([], rt.systems.two_module())
     []
     """
-    return [_response(path) if is_response(path) else read_record(path, system, median_filter=median_filter)
-            for path in paths]
+    found: list[Record | FrequencyResponse] = []
+    for path in paths:
+        found += [_response(path)] if is_response(path) else read_files([path], system, tables=tables,
+                                                                        median_filter=median_filter)
+    return found
 
 
 def _response(path: Path) -> FrequencyResponse:
@@ -199,8 +228,8 @@ def _response(path: Path) -> FrequencyResponse:
 
 
 def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
-                    median_filter: float | None = None, operating_point: Mapping[str, float] | None = None
-                    ) -> Fit | ResponseFit:
+                    median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
+                    tables: Sequence[ReadTable] = ()) -> Fit | ResponseFit:
     """Calibrate a system with record files, or with one file of a frequency response.
 
     Parameters
@@ -215,6 +244,8 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
         Length of a median filter over the sensors of records [s].
     operating_point : mapping, optional
         Of a frequency response: means of heaters [unit], module currents [A] and ambients [K].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
 
     Returns
     -------
@@ -233,7 +264,8 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
     ...
     robthermal.errors.InputError: records: no file is given. Expected records, or one frequency response.
     """
-    train, held_out = (read_measured(paths, system, median_filter=median_filter) for paths in (records, validation))
+    train, held_out = (read_measured(paths, system, median_filter=median_filter, tables=tables)
+                       for paths in (records, validation))
     expected = "records, or one frequency response"
     if not train:
         raise InputError("no file is given", where="records", expected=expected)

@@ -7,6 +7,7 @@ from ._excitation import multisines as multisines
 from ._excitation_noise import noise as noise
 from ._excitation_noise import prbs as prbs
 from ._excitation_set import Excitation as Excitation
+from ._export import save_records as save_records
 from ._glitches import find_glitches as find_glitches
 from ._glitches import median_filter as median_filter
 from ._multisine import multisine as multisine
@@ -45,5 +46,6 @@ __all__ = [
     "prbs",
     "read_record",
     "read_records",
+    "save_records",
     "staircase",
 ]

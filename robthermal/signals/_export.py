@@ -49,12 +49,44 @@ def summary(record: Record) -> str:
 
 def write(record: Record, path: Path, temperature_unit: str, temperatures: Sequence[str] | None) -> None:
     """Write `path` in the format of its suffix; the file appears only when it is complete."""
+    save_records([record], path, temperature_unit, temperatures)
+
+
+def save_records(records: Sequence[Record], path: str | Path, temperature_unit: str = "K",
+                 temperatures: Sequence[str] | None = None) -> None:
+    """Write the parts of one measurement into one file, one after the other on their own times.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        With the same channels, in the order of time.
+    path : str or Path
+        ``.csv``, ``.parquet`` or ``.mat``.
+    temperature_unit : {"K", "degC"}
+        Unit of the temperatures in the file.
+    temperatures : sequence of str, optional
+        Which channels are temperatures; default those whose unit is K.
+
+    Raises
+    ------
+    InputError
+        Another suffix, channels that differ, names that the format cannot hold.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> one = rt.Record(sample_time=1.0, inputs=np.ones(3), outputs=np.ones(3), input_names=["u"], output_names=["y"])
+    >>> rt.signals.save_records([one[:2], one[1:]], "parts.csv")
+    """
+    path = Path(path)
+    if any(record.names != records[0].names for record in records):
+        raise InputError("the parts have different channels", where="argument records", expected="the same in all")
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise InputError(
             f"the file name ends in {path.suffix!r}", where=f"{path}", expected=f"one of {', '.join(_WRITERS)}"
         )
-    table = _in_unit(record, frame(record), temperature_unit, temperatures)
+    table = pd.concat([_in_unit(record, frame(record), temperature_unit, temperatures) for record in records])
     with whole_file(path) as part:
         writer(table, part, path)
 
