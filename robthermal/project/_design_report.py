@@ -92,7 +92,8 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
         yield Section("No box that is never left", f"{result.certification.safe.outcome.text}\n\n"
                       "The set-points need more current than is usable. Inside the temperature box the machine "
                       "contracts at these currents, but that it stays inside is not proven: this design is not "
-                      "certified. Cool the hot side better, move the set-points, or narrow the room's range.", anchor="no-box")
+                      "certified. Cool the hot side better, move the set-points, or narrow the room's range.",
+                      anchor="no-box")
     yield from certification_sections(result.certification)
 
 
