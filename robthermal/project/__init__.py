@@ -63,7 +63,8 @@ __all__ = ["Boxes", "Certification", "Checked", "Comparison", "ControllerDesign"
            "Misfit", "Project", "Residuals", "ResponseResiduals", "SecondVerdict", "boxes_from_text",
            "calibrate_files", "certificate_files", "certify_system", "check_free", "couple_subsystems",
            "demo_project", "design_excitation", "design_from_text", "design_system", "diagnose_records",
-           "estimate_response", "explain", "explainable", "import_reports", "map_from_text", "map_system", "new_project",
-           "output_folder", "point_from_text", "read_coupling", "read_files", "read_measured", "read_project", "reading_from_text", "rebuild_report",
-           "run_job", "second_verdicts", "verify_files", "write_certify", "write_checks", "write_coupling",
-           "write_design", "write_diagnosis", "write_excitation", "write_job", "write_map"]
+           "estimate_response", "explain", "explainable", "import_reports", "map_from_text", "map_system",
+           "new_project", "output_folder", "point_from_text", "read_coupling", "read_files", "read_measured",
+           "read_project", "reading_from_text", "rebuild_report", "run_job", "second_verdicts", "verify_files",
+           "write_certify", "write_checks", "write_coupling", "write_design", "write_diagnosis", "write_excitation",
+           "write_job", "write_map"]
