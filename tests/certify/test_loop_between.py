@@ -7,6 +7,7 @@ import pytest
 from loop_machines import AMBIENT, Machine, peltier
 
 import robthermal as rt
+from robthermal.verification import establish
 
 
 def designed(system, limits, time=1.0, bandwidth=0.05):
@@ -120,3 +121,18 @@ def test_sensors_with_a_gain():
     found = [certified(system, (0.0, 1.0), ["Tp", "Th", "Ts"], gain=gain)[0] for system in (plain, other)]
     assert all(proven.holds for proven in found)
     assert found[0].loop.evidence["contraction"] == pytest.approx(found[1].loop.evidence["contraction"], abs=1e-5)
+
+
+def test_other_observers_are_not_proven_by_the_same_matrices():
+    """Gains that make the observer unstable or that the matrices were not made for; a file that says another plant."""
+    loop = certified(peltier(), (0.0, 2.0), ["Tp", "Th", "Ts"])[0].loop
+    for factor in (-1.0, 0.0, 4.0):
+        gain = (factor * np.array(loop.system["gain"])).tolist()
+        assert not establish("loop", system={**loop.system, "gain": gain}, region=loop.region, evidence=loop.evidence,
+                             made_by={}).holds
+    longer = {**loop.region, "sample_time": 8.0}
+    assert not establish("loop", system=loop.system, region=longer, evidence=loop.evidence, made_by={}).holds
+    for region in ({**loop.region, "plant": "held"},
+                   {**loop.region, "parameters": {"links.hot-sink.conductance": [5.0, 7.0]}}):
+        with pytest.raises(rt.InputError, match="observer in the loop"):
+            establish("loop", system=loop.system, region=region, evidence=loop.evidence, made_by={})
