@@ -66,7 +66,7 @@ SURFACE = {
     "report": """
         Bound Claim Evidence Figure Printed Reason Report Section Table UsableRange box_ranges current_limits
         file_hash house_style is_unchanged load_curve measured_against_model read_content residuals_before_after
-        spectra_before_after versions write_content write_html write_json write_junit
+        rounded_down spectra_before_after versions write_content write_html write_json write_junit
     """,
     "signals": """
         Declared DesignCheck Excitation Import ImportOptions Record

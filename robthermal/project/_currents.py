@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Literal
 
 from ..certify import UsableCurrent, usable_current
-from ..report import Bound, Reason, UsableRange
+from ..report import Bound, Reason, UsableRange, rounded_down
 from ..thermal import System
 from ..verification import Certificate
 from ._codes import GateCode
@@ -45,7 +45,15 @@ def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, p
                                   method="energy" if boxes.method == "lyapunov" else boxes.method)
             rows.append(_row(best, direction, ranges is not None, system.module_names))
             found += _certificates(best, direction, ranges is not None)
+        rows = [*rows[:-2], _at_least(rows[-2], rows[-1]), rows[-1]] if parameters and asked else rows
     return rows, found
+
+
+def _at_least(nominal: UsableRange, robust: UsableRange) -> UsableRange:
+    """What is certified for parameter ranges is certified for the parameters as they stand: they are inside."""
+    if nominal.certified is None or robust.certified is None or robust.certified <= nominal.certified:
+        return nominal
+    return replace(nominal, certified=robust.certified, files=robust.files)
 
 
 def _row(best: UsableCurrent, direction: str, ranges: bool, modules: tuple[str, ...]) -> UsableRange:
@@ -199,13 +207,13 @@ def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange]
         failed.add((module, name))
         usable = _limit(rows, direction, None)
         yield Reason("fail", CODES[name].code, "certify", module, f"{module} is to have {direction} currents up to "
-                     f"{size:.4g} A; {_MEANS[name]} is {limit:.4g} A.", f"Ask for at most {usable or 0.0:.4g} A, the "
-                     "usable current.", size, limit)
+                     f"{size:.6g} A; {_MEANS[name]} is {rounded_down(limit)} A.", "Ask for at most "
+                     f"{rounded_down(usable or 0.0)} A, the usable current.", size, limit)
     for module, direction, name, size, limit in beyond(measured, rows, True):
         if (module, name) not in failed:
             failed.add((module, name))
             yield Reason("remark", CODES[name].code, "certify", module, f"In the records {module} has {direction} "
-                         f"currents up to {size:.4g} A; {_MEANS[name]} is {limit:.4g} A.", "", size, limit)
+                         f"currents up to {size:.6g} A; {_MEANS[name]} is {rounded_down(limit)} A.", "", size, limit)
 
 
 _MEANS = {"rating": "the declared rating", "runaway": "the runaway limit",

@@ -27,8 +27,9 @@ from ._traces import measured_against_model as measured_against_model
 from ._usable import Bound as Bound
 from ._usable import Parameters as Parameters
 from ._usable import UsableRange as UsableRange
+from ._usable import rounded_down as rounded_down
 
 __all__ = ["Bound", "Claim", "Evidence", "Figure", "Printed", "Reason", "Report", "Section", "Table", "UsableRange",
            "box_ranges", "current_limits", "file_hash", "house_style", "is_unchanged", "load_curve",
-           "measured_against_model", "read_content", "residuals_before_after", "spectra_before_after", "versions",
-           "write_content", "write_html", "write_json", "write_junit"]
+           "measured_against_model", "read_content", "residuals_before_after", "rounded_down", "spectra_before_after",
+           "versions", "write_content", "write_html", "write_json", "write_junit"]

@@ -139,7 +139,24 @@ class UsableRange:
 
 
 def rounded_down(current: float) -> str:
-    """A current with four digits, never larger than it is."""
+    """A current with four digits, never larger than it is.
+
+    Parameters
+    ----------
+    current : float
+        Size of a current that may be had [A].
+
+    Returns
+    -------
+    str
+        For a sentence, without unit.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.report.rounded_down(1.41159)
+    '1.411'
+    """
     return f"{Context(prec=4, rounding=ROUND_DOWN).create_decimal(repr(float(current))).normalize():f}"
 
 

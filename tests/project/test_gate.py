@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -201,6 +202,9 @@ def test_currents_above_the_usable_one_fail_with_the_number_that_binds(limit: fl
     assert all(one.about == "m1" and one.value == pytest.approx(1.05 * limit) and one.limit < 1.05 * limit
                for one in failures)
     assert "no thermal runaway" not in page and report.verdict == "FAIL"
+    said = {float(re.findall(r"at most ([\d.]+) A", one.remedy)[0]) for one in failures}
+    assert all(limit - 1e-3 * limit < one <= limit for one in said), "what is advised is never above what is usable"
+    assert "claims below are proven" not in page
     assert "may be used" not in page and "largest certified current" not in page.lower()
 
 
