@@ -1,11 +1,15 @@
 """Largest certified currents and runaway limits of the two-module setup beside the published reference table."""
 
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from _timing import best_of, header, row
 
 import robthermal as rt
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "certify"))
 
 BOX = (278.15, 358.15)
 DIRECTIONS = ("symmetric", "cooling", "heating")
@@ -65,7 +69,54 @@ def closed_forms(machines=40):
     row(f"largest relative difference {worst:.1e}", time.perf_counter() - start)
 
 
+def usable():
+    """Usable currents of the setup, with and without ranges of its parameters."""
+    header("usable current, box up to 85 °C: current, what limits it, the four bounds [A]")
+    two = rt.systems.two_module()
+    points = dict.fromkeys(two.modules, 278.15)
+    ranges = {f"modules.{m}.{p}.value": (0.98 * getattr(module, p).value, 1.02 * getattr(module, p).value)
+              for m, module in two.modules.items() for p in ("seebeck", "resistance", "conductance")}
+    for text, options in (("cooling", {}), ("cooling, set-points 5 °C", {"setpoint": points}),
+                          ("heating", {"direction": "heating"}), ("symmetric", {"direction": "symmetric"}),
+                          ("cooling, 6 parameters ± 2 %", {"parameters": ranges})):
+        seconds, found = best_of(lambda o=options: rt.certify.usable_current(
+            two, temperature=BOX, lower="reported", **o), repeats=1)
+        bounds = ", ".join(f"{bound.current:.3f}" for bound in found.limits.values())
+        row(f"{text:<28} {found.current:.3f} {found.limited_by:<9} ({bounds})", seconds)
+
+
+def ratios(machines=30):
+    """Usable currents of random machines against what an own simulation of constant currents bears."""
+    from random_machines import machine, simulated_limit
+
+    header(f"{machines} random machines: usable current / smallest of simulated box limit, coldest state and rating")
+    rng, found, seconds = np.random.default_rng(0), [], []
+    for _ in range(machines):
+        case = machine(rng)
+        start = time.perf_counter()
+        usable = rt.certify.usable_current(case.system, temperature=case.temperature, ambient=case.ambient,
+                                           heat=case.heat, lower=case.lower)
+        seconds.append(time.perf_counter() - start)
+        others = min(usable.limits["runaway"].current, usable.limits["rating"].current, 30.0)
+        found.append(usable.current / simulated_limit(case, others))
+    low, tenth, median = np.quantile(found, [0.0, 0.1, 0.5])
+    row(f"least {low:.2f}, tenth percentile {tenth:.2f}, median {median:.2f}, below 0.7: "
+        f"{np.sum(np.array(found) < 0.7)}; longest search {max(seconds):.1f} s", float(np.sum(seconds)))
+
+
+def conditions():
+    """A map of 90 conditions on one process."""
+    header("map of 90 conditions, one process")
+    seconds, found = best_of(lambda: rt.certify.limit_map(
+        rt.systems.two_module(), ambient=np.linspace(288.15, 308.15, 5), setpoint=np.linspace(278.15, 298.15, 3),
+        load=np.linspace(0, 3.75, 6), temperature=(273.15, 358.15), jobs=1), repeats=1)
+    row(found.outcome.text, seconds)
+
+
 if __name__ == "__main__":
     limits()
     folds()
     closed_forms()
+    usable()
+    ratios()
+    conditions()

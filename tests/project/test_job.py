@@ -97,7 +97,7 @@ def test_box_that_is_never_left_holds_every_steady_state_and_little_more(result:
 def test_contraction_rate_is_the_pole_of_the_bar(result: rt.project.JobResult) -> None:
     box = next(c for c in result.certification.checked if c.key == "contraction")
     pole = result.system.parameter("links.bar-room.conductance") / result.system.parameter("lumps.bar.capacity")
-    assert 0.99 * pole < float(box.certificate.evidence["rate"]) <= pole * (1 + 1e-12)
+    assert 0.8 * pole < float(box.certificate.evidence["rate"]) <= 0.9 * pole  # two digits, a tenth kept in reserve
 
 
 def test_report_of_a_machine_without_modules_does_not_speak_of_them(result: rt.project.JobResult,
