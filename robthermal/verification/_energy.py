@@ -48,7 +48,7 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
         if total > _MOST_PER_CLUSTER or total * len(group.lumps) ** 2 > _MOST_ENTRIES:
             return Proof(False, f"method energy: too many vertices ({total}) of uncertain modules, or of modules that "
                                 "share lumps, to check them one by one")
-    choices = [_undominated(group, vertices(system, problem.region, group, points)) for group in groups]
+    choices = [_undominated(group, list(vertices(system, problem.region, group, points))) for group in groups]
     rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
     return _check(problem, rate, rest, ports, groups, choices)
 

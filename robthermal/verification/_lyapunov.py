@@ -7,23 +7,25 @@ Not convex in the current for a general P, so (I, I²) is relaxed to a polygon a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq
 
-from ._corners import Part, first_failure, is_positive, make_part
+from ._corners import Part, first_failure, is_positive
 from ._fields import Interval
 from ._kind import Proof
 from ._numbers import decimal, name_of, show
 from ._slopes import exchange_slope, radiation_slope
 from ._system import Region, ThermalSystem
-from ._vertices import Entries, clusters, count, describe, hull, vertices
+from ._vertices import Cluster, Entries, Point, clusters, count, describe, hull, vertices
 
 if TYPE_CHECKING:
     from ._contraction import Contraction
 
 PIECES = (1, 2, 4, 8)  # per current, the relaxation refined in turn
+MOST_ROWS = 400  # of a dense matrix: it and its products fill some 100 MB
 MOST_WORK = 3e8  # vertices times n³, and what every vertex costs however small
 Described = tuple[Entries, str, bool]
 
@@ -44,7 +46,7 @@ class _Form:
 
     def part(self, described: Described) -> Part:
         """Return the same, with where it comes from."""
-        return make_part(self.matrix(described[0]), *described[1:])
+        return Part(self.matrix(described[0]), *described[1:])
 
 
 def prove(problem: Contraction, rate: fmpq) -> Proof:
@@ -53,36 +55,52 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     if broken:
         return Proof(False, f"method lyapunov: {broken}")
     n = len(problem.matrix)
-    if too_much(1, n):
-        return Proof(False, f"method lyapunov: a dense matrix for {n} lumps is too large to check")
-    form = _Form(problem)
-    if not is_positive(make_part(form.P, "", True)):
-        return Proof(False, "method lyapunov: P > 0 fails or cannot be proven")
     base, bent, missing = link_slopes(problem.system, problem.region)
+    missing = missing or too_much(problem.system, problem.region, bent, PIECES[0], n)
     if missing:
         return Proof(False, f"method lyapunov: {missing}")
-    start = make_part(form.matrix(base) - form.P * arb(2 * rate), "", True)
-    links = [[form.part(item) for item in items] for items in bent]
+    form = _Form(problem)
+    if not is_positive(form.P):
+        return Proof(False, "method lyapunov: P > 0 fails or cannot be proven")
+    start = form.matrix(base) - form.P * arb(2 * rate)
     words = f"P E^-1 J + J' E^-1 P < -2 ({decimal(rate)}) P"
     proof = Proof(False, "method lyapunov: too many vertices to check any")
     for pieces in PIECES:
-        total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
-        if too_much(total, n):
-            return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
-        modules = [[form.part(item) for item in choice]
-                   for choice in module_slopes(problem.system, problem.region, pieces)]
-        failed = first_failure(start, [*links, *modules])
+        more = too_much(problem.system, problem.region, bent, pieces, n)
+        if more:
+            return Proof(False, f"{proof.reason} ({more})")
+        groups: list[Collection[Described]] = [*bent, *module_slopes(problem.system, problem.region, pieces)]
+        failed = first_failure(start, groups, form.part)
         if failed is None:
-            return Proof(True, f"{words} at all {total} vertices of the relaxed box")
+            return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")
         proof = Proof(False, f"method lyapunov: {words} fails or cannot be proven at {failed.where or 'the links'}")
         if failed.real:
             break  # a point of the box: no refinement helps
     return proof
 
 
-def too_much(total: int, n: int) -> bool:
-    """Whether so many vertices of matrices of this size would take minutes, or gigabytes."""
-    return total * (n**3 + 2000) > MOST_WORK
+def too_much(system: ThermalSystem, region: Region, bent: Sequence[Collection[Described]], pieces: int,
+             rows: int) -> str:
+    """Return why the vertices would take minutes or the matrices gigabytes, counted before any is made; else empty."""
+    n = len(system.lumps)
+    if rows > MOST_ROWS:
+        return f"{n} lumps need dense matrices with {rows} rows, too large to check: at most {MOST_ROWS}"
+    groups = [*map(len, bent), *map(len, module_slopes(system, region, pieces))]
+    most = int(MOST_WORK / (n**3 + 2000))
+    if sum(groups) + product_up_to(groups, most) > most:
+        return (f"{pieces} piece{'' if pieces == 1 else 's'} per current make more than {most} vertices of the modules "
+                f"and of the links that are not linear, too many for {n} lumps")
+    return ""
+
+
+def product_up_to(sizes: Sequence[int], most: int) -> int:
+    """Return a product of sizes, or a number above ``most`` where it is larger."""
+    total = 1
+    for size in sizes:
+        total *= size
+        if total > most:
+            break
+    return total
 
 
 def dense(entries: Entries, n: int) -> arb_mat:
@@ -107,17 +125,30 @@ def _uncertain_capacity(problem: Contraction) -> str:
     return f"{name_of(name)} is uncertain, which needs method energy, sum or max" if name else ""
 
 
-def vertex_count(system: ThermalSystem, region: Region, pieces: int) -> int:
-    """Return the number of joint vertices of all modules before listing them."""
-    points = [hull(interval, pieces) for interval in region.current]
-    return math.prod(count(system, group, region, points) for group in clusters(system))
+@dataclass(frozen=True)
+class ModuleSlopes:
+    """The Jacobian entries of one group of modules at its vertices: counted at once, made one by one."""
+
+    system: ThermalSystem
+    region: Region
+    group: Cluster
+    points: Sequence[Sequence[Point]]
+
+    def __len__(self) -> int:
+        return count(self.system, self.group, self.region, self.points)
+
+    def __iter__(self) -> Iterator[Described]:
+        for vertex in vertices(self.system, self.region, self.group, self.points):
+            yield vertex.entries, describe(self.system, self.group, vertex), vertex.real
+
+    def __contains__(self, item: object) -> bool:
+        return any(item == other for other in self)
 
 
-def module_slopes(system: ThermalSystem, region: Region, pieces: int) -> list[list[Described]]:
+def module_slopes(system: ThermalSystem, region: Region, pieces: int) -> list[ModuleSlopes]:
     """Return the Jacobian entries of every group of modules at its vertices, currents relaxed to a polygon."""
     points = [hull(interval, pieces) for interval in region.current]
-    return [[(vertex.entries, describe(system, group, vertex), vertex.real)
-             for vertex in vertices(system, region, group, points)] for group in clusters(system)]
+    return [ModuleSlopes(system, region, group, points) for group in clusters(system)]
 
 
 def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[list[Described]], str]:
@@ -150,4 +181,5 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
 
 
 def _ends(slope: Interval, entries: Entries, words: str) -> list[Described]:
-    return [({place: value * s for place, value in entries.items()}, f"{words} {show(s)} W/K", True) for s in slope]
+    return [({place: value * s for place, value in entries.items()}, f"{words} {show(s)} W/K", True)
+            for s in dict.fromkeys(slope)]

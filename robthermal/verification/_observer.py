@@ -8,7 +8,7 @@ e+ = M e with M = A_d - L C + Γ F, F a mean of ∂f/∂x over the box (proof no
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,17 +16,17 @@ from flint import arb, arb_mat, fmpq
 
 from robthermal.errors import InputError
 
-from ._corners import Part, first_failure, is_positive, make_part
+from ._corners import Part, first_failure, is_positive
 from ._fields import get, mapping, margin_of, no_other, numbers, positive, sequence, text
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import (
     PIECES,
+    Described,
     asymmetry,
     dense,
     link_slopes,
     module_slopes,
     too_much,
-    vertex_count,
 )
 from ._numbers import decimal, exact, name_of, round_down, show
 from ._system import Region, ThermalSystem, read_region, read_system, say_region
@@ -129,14 +129,13 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     n = len(problem.matrix)
     if contraction <= 0:
         return Proof(False, f"contraction {show(contraction)} is not positive")
-    if too_much(1, n):
-        return Proof(False, f"a dense matrix for {n} lumps is too large to check")
-    broken = asymmetry(problem.matrix)
     base, bent, missing = link_slopes(problem.system, problem.region)
-    if broken or missing:
-        return Proof(False, broken or missing)
+    broken = (asymmetry(problem.matrix) or missing
+              or too_much(problem.system, problem.region, bent, refinements[0], 2 * n))
+    if broken:
+        return Proof(False, broken)
     P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])
-    if not is_positive(make_part(P, "", True)):
+    if not is_positive(P):
         return Proof(False, "P > 0 fails or cannot be proven")
     sampled = _sampled(problem)
     if isinstance(sampled, str):
@@ -144,18 +143,17 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     A_d, hold = sampled
     left = P * hold
     passive = P * (A_d - _injection(problem)) + left * dense(_beyond_passive(problem, base), n)
-    start = make_part(_schur(passive, P * arb(contraction)), "", True)
-    links = [[_part(left, item, n) for item in items] for items in bent]
+    start = _schur(passive, P * arb(contraction))
     words = f"M'PM < {decimal(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
     proof = Proof(False, "too many vertices to check any")
     for pieces in refinements:
-        total = vertex_count(problem.system, problem.region, pieces) * math.prod(len(items) for items in bent)
-        if too_much(total, n):
-            return Proof(False, f"{proof.reason} ({total} vertices with {pieces} pieces per current)")
-        groups = module_slopes(problem.system, problem.region, pieces)
-        failed = first_failure(start, [*links, *([_part(left, item, n) for item in items] for items in groups)])
+        more = too_much(problem.system, problem.region, bent, pieces, 2 * n)
+        if more:
+            return Proof(False, f"{proof.reason} ({more})")
+        groups: list[Collection[Described]] = [*bent, *module_slopes(problem.system, problem.region, pieces)]
+        failed = first_failure(start, groups, lambda item: _part(left, item, n))
         if failed is None:
-            return Proof(True, f"{words} at all {total} vertices of the relaxed box")
+            return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")
         proof = Proof(False, f"{words} fails or cannot be proven at {failed.where or 'the links'}")
         if failed.real:
             break  # a point of the box: no refinement helps
@@ -208,7 +206,7 @@ def _injection(problem: Observer) -> arb_mat:
 
 def _part(left: arb_mat, described: tuple[Entries, str, bool], n: int) -> Part:
     entries, where, real = described
-    return make_part(_schur(left * dense(entries, n)), where, real)
+    return Part(_schur(left * dense(entries, n)), where, real)
 
 
 def _schur(PM: arb_mat, own: arb_mat | None = None) -> arb_mat:

@@ -8,7 +8,7 @@ temperature: they form one cluster, whose vertices are taken together (proof not
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -52,15 +52,22 @@ class Vertex:
 
 
 def clusters(system: ThermalSystem) -> list[Cluster]:
-    """Return the modules grouped by shared lumps."""
-    groups: list[tuple[set[int], list[int]]] = []
+    """Return the modules grouped by shared lumps, in the order of their first modules."""
+    above: dict[int, int] = {}  # a forest: lumps of one group have one root
+
+    def root(lump: int) -> int:
+        while above.setdefault(lump, lump) != lump:
+            above[lump] = lump = above[above[lump]]
+        return lump
+
+    for module in system.modules:
+        above[root(module.cold)] = root(module.hot)
+    groups: dict[int, tuple[set[int], list[int]]] = {}
     for k, module in enumerate(system.modules):
-        faces = {module.hot, module.cold}
-        touching = [group for group in groups if group[0] & faces]
-        groups = [group for group in groups if not group[0] & faces]
-        lumps = faces.union(*(group[0] for group in touching))
-        groups.append((lumps, [*(m for group in touching for m in group[1]), k]))
-    return [Cluster(tuple(sorted(lumps)), tuple(sorted(modules))) for lumps, modules in groups]
+        lumps, members = groups.setdefault(root(module.hot), (set(), []))
+        lumps.update((module.hot, module.cold))
+        members.append(k)
+    return [Cluster(tuple(sorted(lumps)), tuple(members)) for lumps, members in groups.values()]
 
 
 def ends(interval: Interval) -> list[fmpq]:
@@ -94,17 +101,15 @@ def count(system: ThermalSystem, cluster: Cluster, region: Region, points: Seque
 
 
 def vertices(system: ThermalSystem, region: Region, cluster: Cluster,
-             points: Sequence[Sequence[Point]]) -> list[Vertex]:
-    """Return all vertices of a cluster; ``points`` holds the current points of every module of the system."""
-    found = []
+             points: Sequence[Sequence[Point]]) -> Iterator[Vertex]:
+    """Make the vertices of a cluster; ``points`` holds the current points of every module of the system."""
     for temperatures in product(*(ends(region.temperature[lump]) for lump in cluster.lumps)):
         at = dict(zip(cluster.lumps, temperatures, strict=True))
         for chosen in product(*(product(points[k], system.forms(k)) for k in cluster.modules)):
             entries: Entries = {}
             for point, module in chosen:
                 _add_module(entries, module, at, point)
-            found.append(Vertex(entries, temperatures, tuple(point for point, _ in chosen)))
-    return found
+            yield Vertex(entries, temperatures, tuple(point for point, _ in chosen))
 
 
 def describe(system: ThermalSystem, cluster: Cluster, vertex: Vertex) -> str:

@@ -14,7 +14,7 @@ from test_uncertain import machines, names_of, spans
 
 from robthermal.errors import InputError
 from robthermal.verification import Certificate, establish, verify
-from robthermal.verification._corners import is_positive, make_part
+from robthermal.verification._corners import is_positive
 
 ROD = {"lumps": {"rod": {"capacity": 10.0}}, "ambients": ["room"], "modules": {},
        "links": [{"between": ["rod", "room"], "conductance": 0.5}]}
@@ -201,11 +201,11 @@ def test_definiteness_is_never_wrong():
         gram = B @ B.T  # integers: exact, positive semidefinite
         for shift, definite in ((1.0, True), (1e-6, True), (-1e-6, None), (-1.0, None)):
             A = gram + shift * np.eye(n)
-            proven = is_positive(make_part(arb_mat(A.tolist()), "", True))
+            proven = is_positive(arb_mat(A.tolist()))
             smallest = np.linalg.eigvalsh(A)[0]
             assert not (proven and smallest < -1e-10)
             assert proven or not definite
     for bad in (np.ones((3, 3)), -np.eye(2)):
-        assert not is_positive(make_part(arb_mat(bad.tolist()), "", True))
+        assert not is_positive(arb_mat(bad.tolist()))
     wide = arb(0, 1.1)  # the matrix contains [[1, 1.1], [1.1, 1]], which is indefinite
-    assert not is_positive(make_part(arb_mat([[arb(1), wide], [wide, arb(1)]]), "", True))
+    assert not is_positive(arb_mat([[arb(1), wide], [wide, arb(1)]]))
