@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq
 
 from ._between import Sampled, sample
-from ._corners import Part, first_failure, is_positive, make_part
+from ._corners import Part, first_failure, is_positive
 from ._fields import Interval
 from ._growth import Growth
 from ._law import fixed_slopes, free_slopes, unfit
@@ -101,7 +102,7 @@ def flow_growth(problem: Loop, Q: arb_mat) -> Growth | str:
         rows = problem.start[min(k, len(problem.start) - 1)]
         S = arb_mat([[arb(rows[i][j]) for j in layout.own] for i in layout.own])
         where = "; ".join(mode.where for mode in case)
-        if not is_positive(make_part(S, "", True)):
+        if not is_positive(S):
             return f"the form at the start of a sample is not positive or cannot be proven to be, {where}"
         if failed := _moves(problem, layout, S, Q, base, bent, case):
             return f"between the samples the form may grow, {where}: {failed}"
@@ -177,21 +178,19 @@ def _moves(problem: Loop, layout: Layout, S: arb_mat, Q: arb_mat, base: Entries,
             end[place[i]][place[j]] = value
     after = arb_mat(end)
 
-    def grown(P: arb_mat, entries: Entries, where: str, real: bool) -> Part:
+    def grown(P: arb_mat, item: Described) -> Part:
+        entries, where, real = item
         A = [[arb(0)] * d for _ in range(d)]
         for (i, j), value in entries.items():
             A[i][j] = arb(value / capacity[i])
         PA = P * arb_mat(A)
-        return make_part((PA + PA.transpose()) * -time, where, real)
+        return Part((PA + PA.transpose()) * -time, where, real)
 
+    modules = [[(_entries(problem.system.modules[k], slopes, layout.current.get(k)), "", False) for slopes in mode.flow]
+               for k, mode in enumerate(case)]
     for P in (S, after):
-        linear = grown(P, base, "", True)
-        start = make_part(S - after + linear.matrix, "", True)
-        groups = [[grown(P, entries, words, real) for entries, words, real in items] for items in bent]
-        for k, mode in enumerate(case):
-            groups.append([grown(P, _entries(problem.system.modules[k], slopes, layout.current.get(k)), "", False)
-                           for slopes in mode.flow])
-        failed = first_failure(start, groups)
+        start = S - after + grown(P, (base, "", True)).matrix
+        failed = first_failure(start, [*bent, *modules], partial(grown, P))
         if failed is not None:
             return "at the start of the sample" if P is S else "at the end of the sample"
     return ""
