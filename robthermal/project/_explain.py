@@ -13,10 +13,12 @@ from ..diagnosis import Effect, Quantity, effects
 from ..errors import InputError
 from ..verification._kinds import KINDS
 from ._assumptions import ARITHMETIC, kind_assumptions
+from ._codes import GateCode
 from ._outcomes import Said, outcome_codes
 
 _PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency"), "linear_certificates")}
 _ERRORS = {cls.__name__: cls for cls in (errors.InputError, errors.Diverged)}
+_REASONS = {code.code: code for code in GateCode}
 _ANSWER = {True: "the answer is yes", False: "the answer is no", None: "the answer depends"}
 
 
@@ -29,7 +31,7 @@ class Explanation:
     name : str
         As it stands in files, tables and messages.
     what : str
-        "effect", "certificate", "outcome" or "error".
+        "effect", "certificate", "outcome", "reason" or "error".
     meaning : tuple of str
         Paragraphs.
     details : dict of str to tuple of str
@@ -65,7 +67,7 @@ def explainable() -> dict[str, tuple[str, ...]]:
     True
     """
     return {"effect": tuple(effects()), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
-            "error": tuple(_ERRORS)}
+            "reason": tuple(_REASONS), "error": tuple(_ERRORS)}
 
 
 def explain(name: str) -> tuple[Explanation, ...]:
@@ -74,7 +76,7 @@ def explain(name: str) -> tuple[Explanation, ...]:
     Parameters
     ----------
     name : str
-        Of an effect, a kind of certificate, the code of an outcome, or an error.
+        Of an effect, a kind of certificate, the code of an outcome, the reason of a verdict, or an error.
 
     Returns
     -------
@@ -109,6 +111,9 @@ def _all(name: str) -> Iterator[Explanation]:
         yield _certificate(name)
     if name in outcome_codes():
         yield _outcome(name, outcome_codes()[name])
+    if name in _REASONS:
+        yield Explanation(name, "reason", (_REASONS[name].meaning,), {"What to do": (_REASONS[name].remedy,)},
+                          "docs/explanations/report.md")
     if name in _ERRORS:
         text = inspect.getdoc(_ERRORS[name]) or ""
         yield Explanation(name, "error", (text.split("\n\n")[0],), {}, "docs/api/errors.md")
