@@ -41,10 +41,11 @@ SURFACE = {
         simulate_loop state_feedback unobservable
     """,
     "diagnosis": """
-        Adequacy Along Candidate Decision Diagnosis Effect EffectSet Entry Found Gap HoldOut JointCheck
-        JointSelection Levels Location Measurement NextExperiment NoiseFloor Quantity Refit Response Scores
-        ShortList UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects forget_effect hold_out
-        locate next_experiment noise_floor refit refit_short_list register_effect score select_jointly unknown_heat
+        Adequacy Candidate Decision Diagnosis Effect EffectSet Entry Found Gap HoldOut JointCheck JointSelection
+        LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Response
+        Scores ShortList UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
+        forget_effect hold_out locate next_experiment noise_floor refit refit_short_list register_effect score
+        select_jointly unknown_heat
     """,
     "errors": """
         Diverged InputError Outcome RobthermalError

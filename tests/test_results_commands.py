@@ -335,4 +335,4 @@ def test_a_diagnosis_says_its_stages() -> None:
     order = ["refitting the nominal system", "trying every effect of the catalogue at every place",
              "refitting the best candidates", "testing whether anything is left", "running both models freely"]
     assert [said.index(stage) for stage in order] == sorted(said.index(stage) for stage in order)
-    assert "predicting the unseen records" not in said
+    assert "predicting the validation data" not in said

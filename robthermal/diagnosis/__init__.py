@@ -1,6 +1,6 @@
-"""Where data and simulation part: locate it, name the missing effect, add it, show the gap shrink on unseen records."""
+"""Where model and data differ: locate it, name the missing effect, add it, and validate."""
 
-from .data import NoiseFloor as NoiseFloor
+from .data import NoiseEstimate as NoiseEstimate
 from .data import noise_floor as noise_floor
 from .diagnose import diagnose as diagnose
 from .diagnosis import Diagnosis as Diagnosis
@@ -25,10 +25,10 @@ from .evidence import hold_out as hold_out
 from .evidence import locate as locate
 from .evidence import score as score
 from .evidence import unknown_heat as unknown_heat
-from .fit import Levels as Levels
+from .fit import NoiseScaling as NoiseScaling
 from .fit import Refit as Refit
 from .fit import refit as refit
-from .path import Along as Along
+from .path import LinearizedRecord as LinearizedRecord
 from .plan import Measurement as Measurement
 from .plan import NextExperiment as NextExperiment
 from .plan import next_experiment as next_experiment
@@ -42,9 +42,9 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Along", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
-           "HoldOut", "JointCheck", "JointSelection", "Levels", "Location", "Measurement", "NextExperiment",
-           "NoiseFloor", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat", "ValidationResiduals",
-           "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
-           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score",
-           "select_jointly", "unknown_heat"]
+__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
+           "HoldOut", "JointCheck", "JointSelection", "LinearizedRecord", "Location", "Measurement", "NextExperiment",
+           "NoiseEstimate", "NoiseScaling", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat",
+           "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect",
+           "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect",
+           "score", "select_jointly", "unknown_heat"]

@@ -150,8 +150,8 @@ def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcom
     labels = ", ".join(candidate.label for candidate in ruled_out(state.rounds))
     excluded = f" The validation records rule out {labels}, which the others could not." if labels else ""
     if any(map(alternatives, state.rounds)):
-        return "ambiguous", Outcome(False, "ambiguous", "The records cannot tell some effects apart: see alternatives, "
-                                    f"and next_experiment for what separates them.{excluded}")
+        text = "The records cannot distinguish some effects: see alternatives, and next_experiment for what separates them."
+        return "ambiguous", Outcome(False, "ambiguous", text + excluded)
     return "named", Outcome(True, "named", f"One set of effects explains the records.{excluded}")
 
 
@@ -167,7 +167,7 @@ def _independent_of_step(fit: Refit) -> bool:
 
 
 def alternatives(round_: Accepted) -> tuple[Name, ...]:
-    """Everything the records cannot tell from the accepted effect.
+    """Everything the records cannot distinguish from the accepted effect.
 
     Parameters
     ----------

@@ -13,9 +13,9 @@ from ._judge import Judged, Name, Progress, Validation, alternatives, judge, rec
 from .data import Measured, as_measured, noise_floor
 from .diagnosis import Diagnosis, Found
 from .effects import candidates
-from .evidence import Gap, expected_rms, locate, refuse_seen, unknown_heat, unseen_data
+from .evidence import Gap, expected_rms, locate, refuse_seen, unknown_heat, validation_data
 from .fit import Refit, SessionGain, refit
-from .plan import NextExperiment, next_experiment, rivals, setting_of
+from .plan import NextExperiment, next_experiment, rivals, trial_conditions
 from .search import (
     Accepted,
     SearchState,
@@ -37,7 +37,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
              noise: Mapping[str, float] | float | None = None, operating_point: Mapping[str, float] | None = None,
              session_gain: SessionGain = False,
              progress: Progress = lambda stage: None) -> Diagnosis:
-    """Find where records and simulation part, name the missing effect, add it, and test it on unseen records.
+    """Find where records and simulation part, name the missing effect, add it, and test it on validation records.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         Nominal: `noise` of its sensors, `disturbance` of its lumps, `sigma` of its fit table say what is known.
     records : Record, FrequencyResponse, or list of them
         Measured. Records may come from a closed loop. Of a frequency response (from `rt.identify`, with its covariance)
-        the linearisation at `operating_point` is compared.
+        the linearization at `operating_point` is compared.
     validation : Record, FrequencyResponse, or list of them, optional
-        Not seen by any fit. They test the prediction, may take a name back, and may tell names of a set apart.
+        Not seen by any fit. They test the prediction, may take a name back, and may resolve sets of alternatives.
     parameters : iterable or mapping, optional
         Nominal parameters to refit, as in `rt.calibrate`. Default: the fit table; without one they are taken as known.
     effects : iterable of str, optional
@@ -102,8 +102,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("trying every effect of the catalogue at every place")
     state = revised_search(accepted_effects(begin(nominal, names), progress), progress)
     if state.rounds and validation is not None and not state.misfit_left:
-        progress("asking the validation data whether they speak against an effect")
-        state = validate(state, unseen_data(state.fit, validation, operating_point))
+        progress("testing on the validation data whether any effect is contradicted")
+        state = validate(state, validation_data(state.fit, validation, operating_point))
     judged = judge(state, checked, progress)
     progress("locating the misfit and planning the next experiment")
     return concluded(reconsider_noise(judged, checked))
@@ -162,7 +162,7 @@ def concluded(judged: Judged) -> Diagnosis:
     if judged.hold_out is not None:
         gap["validation"] = judged.hold_out.gap
     where = locate(nominal)
-    unexplained = judged.verdict == "unexplained" and bool(nominal.along)
+    unexplained = judged.verdict == "unexplained" and bool(nominal.records)
     return Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),
@@ -194,5 +194,5 @@ def _plan(rounds: tuple[Accepted, ...]) -> NextExperiment | None:
     for round_ in rounds:
         entries = rivals(round_)
         if len(entries) > 1:
-            return next_experiment(entries) if setting_of(entries[0].fit) is not None else None
+            return next_experiment(entries) if trial_conditions(entries[0].fit) is not None else None
     return None

@@ -12,7 +12,7 @@ from ..errors import Outcome
 from ..thermal import System
 from ._file import write_json
 from ._judge import Name, Verdict
-from .data import NoiseFloor
+from .data import NoiseEstimate
 from .effects import Candidate
 from .evidence import Adequacy, Gap, HoldOut, Location, Scores, UnknownHeat
 from .fit import Refit
@@ -27,13 +27,13 @@ class Found:
     Parameters
     ----------
     effect : str
-        Its name.
+        Name in the catalogue.
     where : tuple of str
-        Parts of the system.
+        Parts of the system it acts on.
     values : dict
         Quantity to (value, standard deviation, unit).
     p_value : float
-        Family-wise.
+        Family-wise p-value of its score.
     delta_bic : float
         Against the model without it; above 10 is very strong.
     """
@@ -94,7 +94,7 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     outcome: Outcome
     provisional: tuple[Found, ...]
-    noise_floor: NoiseFloor
+    noise_floor: NoiseEstimate
     nominal: Refit
     fit: Refit
     scores: Scores
@@ -106,7 +106,7 @@ class Diagnosis:
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
-        """What training could not tell from the accepted effects, and the unseen records could."""
+        """Effects that training could not exclude, and the validation records could."""
         return ruled_out(self.rounds)
 
     def __str__(self) -> str:
@@ -169,7 +169,7 @@ class Diagnosis:
         Parameters
         ----------
         path : str or Path
-            File.
+            File to write.
         """
         write_json(path, self.to_dict())
 

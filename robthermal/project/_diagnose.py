@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ..diagnosis import Along, Diagnosis, diagnose
-from ..diagnosis.path import AlongResponse
+from ..diagnosis import Diagnosis, LinearizedRecord, diagnose
+from ..diagnosis.path import LinearizedResponse
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..signals import Record
@@ -162,7 +162,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
 
 def _trained(found: Diagnosis) -> Iterator[Residuals]:
     for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
-        if isinstance(path, Along):
+        if isinstance(path, LinearizedRecord):
             names = path.one.sensors
             yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
 
@@ -170,7 +170,7 @@ def _trained(found: Diagnosis) -> Iterator[Residuals]:
 def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
     """Real parts stand above imaginary parts."""
     for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
-        if isinstance(path, AlongResponse):
+        if isinstance(path, LinearizedResponse):
             n = path.one.frequencies.size
             sizes = (np.hypot(r[:n], r[n:]) for r in (before, after))
             yield ResponseResiduals(path.one.label, path.one.frequencies,

@@ -14,9 +14,9 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 import robthermal as rt
-from robthermal.diagnosis.data import RecordData, as_measured
-from robthermal.diagnosis.fit._levels import Levels, refined, with_slow_part
-from robthermal.diagnosis.path._along import Along, along
+from robthermal.diagnosis.data import as_measured
+from robthermal.diagnosis.fit._noise_scaling import NoiseScaling, refined, with_slow_part
+from robthermal.diagnosis.path._linearized_record import LinearizedRecord, linearized_record
 from robthermal.diagnosis.path._whitening import SlowNoise, settled_cost, whitener
 from robthermal.diagnosis.search._wider_noise import with_wider_noise
 
@@ -36,10 +36,10 @@ def bar() -> rt.System:
                      sensors={"T": {"lump": "bar", "noise": 0.02}})
 
 
-def at_rest(system: rt.System, n: int = N) -> Along:
+def at_rest(system: rt.System, n: int = N) -> LinearizedRecord:
     record = rt.Record(sample_time=H, inputs=np.full(n, 300.0), outputs=np.full((n, 1), 300.0), input_names=["room"],
                        output_names=["T"])
-    return along(system, as_measured(system, record, "records")[0])
+    return linearized_record(system, as_measured(system, record, "records")[0])
 
 
 def dense(heat: Array, n: int) -> Array:
@@ -71,7 +71,7 @@ def test_a_missing_reading_counts_for_nothing(bar: rt.System) -> None:
     path = at_rest(bar)
     missing = np.zeros((N, 1), bool)
     missing[40] = True
-    path = replace(path, one=RecordData(path.one.record, path.one.sensors, path.one.columns, path.one.readings, missing))
+    path = replace(path, one=replace(path.one, missing=missing))
     r = np.repeat(np.random.default_rng(0).standard_normal((N, 1, 1)), 2, axis=2)
     r[40, 0, 1] += 7.0
     z = whitener(path, NOISE, np.zeros(1), SLOW)(r)
@@ -105,7 +105,7 @@ def test_levels_keep_and_say_the_slow_part(bar: rt.System) -> None:
     path = replace(path, one=as_measured(bar, one, "records")[0])
     floor = rt.diagnosis.noise_floor(bar, one)
     floor = replace(floor, disturbance={"bar": 0.0})
-    levels = with_slow_part([path], floor, Levels(1.0, {}))
+    levels = with_slow_part([path], floor, NoiseScaling(1.0, {}))
     assert levels is not None
     assert 0.35 < levels.share < 0.7
     assert 12.0 < levels.memory < 50.0  # 28.5 s in truth
@@ -120,7 +120,7 @@ def test_levels_keep_and_say_the_slow_part(bar: rt.System) -> None:
 def test_the_slow_part_is_never_more_than_the_declared_noise(bar: rt.System) -> None:
     path = at_rest(bar)
     floor = rt.diagnosis.noise_floor(bar, path.one.record, noise=0.02)
-    slow = Levels(1.0, {"T": 1.4}, share=1.0, memory=9.0).slow(path, floor)
+    slow = NoiseScaling(1.0, {"T": 1.4}, share=1.0, memory=9.0).slow(path, floor)
     assert slow is not None
     assert slow.std == pytest.approx(0.02)
     assert slow.pole == pytest.approx(np.exp(-3.0 / 9.0))

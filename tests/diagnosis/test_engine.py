@@ -14,7 +14,7 @@ from robthermal.diagnosis.data._glitches import outliers
 from robthermal.diagnosis.fit._descent import descend
 from robthermal.diagnosis.fit._refitting import extended
 from robthermal.diagnosis.fit._whitened import Whitened
-from robthermal.diagnosis.path._along import along
+from robthermal.diagnosis.path._linearized_record import linearized_record
 from robthermal.diagnosis.path._whitening import whitener
 from robthermal.diagnosis.search import _revise
 from robthermal.diagnosis.search._decide import Accepted
@@ -214,7 +214,7 @@ def test_a_missing_reading_counts_for_nothing(plant: rt.System, hide: Hide) -> N
     one = as_measured(moving, hide(n=100)[0], "records")[0]
     missing = np.zeros(one.readings.shape, bool)
     missing[40, 0] = True
-    path = along(moving, type(one)(one.record, one.sensors, one.columns, one.readings, missing))
+    path = linearized_record(moving, type(one)(one.record, one.sensors, one.columns, one.readings, missing))
     w = whitener(path, np.array([0.01, 0.01]), np.array([0.05, 0.05]))
     r = np.random.default_rng(0).standard_normal((100, 2, 2))
     r[:, :, 1] = r[:, :, 0]

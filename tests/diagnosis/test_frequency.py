@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import robthermal as rt
 from robthermal.diagnosis.data._frequency_data import response_data
 from robthermal.diagnosis.data._frequency_whitening import as_complex, as_real, kept_bins
-from robthermal.diagnosis.evidence._frequency_tails import inflation, sureness, tail
-from robthermal.diagnosis.path._frequency_model import slope
+from robthermal.diagnosis.evidence._frequency_tails import inflation, relative_degrees_of_freedom, tail
+from robthermal.diagnosis.path._linearized_response import slope
 
 Array = NDArray[np.float64]
 Measure = Callable[..., rt.identify.FrequencyResponse]
@@ -181,7 +181,8 @@ def test_scores_of_a_wishart_estimate_have_the_stated_mean_and_tails() -> None:
 def test_corrections_reduce_to_one_for_records(plant: rt.System, hide: Callable) -> None:
     fit = rt.diagnosis.refit(plant, hide(n=100)[0])
     U = np.linalg.qr(np.random.default_rng(0).standard_normal((fit.z.size, 3)))[0]
-    assert np.all(inflation(fit, U) == 1.0) and np.all(np.isinf(tail(fit, U))) and sureness(fit, U) == 1.0
+    assert np.all(inflation(fit, U) == 1.0) and np.all(np.isinf(tail(fit, U)))
+    assert relative_degrees_of_freedom(fit, U) == 1.0
 
 
 def test_slopes_are_the_derivative_of_a_closed_form() -> None:

@@ -10,7 +10,7 @@ import pytest
 import robthermal as rt
 from robthermal.diagnosis.plan._next_experiment import _clearest, rivals
 from robthermal.diagnosis.plan._separation import hypotheses_of, separation
-from robthermal.diagnosis.plan._setting import setting_of
+from robthermal.diagnosis.plan._trial_conditions import trial_conditions
 from robthermal.diagnosis.plan._trial_inputs import limits_of
 from robthermal.diagnosis.plan._trial_search import LONGEST, Trial, search_of
 
@@ -152,7 +152,7 @@ def test_temperature_limits_are_kept(bench: rt.System, convective: tuple[rt.diag
 
 def test_a_longer_record_promises_about_as_many_times_more(convective: tuple[rt.diagnosis.Entry, ...]) -> None:
     search = search_of(convective, None)
-    short = search.at(search.setting.one.record)
+    short = search.at(search.conditions.one.record)
     (pair, gain), = short.pairs.items()
     assert 0.5 < gain < 40.0 / LONGEST  # otherwise the test says little
     longer = search.prolonged(short, gain)
@@ -185,7 +185,7 @@ def test_inputs_without_limits_stay_within_the_record(bench: rt.System) -> None:
 
 
 def test_one_candidate_is_refused(convective: tuple[rt.diagnosis.Entry, ...]) -> None:
-    with pytest.raises(rt.InputError, match="two or more to tell apart"):
+    with pytest.raises(rt.InputError, match="two or more to separate"):
         rt.diagnosis.next_experiment(convective[:1])
 
 
@@ -243,7 +243,7 @@ def test_promise_of_a_measurement_is_the_distance_of_the_two_values(
     R_j, R_k = (float(fit.structure.ranges.values(fit.v[:fit.structure.n_parameters])[at]) for fit in (j, k))
     idle = rt.Record(sample_time=H, inputs=np.tile([0.0, ROOM], (300, 1)), outputs=np.zeros((300, 2)),
                      input_names=["m", "room"], output_names=["Tc", "Th"])
-    found = separation(hypotheses_of(entries), setting_of(j), idle)
+    found = separation(hypotheses_of(entries), trial_conditions(j), idle)
     asked = rt.diagnosis.Measurement("modules.m.resistance.value", 0.005)
     gain = found.pairs(asked)[entries[0].candidate.label, entries[1].candidate.label]
     each = [(R_j - R_k) ** 2 / ((0.005 * true) ** 2 + (own**2) * fit.covariance[at, at] / max(fit.variance, 1.0))

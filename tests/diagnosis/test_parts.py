@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear, nnls
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.fit._descent import descend
-from robthermal.diagnosis.path._along import Along, along
+from robthermal.diagnosis.path._linearized_record import LinearizedRecord, linearized_record
 from robthermal.diagnosis.path._whitening import gathered, whitener
 
 
@@ -31,13 +31,13 @@ def cooler() -> rt.System:
 
 
 @pytest.fixture(scope="module")
-def path(cooler: rt.System) -> Along:
+def path(cooler: rt.System) -> LinearizedRecord:
     rng = np.random.default_rng(3)
     u = np.repeat(np.column_stack([rng.choice([0.0, 3.0], 12), rng.uniform(-0.5, 1.0, 12),
                                    298.15 + rng.normal(0.0, 1.0, 12)]), 12, axis=0)
     record = rt.Record(sample_time=2.0, inputs=u, outputs=np.full((144, 2), 298.15),
                        input_names=["heater", "m1", "room"], output_names=["Tc", "Th"])
-    return along(cooler, as_measured(cooler, record, "records")[0])
+    return linearized_record(cooler, as_measured(cooler, record, "records")[0])
 
 
 def test_catalogue_is_the_contract() -> None:
@@ -58,7 +58,7 @@ def test_units_are_those_of_the_column(cooler: rt.System) -> None:
         assert known["m1", "offset"] == known["m1", "clip"] == "A"
 
 
-def test_whitener_inverts_the_dense_covariance(path: Along) -> None:
+def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
     noise, disturbance = np.array([0.02, 0.03]), np.array([0.05, 0.02])
     A, C, Q = path.steps[0], path.C, gathered(path, disturbance)
     n, nz = 40, A.shape[1]
@@ -85,14 +85,14 @@ def test_noise_gathered_in_a_sample_of_one_lump() -> None:
                     links=[{"between": ("bar", "room"), "conductance": 2.0}], sensors={"T": {"lump": "bar"}})
     record = rt.Record(sample_time=3.0, inputs=np.full(4, 300.0), outputs=np.full((4, 1), 300.0), input_names=["room"],
                        output_names=["T"])
-    Q = gathered(along(bar, as_measured(bar, record, "records")[0]), np.array([0.7]))
+    Q = gathered(linearized_record(bar, as_measured(bar, record, "records")[0]), np.array([0.7]))
     exact = (0.7 / 10.0) ** 2 * (1 - np.exp(-2 * 0.2 * 3.0)) / (2 * 0.2)
     assert Q[0, 0, 0] == pytest.approx(exact, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", sorted(rt.thermal.effects()))
-def test_signature_is_the_derivative_of_the_simulation(path: Along, name: str) -> None:
-    # The linearised signature, written by hand or from the equations, against two nonlinear simulations.
+def test_signature_is_the_derivative_of_the_simulation(path: LinearizedRecord, name: str) -> None:
+    # The linearized signature, written by hand or from the equations, against two nonlinear simulations.
     for candidate in rt.diagnosis.candidates(path.system, [name])[:3]:
         trials = candidate.trials(path)
         trial = trials[len(trials) // 2]

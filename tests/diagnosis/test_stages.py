@@ -10,7 +10,7 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis import search
-from robthermal.diagnosis.evidence import unseen_data
+from robthermal.diagnosis.evidence import validation_data
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 FEW = ("natural_convection", "sensor_lag", "sensor_offset")
@@ -78,7 +78,7 @@ def test_where_a_large_misfit_is_left_no_later_stage_touches_the_state(
         accepted: search.SearchState, convected: tuple[rt.Record, rt.Record]) -> None:
     left = replace(accepted, rounds=accepted.rounds * 2, complete=True, misfit_left=True)
     assert search.revise(left) is left and search.compare(left) is left
-    data = unseen_data(left.fit, convected[1], None)
+    data = validation_data(left.fit, convected[1], None)
     assert search.validate(left, data).rounds == left.rounds
 
 
@@ -100,9 +100,9 @@ def test_an_effect_that_needs_no_place_is_dropped_by_revision(plant: rt.System, 
 
 def test_validation_data_keep_an_effect_that_holds_and_take_back_one_that_does_not(
         accepted: search.SearchState, convected: tuple[rt.Record, rt.Record], hide: Hide) -> None:
-    kept = search.validate(accepted, unseen_data(accepted.fit, convected[1], None))
+    kept = search.validate(accepted, validation_data(accepted.fit, convected[1], None))
     assert kept.rounds == accepted.rounds and kept.fit is accepted.fit
-    gone = search.validate(accepted, unseen_data(accepted.fit, hide()[1], None))  # nothing is hidden there
+    gone = search.validate(accepted, validation_data(accepted.fit, hide()[1], None))  # nothing is hidden there
     assert gone.rounds == () and gone.fit is accepted.nominal
 
 
@@ -111,7 +111,7 @@ def test_diagnose_is_the_stages_in_a_row(plant: rt.System, convected: tuple[rt.R
     said: list[str] = []
     found = rt.diagnose(plant, convected[0], validation=convected[1], effects=FEW, progress=said.append)
     by_hand = search.validate(search.compare(search.revise(search.shortlist(accepted))),
-                              unseen_data(accepted.fit, convected[1], None))
+                              validation_data(accepted.fit, convected[1], None))
     assert found.verdict == "named"
     assert [r.best.candidate.key for r in found.rounds] == [r.best.candidate.key for r in by_hand.rounds]
     assert found.fit.v.tolist() == by_hand.fit.v.tolist()

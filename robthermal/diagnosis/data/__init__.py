@@ -11,9 +11,9 @@ from ._measured import as_measured as as_measured
 from ._measured import records_of as records_of
 from ._measured import responses_of as responses_of
 from ._measured import without_outliers as without_outliers
-from ._noise_floor import NoiseFloor as NoiseFloor
-from ._noise_floor import noise_floor as noise_floor
+from ._noise_estimate import NoiseEstimate as NoiseEstimate
+from ._noise_estimate import noise_floor as noise_floor
 from ._record_data import RecordData as RecordData
 
-__all__ = ["Complex", "DataSet", "Measured", "NoiseFloor", "RecordData", "ResponseData", "ResponseWhitener",
+__all__ = ["Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "ResponseWhitener",
            "as_complex", "as_measured", "as_real", "noise_floor", "records_of", "responses_of", "without_outliers"]

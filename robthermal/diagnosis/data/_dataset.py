@@ -83,7 +83,7 @@ class DataSet(Protocol):
         Parameters
         ----------
         system : System
-            Nominal model.
+            Nominal model of the data.
         candidate : Candidate
             Effect at a place.
         """

@@ -28,7 +28,7 @@ class ResponseData:
     Parameters
     ----------
     response : FrequencyResponse
-        Estimated.
+        Estimated frequency response with its covariance.
     index : ndarray of int, shape (n_b,)
         Positions of the bins used.
     outputs, inputs : tuple of str

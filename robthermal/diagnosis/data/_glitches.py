@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 _WIDTH = 7  # samples: up to three outliers side by side
 _FAR = 8.0  # standard deviations
 _STEEP = 2.5  # times the spread of the middle three: a bend of the residual
-_BENT = 0.5  # times the largest second difference of the model nearby: where inputs switch, the model may be late
+_CURVED = 0.5  # times the largest second difference of the model nearby: where inputs switch, the model may be late
 _PASSES = 5
 MOST = 0.05
 
@@ -62,7 +62,7 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     except Diverged:  # the refit will say so
         return one
     r, missing = residual(one.readings, model), np.zeros(one.readings.shape, bool)
-    allowed: Array = _FAR * noise + _BENT * _bends(model)
+    allowed: Array = _FAR * noise + _CURVED * _curvature(model)
     time = np.arange(len(r))
     for _ in range(_PASSES):
         new = outliers(r, allowed) & ~missing
@@ -88,7 +88,7 @@ def outliers(r: Array, allowed: Array) -> Mask:
     return np.asarray(np.abs(r - middle) > allowed + _STEEP * (window[..., half + 1] - window[..., half - 1]))
 
 
-def _bends(model: Array) -> Array:
+def _curvature(model: Array) -> Array:
     """Largest second difference of a model nearby, (n, n_sensors) [K]."""
     bend = np.abs(np.diff(model, 2, axis=0, prepend=model[:1], append=model[-1:]))
     return np.asarray(_windows(bend).max(axis=2))

@@ -71,7 +71,7 @@ def without_outliers(system: System, data: Sequence[DataSet], noise: Mapping[str
     Parameters
     ----------
     system : System
-        Nominal model.
+        Nominal model of the data.
     data : sequence of DataSet
         Data of a fit; frequency responses are left as they are.
     noise : mapping

@@ -61,7 +61,7 @@ def record_data(system: System, records: Sequence[Record], where: str) -> list[R
     system : System
         Model whose sensors are looked for.
     records : sequence of Record
-        Measured records.
+        Measured records to check.
     where : str
         Name of the argument, for messages.
     """

@@ -20,7 +20,7 @@ class Candidate:
     Parameters
     ----------
     effect : Effect
-        What.
+        Effect of the catalogue.
     where : tuple of str
         Parts of the system it acts on.
     shape : dict
@@ -47,7 +47,7 @@ class Candidate:
         Parameters
         ----------
         system : System
-            Without it.
+            System without the effect.
         size : float
             Value of the effect's first quantity.
 
@@ -101,7 +101,7 @@ def candidates(system: System, names: Iterable[str] | None = None) -> list[Candi
     Parameters
     ----------
     system : System
-        Nominal.
+        Nominal system to search.
     names : iterable of str, optional
         Effects; default all.
 

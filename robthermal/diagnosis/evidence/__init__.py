@@ -7,9 +7,9 @@ from ._hold_out import HoldOut as HoldOut
 from ._hold_out import ValidationResiduals as ValidationResiduals
 from ._hold_out import expected_rms as expected_rms
 from ._hold_out import hold_out as hold_out
+from ._hold_out import negative_log_predictive_density as negative_log_predictive_density
 from ._hold_out import refuse_seen as refuse_seen
-from ._hold_out import surprises as surprises
-from ._hold_out import unseen_data as unseen_data
+from ._hold_out import validation_data as validation_data
 from ._locate import Location as Location
 from ._locate import locate as locate
 from ._score import ALPHA as ALPHA
@@ -24,5 +24,6 @@ from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Gap", "HoldOut", "Location", "Scores", "UnknownHeat",
-           "ValidationResiduals", "adequacy", "expected_rms", "explains", "hold_out", "locate", "promised",
-           "promising", "refuse_seen", "score", "score_candidates", "surprises", "unknown_heat", "unseen_data"]
+           "ValidationResiduals", "adequacy", "expected_rms", "explains", "hold_out", "locate",
+           "negative_log_predictive_density", "promised", "promising", "refuse_seen", "score", "score_candidates",
+           "unknown_heat", "validation_data"]

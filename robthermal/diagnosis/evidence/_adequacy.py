@@ -14,7 +14,7 @@ from scipy.stats import f as f_distribution
 from ...errors import Outcome
 from ..fit import Refit
 from ..path import N_SPLINES, Linearized
-from ._frequency_tails import inflation, sureness
+from ._frequency_tails import inflation, relative_degrees_of_freedom
 
 Array = NDArray[np.float64]
 LAGS = 60
@@ -148,4 +148,4 @@ def f_test(fit: Refit, J: Array) -> tuple[float, float]:
     explained = float(np.sum((U.T @ fit.rest) ** 2))
     F = (explained / q) / (max(float(fit.rest @ fit.rest) - explained, 1e-300) / nu)
     F /= float(np.mean(inflation(fit, U)))
-    return F, float(f_distribution.sf(F, q * sureness(fit, U), nu))
+    return F, float(f_distribution.sf(F, q * relative_degrees_of_freedom(fit, U), nu))

@@ -38,7 +38,7 @@ def tail(fit: Refit, unit: Array) -> Array:
     return np.where(excess > 0, 4.0 + 1.0 / np.where(excess > 0, excess, 1.0), np.inf)
 
 
-def sureness(fit: Refit, U: Array) -> float:
+def relative_degrees_of_freedom(fit: Refit, U: Array) -> float:
     """Degrees of freedom of |Uᵀz|² per orthonormal column of U (m, q).
 
     Let the noise of window g be known up to a factor τ, var τ² = 2/(ν-4). Then the variance of |Uᵀz|² is

@@ -64,7 +64,7 @@ class ValidationResiduals:
 
 @dataclass(frozen=True)
 class HoldOut:
-    """How the effects do on unseen records.
+    """How the effects do on validation records.
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ class HoldOut:
 
 def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measured], *,
              operating_point: Mapping[str, float] | None = None) -> HoldOut:
-    """Predict unseen records with and without the effects.
+    """Predict validation records with and without the effects.
 
     Parameters
     ----------
     before : Refit
-        Nominal.
+        Nominal system refitted.
     after : Refit
         With the effects.
     validation : Record, FrequencyResponse, or list of them
@@ -140,20 +140,20 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     >>> rt.diagnosis.hold_out(fit, fit, measured(2)).outcome.code
     'predicted'
     """
-    data = unseen_data(after, validation, operating_point)
+    data = validation_data(after, validation, operating_point)
     residuals = _residuals(before, after, records_of(data))
-    gap = _unseen_gap(before, after, data, residuals)
+    gap = _validation_gap(before, after, data, residuals)
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
-    text = (f"The unseen records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
-            f"The unseen records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
+    text = (f"The validation records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
+            f"The validation records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
             "nothing has changed in between, diagnose with them among the training records.")
     return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text),
                    residuals)
 
 
-def unseen_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
+def validation_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None
                 ) -> list[DataSet]:
     """Validation data without glitches; refused if the fit has seen them."""
     base = fit.structure.base
@@ -176,7 +176,7 @@ def refuse_seen(training: Sequence[DataSet], validation: Sequence[DataSet]) -> N
                                  expected="data the fit has not seen", remedy="Estimate it from another record.")
 
 
-def _unseen_gap(before: Refit, after: Refit, data: Sequence[DataSet],
+def _validation_gap(before: Refit, after: Refit, data: Sequence[DataSet],
                 residuals: Sequence[ValidationResiduals]) -> Gap:
     if not residuals:
         return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
@@ -212,7 +212,7 @@ def _ran_away(one: RecordData) -> dict[str, Array]:
 
 
 def _session_systems(fit: Refit, data: Sequence[RecordData]) -> list[System]:
-    """Trained system in every unseen session: a new session has a gain of its own, estimated on all of it."""
+    """Trained system in every validation session: a new session has a gain of its own, estimated on all of it."""
     sessions = fit.structure.sessions
     if not sessions.inputs:
         return [fit.system] * len(data)
@@ -238,15 +238,16 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[fl
     return float(only.z @ only.z) / n, float(f_distribution.sf(rss / n, n * structure.certainty, known))
 
 
-def surprises(fits: Sequence[Refit], reference: Refit, data: Sequence[DataSet]) -> list[float]:
-    """-2 log predictive densities of unseen records given the trained parameters' covariance, but for one constant.
+def negative_log_predictive_density(fits: Sequence[Refit], reference: Refit, data: Sequence[DataSet]) -> list[float]:
+    """-2 log predictive densities of validation records given the trained parameters' covariance, but for one constant.
 
-    Linearised as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
+    Linearized as in `predicted`: smallest sum of squares, and the log of by how much the records narrow the unknowns.
     One filter serves all fits, with the noise of `reference` and along the first model that survives the records; for
     a fit that does not it is infinite.
     """
     whiteners = next((found for fit in (reference, *fits) if (found := _surviving(fit, reference, data))), None)
-    return [float("inf") if whiteners is None else _surprise(fit, whiteners, reference, data) for fit in fits]
+    return [float("inf") if whiteners is None else _negative_log_density(fit, whiteners, reference, data)
+            for fit in fits]
 
 
 def _surviving(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[White, ...] | None:
@@ -256,7 +257,7 @@ def _surviving(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[W
         return None
 
 
-def _surprise(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[DataSet]) -> float:
+def _negative_log_density(fit: Refit, whiteners: Sequence[White], reference: Refit, data: Sequence[DataSet]) -> float:
     try:
         _, only, n = _own_unknowns(fit, data, whiteners)
     except Diverged:
@@ -275,7 +276,7 @@ def _log_volume(J: Array) -> float:
 
 
 def _over(fit: Refit, data: Sequence[DataSet], start: Start = "free") -> tuple[Structure, Array]:
-    """The structure over unseen data, and its unknowns: those trained, the data's own at zero."""
+    """The structure over validation data, and its unknowns: those trained, the data's own at zero."""
     starts = tuple(one.initial(fit.system, start) for one in data)
     structure = replace(fit.structure, data=tuple(data), starts=starts)
     p = structure.n_parameters + structure.n_effects
@@ -283,13 +284,13 @@ def _over(fit: Refit, data: Sequence[DataSet], start: Start = "free") -> tuple[S
 
 
 def _filters(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[White, ...]:
-    """Whiteners of unseen data along the trained model, with the noise of `reference`."""
+    """Whiteners of validation data along the trained model, with the noise of `reference`."""
     return filters(*_over(fit, data), reference.floor, reference.levels)[1]
 
 
 @dataclass(frozen=True, eq=False)
-class _Unseen:
-    """Whitened residuals of unseen data, and what training says about the first unknowns: R (v - trained)."""
+class _Validation:
+    """Whitened residuals of validation data, and what training says about the first unknowns: R (v - trained)."""
 
     of: Whitened
     R: Array
@@ -315,13 +316,13 @@ class _Unseen:
 
 def _own_unknowns(fit: Refit, data: Sequence[DataSet], whiteners: Sequence[White]
                   ) -> tuple[Structure, Point, int]:
-    """Initial temperatures and session gains on unseen data, the trained parameters fixed; also the readings."""
+    """Initial temperatures and session gains on validation data, the trained parameters fixed; also the readings."""
     structure, v = _over(fit, data)
     p = structure.n_parameters + structure.n_effects
     trained = fit.v[:p]
     low, high = (bound.copy() for bound in structure.bounds)
     low[:p], high[:p] = trained, trained
-    problem = _Unseen(Whitened(structure, whiteners), _information_root(fit.J, p), trained)
+    problem = _Validation(Whitened(structure, whiteners), _information_root(fit.J, p), trained)
     return structure, descend(problem, v, (low, high), 20, 1e-4).at, structure.n_readings
 
 
@@ -338,7 +339,7 @@ def response_rms(fit: Refit, data: Sequence[DataSet]) -> float:
     Parameters
     ----------
     fit : Refit
-        Trained fit.
+        Fit to the training data.
     data : sequence of DataSet
         Validation data; records among them are left out.
     """

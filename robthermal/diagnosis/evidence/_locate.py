@@ -62,7 +62,7 @@ def locate(fit: Refit) -> Location:
     Parameters
     ----------
     fit : Refit
-        From `refit`.
+        Nominal system refitted, from `refit`.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def locate(fit: Refit) -> Location:
 
 def _conditions(fit: Refit) -> tuple[str, ...]:
     """The bin with the largest mean square of the innovations, for each way of looking at them."""
-    paths = fit.along
+    paths = fit.records
     if not paths:
         return ()
     sizes = [np.mean(z**2, axis=1) for z, _ in fit.record_innovations]

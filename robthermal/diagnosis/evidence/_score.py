@@ -52,7 +52,7 @@ class Scores:
     signatures : ndarray, shape (m, k)
         Whitened, projected, of unit length (0 for one without a signature).
     n_trials : int
-        Columns tested.
+        Number of signatures tested.
     """
 
     candidates: tuple[Candidate, ...]
@@ -141,7 +141,7 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     Parameters
     ----------
     fit : Refit
-        From `refit`.
+        Fit without the candidates, from `refit`.
     effects : iterable of str, optional
         Names; default the whole catalogue.
 
@@ -208,19 +208,19 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
 
 def promising(fit: Refit, scores: Scores) -> bool:
     """Whether any score could pass: refits are not started for nothing."""
-    least = 0.5 * (BIC_GAP + math.log(fit.n_readings))  # half: a refit may gain over its linearisation
+    least = 0.5 * (BIC_GAP + math.log(fit.n_readings))  # half: a refit may gain over its linearization
     return any(scores.p_value[i] < ALPHA and scores.statistic[i] > least for i in scores.order)
 
 
 def promised(fit: Refit, scores: Scores, i: int) -> float:
-    """Sum of squares that the linearisation about the fit leaves with candidate i.
+    """Sum of squares that the linearization about the fit leaves with candidate i.
 
     Parameters
     ----------
     fit : Refit
         That was scored.
     scores : Scores
-        On it.
+        Scores on that fit.
     i : int
         Place in `candidates`.
     """
@@ -236,7 +236,7 @@ def explains(fit: Refit, scores: Scores) -> float:
     fit : Refit
         That leaves more than noise.
     scores : Scores
-        On it.
+        Scores on that fit.
     """
     least = min((promised(fit, scores, i) for i in scores.order), default=fit.rss)
     return (fit.rss - least) / (fit.rss - fit.n_readings)

@@ -14,7 +14,7 @@ from ...signals import Record
 from ...thermal import Input
 from ..data import DataSet, RecordData, records_of
 from ..fit import Refit, Whitened, filters
-from ..path import Along
+from ..path import LinearizedRecord
 from ._locate import locate
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class UnknownHeat:
     Parameters
     ----------
     lump : str
-        Where.
+        Lump that the heat enters.
     time : tuple of ndarray, shape (n_knots,)
         Times of the knots of every record [s]; between them the heat is linear.
     heat, std : tuple of ndarray, shape (n_knots,)
@@ -92,7 +92,7 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
     """Smooth an unknown heat into one lump out of the records.
 
     A Gaussian process with the covariance of a random walk is the prior; parameters, initial temperatures and session
-    gains of the fit are unknowns beside it, with their own priors. The posterior is that of the linearisation at its
+    gains of the fit are unknowns beside it, with their own priors. The posterior is that of the linearization at its
     own mean.
 
     Parameters
@@ -127,7 +127,7 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
     >>> found.lump, bool(abs(found.heat[0][5]) < 0.3), bool(abs(found.heat[0][-5] - 1.0) < 0.3)
     ('bar', True, True)
     """
-    if not fit.along:
+    if not fit.records:
         raise InputError("there is no record", where="argument fit", expected="a refit of records",
                          remedy="A frequency response has no time: see `located` of its diagnosis.")
     if lump is None:
@@ -135,7 +135,7 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
     if lump not in fit.system.lumps:
         raise InputError(f"there is no lump {lump!r}", where="argument lump",
                          expected="one of " + ", ".join(fit.system.lump_names))
-    knots = [_knots(path.time) for path in fit.along]
+    knots = [_knots(path.time) for path in fit.records]
     K = block_diag(*[_walk(t) for t in knots])
     root = np.linalg.cholesky(K + 1e-12 * np.trace(K) / len(K) * np.eye(len(K)))
     here, heat = fit, np.zeros(len(K))
@@ -153,7 +153,7 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
         heat = new
         try:
             here = _heated(fit, np.clip(here.v + step, *fit.structure.bounds), lump, knots, found.heat)
-        except Diverged:  # far outside what the linearisation knows: stay with the last answer
+        except Diverged:  # far outside what the linearization knows: stay with the last answer
             break
     return found
 
@@ -196,8 +196,8 @@ def _walk(t: Array) -> Array:
 def _whitened_response(fit: Refit, lump: int, knots: list[Array]) -> Array:
     """Whitened readings to one watt at every knot (m, k)."""
     ends = np.cumsum([t.size for t in knots])
-    own = {id(path): (t, int(end)) for path, t, end in zip(fit.along, knots, ends, strict=True)}
-    records = {id(path): path for path in fit.along}
+    own = {id(path): (t, int(end)) for path, t, end in zip(fit.records, knots, ends, strict=True)}
+    records = {id(path): path for path in fit.records}
     columns = []
     for path in fit.paths:
         out = np.zeros((*path.one.readings.shape, int(ends[-1])))
@@ -208,7 +208,7 @@ def _whitened_response(fit: Refit, lump: int, knots: list[Array]) -> Array:
     return fit.whiten(columns)
 
 
-def _response(path: Along, lump: int, knots: Array) -> Array:
+def _response(path: LinearizedRecord, lump: int, knots: Array) -> Array:
     """Readings (n, n_sensors, k) to heat that is linear between knots, one watt at one of them."""
     now = np.column_stack([np.interp(path.time, knots, unit) for unit in np.eye(knots.size)])
     start = np.zeros((*path.x.shape, knots.size))

@@ -38,7 +38,7 @@ class Point:
     problem : Problem
         What is minimised.
     v : ndarray, shape (p,)
-        Unknowns.
+        Values of the unknowns.
     """
 
     problem: Problem
@@ -76,7 +76,7 @@ class Descent:
         Whether a further step, shortened or damped where longer ones fail, would change the sum of squares by less
         than `enough`.
     iterations : int
-        Evaluations.
+        Number of evaluations.
     """
 
     at: Point
@@ -99,7 +99,7 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
         Evaluations; whether the last one has converged is not looked at.
     enough : float
         Predicted decrease of the sum of squares, relative to it, at which to stop; ten times as much per factor e by
-        which the mean square exceeds 1: what is hopeless is not polished.
+        which the mean square exceeds 1: a large misfit is not polished.
     """
     now, count, damped = Point(problem, np.clip(v, *bounds)), 1, 0.0
     now.z  # noqa: B018  # a start that does not survive its simulation raises here
@@ -144,7 +144,7 @@ def _lengths(damped: float) -> list[tuple[float, float]]:
     """Share and damping of the steps tried one after the other, if the step before had to be damped by so much.
 
     The full step; shorter ones in its direction; then ones that turn away from what the data hardly determine. In a
-    bent valley step after step needs the same damping: it is not looked for again from the beginning.
+    curved valley step after step needs the same damping: it is not looked for again from the beginning.
     """
     shares = [(1.0, 0.0)] if damped else [(1.0, 0.0), (0.5, 0.0), (0.25, 0.0)]
     return shares + [(1.0, damping) for damping in _DAMPINGS if damping > 0.05 * damped]

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ..._fitting import rmse
 from ...errors import Outcome
 from ...thermal import System
-from ..data import NoiseFloor
+from ..data import NoiseEstimate
 from ..effects import Candidate
-from ..path import Along, Linearized, White, linearized_records
-from ._levels import Levels
+from ..path import Linearized, LinearizedRecord, White, linearized_records
+from ._noise_scaling import NoiseScaling
 from ._sessions import session_table
 from ._structure import Structure
 from ._whitened import Whitened
@@ -33,15 +33,15 @@ class Refit:
     Parameters
     ----------
     structure : Structure
-        Unknowns.
+        Unknowns and their priors.
     v : ndarray
-        Their values.
-    floor : NoiseFloor
+        Values of the unknowns.
+    floor : NoiseEstimate
         Where the noise levels came from.
-    levels : Levels
+    levels : NoiseScaling
         Factors on them, re-estimated within limits.
     paths : tuple of Linearized
-        Linearisation along every record; the modelled frequency response beside every measured one.
+        Linearization along every record; the modelled frequency response beside every measured one.
     whiteners : tuple of Whitener or ResponseWhitener
         One per record or frequency response.
     z : ndarray, shape (m,)
@@ -52,8 +52,8 @@ class Refit:
 
     structure: Structure
     v: Array
-    floor: NoiseFloor
-    levels: Levels
+    floor: NoiseEstimate
+    levels: NoiseScaling
     paths: tuple[Linearized, ...]
     whiteners: tuple[White, ...]
     z: Array
@@ -92,7 +92,7 @@ class Refit:
         Parameters
         ----------
         columns : ndarray, shape (m, ...)
-            Whitened.
+            Whitened columns to project.
 
         Returns
         -------
@@ -109,7 +109,7 @@ class Refit:
     def degrees_of_freedom(self) -> int:
         """Rows less missing readings and directions fitted."""
         return self.z.size - self.basis.shape[1] - sum(
-            int(path.one.missing.sum()) for path in self.along if path.one.missing is not None)
+            int(path.one.missing.sum()) for path in self.records if path.one.missing is not None)
 
     @property
     def variance(self) -> float:
@@ -151,25 +151,25 @@ class Refit:
 
         Without any record: of the whitened residual of the responses, in standard deviations of their noise.
         """
-        if not self.along:
+        if not self.records:
             return rmse([self.z[:self.n_readings]])
-        return rmse(path.residual for path in self.along)
+        return rmse(path.residual for path in self.records)
 
     @property
-    def along(self) -> tuple[Along, ...]:
-        """Linearisations along the records, without the frequency responses."""
+    def records(self) -> tuple[LinearizedRecord, ...]:
+        """Linearizations along the records, without the frequency responses."""
         return linearized_records(self.paths)
 
     @property
-    def record_innovations(self) -> list[tuple[Array, Along]]:
+    def record_innovations(self) -> list[tuple[Array, LinearizedRecord]]:
         """Whitened residuals of every record with its linearization; without the frequency responses."""
         of = dict(zip(map(id, self.paths), self.innovations(), strict=True))
-        return [(of[id(path)], path) for path in self.along]
+        return [(of[id(path)], path) for path in self.records]
 
     @property
     def unit(self) -> str:
         """Unit of `rms`."""
-        return "K" if self.along else "standard deviations"
+        return "K" if self.records else "standard deviations"
 
     def testable(self, tested: Iterable[Candidate]) -> list[Candidate]:
         """Candidates that these data may show.
@@ -177,7 +177,7 @@ class Refit:
         Parameters
         ----------
         tested : iterable of Candidate
-            All.
+            Candidates to choose from.
 
         Returns
         -------
@@ -217,7 +217,7 @@ class Refit:
         ranges = self.structure.ranges
         values = ranges.values(self.v[:len(ranges.names)])
         lines = [f"{name} = {value:.6g}" for name, value in zip(ranges.names, values, strict=True)]
-        labels = [path.one.label for path in self.along]
+        labels = [path.one.label for path in self.records]
         own = zip(self.structure.data, self.structure.gains(self.v), strict=True)
         gains = [g for one, g in own if one.n_sessions]
         lines += session_table(self.structure.sessions, labels, gains)

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ..._fitting import NONE, Choice, chosen_ranges
 from ...errors import Diverged, InputError, Outcome
 from ...thermal import System
-from ..data import Measured, NoiseFloor, as_measured, noise_floor, without_outliers
+from ..data import Measured, NoiseEstimate, as_measured, noise_floor, without_outliers
 from ..path import Linearized, White, linearized_records
 from ._descent import Descent, descend
-from ._levels import Levels, refined
+from ._noise_scaling import NoiseScaling, refined
 from ._refit import Refit
 from ._sessions import SessionGain, sessions_of
 from ._structure import Structure, structure_of
@@ -26,7 +26,7 @@ ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of thr
 _ROUNDS = 3  # of filter and noise levels
 
 
-def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFloor | None = None, *,
+def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEstimate | None = None, *,
           parameters: Choice = None, operating_point: Mapping[str, float] | None = None,
           session_gain: SessionGain = False) -> Refit:
     """Refit the nominal parameters and the initial temperatures to the records, with their priors.
@@ -36,9 +36,9 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFl
     system : System
         Nominal. `sigma` in its fit table are the priors.
     records : Record, FrequencyResponse, or list of them
-        Measured.
-    floor : NoiseFloor, optional
-        From `noise_floor`.
+        Measured data to fit.
+    floor : NoiseEstimate, optional
+        Noise of the data, from `noise_floor`.
     parameters : iterable or mapping, optional
         As in `rt.calibrate`. Default: the fit table; without one, all parameters are taken as known.
     operating_point : mapping, optional
@@ -82,13 +82,13 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseFl
         raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
                          expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
     try:
-        return fitted(structure, structure.start(ranges.start, []), floor, Levels(1.0, {}))
+        return fitted(structure, structure.start(ranges.start, []), floor, NoiseScaling(1.0, {}))
     except Diverged as error:
         raise InputError(f"the nominal model runs away: {error}", where="argument system",
                          remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
 
 
-def fitted(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels) -> Refit:
+def fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling) -> Refit:
     """Fit from v; filter and noise levels are renewed at the estimate, and the fit repeated."""
     for _ in range(_ROUNDS):
         paths, whiteners = filters(structure, v, floor, levels)
@@ -110,12 +110,12 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
     return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
 
 
-def relinearised(fit: Refit) -> Refit:
-    """The same with linearisations of its own structure; `extended` keeps those of the structure it came from."""
+def relinearized(fit: Refit) -> Refit:
+    """The same with linearizations of its own structure; `extended` keeps those of the structure it came from."""
     return replace(fit, paths=fit.structure.paths(fit.v))
 
 
-def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
+def filters(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling
             ) -> tuple[tuple[Linearized, ...], tuple[White, ...]]:
     """The model beside all data, linearized there, and what makes the errors of each data set white."""
     paths = structure.paths(v)
@@ -123,7 +123,7 @@ def filters(structure: Structure, v: Array, floor: NoiseFloor, levels: Levels
                         for path in paths)
 
 
-def _refined(paths: Sequence[Linearized], floor: NoiseFloor, levels: Levels) -> Levels:
+def _refined(paths: Sequence[Linearized], floor: NoiseEstimate, levels: NoiseScaling) -> NoiseScaling:
     """Noise levels of the records; those of responses come with them."""
     records = linearized_records(paths)
     if not records:

@@ -67,7 +67,7 @@ class Sessions:
                                        for name, sigma, value in zip(self.numbers, self.sigma, g, strict=True)})
 
     def hides(self, candidate: Candidate) -> str:
-        """Why an effect cannot be told from the sessions' gains; empty if it can."""
+        """Why an effect cannot be distinguished from the sessions' gains; empty if it can."""
         if candidate.effect.name == "input_gain" and candidate.where[0] in self.inputs:
             return "every session has a gain of its own for this input"
         return ""
@@ -79,7 +79,7 @@ def sessions_of(system: System, session_gain: SessionGain) -> Sessions:
     Parameters
     ----------
     system : System
-        Nominal.
+        Nominal system of all sessions.
     session_gain : bool or mapping
         True: 5 % for every heater and module. A mapping: from input to standard deviation [-].
     """

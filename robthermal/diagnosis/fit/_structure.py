@@ -27,7 +27,7 @@ _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
 @dataclass(eq=False)
-class _Lately:
+class _Computed:
     """What has been computed at some unknowns."""
 
     paths: tuple[Linearized, ...]
@@ -63,7 +63,7 @@ class Structure:
     effects: tuple[Candidate, ...] = ()
     tolerance: float = 1e-4
     sessions: Sessions = Sessions()
-    _last: dict[bytes, _Lately] = field(default_factory=dict, init=False, repr=False)
+    _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def n_parameters(self) -> int:
@@ -178,21 +178,21 @@ class Structure:
 
     def paths(self, v: Array) -> tuple[Linearized, ...]:
         """The model beside all data; the last few are kept: filters and noise change more often than unknowns."""
-        return self._lately(v).paths
+        return self._computed(v).paths
 
     def slopes(self, v: Array) -> list[Array]:
         """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all data sets; kept too."""
-        lately = self._lately(v)
-        if lately.slopes is None:
-            lately.slopes = [path.slopes(own) for path, own in zip(lately.paths, self._unknowns(v), strict=True)]
-        return lately.slopes
+        computed = self._computed(v)
+        if computed.slopes is None:
+            computed.slopes = [path.slopes(own) for path, own in zip(computed.paths, self._unknowns(v), strict=True)]
+        return computed.slopes
 
-    def _lately(self, v: Array) -> _Lately:
+    def _computed(self, v: Array) -> _Computed:
         key = v.tobytes()
         if key not in self._last:
             while len(self._last) >= _KEPT:
                 del self._last[next(iter(self._last))]
-            self._last[key] = _Lately(tuple(linearize(system, one, self.tolerance)
+            self._last[key] = _Computed(tuple(linearize(system, one, self.tolerance)
                                             for system, one in zip(self.systems(v), self.data, strict=True)))
         return self._last[key]
 
@@ -245,7 +245,7 @@ class Structure:
         Parameters
         ----------
         candidate : Candidate
-            Any.
+            Effect at a place.
 
         Returns
         -------

@@ -21,7 +21,7 @@ class Whitened:
     Parameters
     ----------
     structure : Structure
-        Unknowns.
+        Unknowns and their priors.
     whiteners : sequence of White
         One per record or frequency response.
     """

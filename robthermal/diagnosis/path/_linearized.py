@@ -15,7 +15,7 @@ from ..effects import Candidate, TrialContext
 from ._whitening import Whitener
 
 if TYPE_CHECKING:
-    from ._along import Along
+    from ._linearized_record import LinearizedRecord
 
 Array = NDArray[np.float64]
 White = Whitener | ResponseWhitener
@@ -106,7 +106,7 @@ class Linearized(TrialContext, Protocol):
             Place of the lump.
         """
 
-    def white(self, noise: Callable[[Along], tuple[Any, ...]]) -> White:
+    def white(self, noise: Callable[[LinearizedRecord], tuple[Any, ...]]) -> White:
         """The map that makes the errors of the readings white.
 
         Parameters
@@ -121,7 +121,7 @@ class Linearized(TrialContext, Protocol):
         Parameters
         ----------
         z : ndarray
-            Whitened residuals.
+            Whitened residuals of the data set.
         """
 
     def noise_windows(self, block: Array) -> Iterator[tuple[ResponseData, Array]]:
@@ -141,5 +141,5 @@ class Linearized(TrialContext, Protocol):
         ax : matplotlib.axes.Axes
             Axes to draw on.
         r : ndarray
-            Residuals.
+            Residuals to draw.
         """

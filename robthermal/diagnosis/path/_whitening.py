@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.signal import lfilter
 
 if TYPE_CHECKING:
-    from ._along import Along
+    from ._linearized_record import LinearizedRecord
 
 Array = NDArray[np.float64]
 _IGNORED = 1e6  # K: standard deviation of a missing reading
@@ -54,7 +54,7 @@ class Whitener:
     """Maps free-run residuals (n, n_sensors, ...) [K] to white innovations of unit covariance.
 
     With δ(k+1) = A(k) δ(k) + w, r = C δ + v and the filter started at δ̂ = 0, P = 0 (the start is a parameter of the
-    fit), e = r - C δ̂ are the innovations and z = S^(-1/2) e. If the linearised model holds, cov z = 1. The states of a
+    fit), e = r - C δ̂ are the innovations and z = S^(-1/2) e. If the linearized model holds, cov z = 1. The states of a
     slow part of the noise stand behind δ.
 
     Parameters
@@ -62,9 +62,9 @@ class Whitener:
     A : ndarray, shape (n, n_z, n_z)
         Transition of every sample.
     C : ndarray, shape (n_sensors, n_z)
-        Sensors.
+        Readings of the states.
     gains : ndarray, shape (n, n_z, n_sensors)
-        Filter gains.
+        Gains of the Kalman filter.
     roots : ndarray, shape (n, n_sensors, n_sensors)
         Inverse Cholesky factors of the innovations' covariance.
     """
@@ -115,13 +115,13 @@ class Whitener:
         return np.ascontiguousarray(carry), out.reshape(len(sample), _BLOCK * n_sensors, -1)
 
 
-def whitener(path: Along, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
+def whitener(path: LinearizedRecord, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
     """Filter along one record.
 
     Parameters
     ----------
-    path : Along
-        Linearisation along the simulated record.
+    path : LinearizedRecord
+        Linearization along the simulated record.
     noise : ndarray, shape (n_sensors,)
         Standard deviation of the record's sensors [K].
     disturbance : ndarray, shape (n_lumps,)
@@ -152,7 +152,7 @@ def whitener(path: Along, noise: Array, disturbance: Array, slow: SlowNoise | No
     return Whitener(A, C, gains, roots)
 
 
-def gathered(path: Along, disturbance: Array, M: Array | None = None) -> Array:
+def gathered(path: LinearizedRecord, disturbance: Array, M: Array | None = None) -> Array:
     """Noise gathered in every sample, ∫ e^{Ms} q e^{Mᵀs} ds: Simpson over an eighth, doubled three times."""
     kinds, kind = path.kinds
     one_by_one = M is None
@@ -167,8 +167,9 @@ def gathered(path: Along, disturbance: Array, M: Array | None = None) -> Array:
     return Q[kind] if one_by_one else Q
 
 
-def settled_cost(path: Along, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> float:
-    """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearisation.
+def settled_cost(path: LinearizedRecord, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None
+                 ) -> float:
+    """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
     Good enough for noise levels, and a hundred times faster than the time-varying filter.
     """

@@ -4,6 +4,6 @@ from ._measurement import Measurement as Measurement
 from ._next_experiment import NextExperiment as NextExperiment
 from ._next_experiment import next_experiment as next_experiment
 from ._next_experiment import rivals as rivals
-from ._setting import setting_of as setting_of
+from ._trial_conditions import trial_conditions as trial_conditions
 
-__all__ = ["Measurement", "NextExperiment", "next_experiment", "rivals", "setting_of"]
+__all__ = ["Measurement", "NextExperiment", "next_experiment", "rivals", "trial_conditions"]

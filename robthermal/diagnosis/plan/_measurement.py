@@ -48,7 +48,7 @@ def _instead(candidate: Candidate) -> str:
     return candidate.effect.measure.format(*candidate.where) or candidate.effect.separated_by
 
 
-def most_telling(worth: Mapping[Measurement, float], least: float) -> Measurement | None:
+def most_informative(worth: Mapping[Measurement, float], least: float) -> Measurement | None:
     """The measurement that is worth most, if it is worth at least as much."""
     best = max(worth, key=lambda option: worth[option], default=None)
     return best if best is not None and worth[best] >= least else None

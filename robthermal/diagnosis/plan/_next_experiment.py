@@ -39,16 +39,16 @@ class NextExperiment:
     record : Record
         Inputs to apply; its outputs are what the best candidate predicts [K].
     expected : float
-        Expected ΔBIC between the closest two candidates that any input tells apart, from this record with the present
+        Expected ΔBIC between the closest two candidates that any input separates, from this record with the present
         ones, everything refitted.
     present : float
         The same if the present inputs were repeated.
     pairs : dict
         Expected ΔBIC of every pair, by labels.
     inseparable : tuple of (str, str)
-        Pairs that neither a trial input nor the measurement tells apart: something else has to be measured.
+        Pairs that neither a trial input nor the measurement separates: something else has to be measured.
     advice : str
-        In words.
+        What to do, in words.
     measurement : Measurement or None
         A parameter to measure by itself besides; `expected` and `pairs` count on it.
     inputs : tuple of str
@@ -89,7 +89,7 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
     Parameters
     ----------
     entries : sequence of Entry
-        Two candidates or more that the records cannot tell apart; the first six are told apart.
+        Two candidates or more that the records cannot distinguish; the first six are separated.
     trials : int
         Inputs tried for up to four candidates, fewer for more; half as many again to improve the best. A search that
         has found plenty ends earlier.
@@ -127,7 +127,7 @@ def next_experiment(entries: Sequence[Entry], *, trials: int = 10, seed: int = 0
     """
     search = search_of(entries[:MOST], temperature)
     rng = np.random.default_rng(seed)
-    present = search.setting.one
+    present = search.conditions.one
     repeated = search.at(present.record)
     tried = [repeated]
     count = max(trials * _FULL // max(len(search.hypotheses), _FULL), 1)
@@ -153,12 +153,12 @@ def _fast(search: Search, slow: float, rng: np.random.Generator) -> list[Trial]:
     for number in range(_FAST_TRIALS):
         if number == _FAST_ATTEMPTS and max(trial.worth(LONGEST) for trial in tried) <= slow:
             break
-        tried.append(search.at(drawn(search.setting.one, search.limits, number, rng, _FASTER)))
+        tried.append(search.at(drawn(search.conditions.one, search.limits, number, rng, _FASTER)))
     return tried
 
 
 def rivals(decision: Decision) -> tuple[Entry, ...]:
-    """Best candidate and everything the records cannot tell from it, exact aliases refitted too."""
+    """Best candidate and everything the records cannot distinguish from it, exact aliases refitted too."""
     best = decision.best
     if best is None:
         return ()
@@ -195,7 +195,7 @@ def _clearest(tried: Sequence[Trial], times: int) -> list[Trial]:
 
 def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequence[Trial]) -> NextExperiment:
     if not any(trial.pairs for trial in tried):
-        return NextExperiment(search.setting.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or "
+        return NextExperiment(search.conditions.one.record, 0.0, 0.0, {}, (), "Every trial input leaves the limits or "
                               "runs away: set limits of the inputs, or start from another state.")
     clearest = [search.measured(trial) for trial in _clearest(tried, 1 if search.enough(tried) else LONGEST)]
     most = {pair: max(trial.pairs.get(pair, 0.0) for trial in (*tried, *clearest)) for pair in clearest[0].pairs}
@@ -203,10 +203,10 @@ def _plan(entries: Sequence[Entry], search: Search, repeated: Trial, tried: Sequ
     alike = tuple(pair for pair in most if most[pair] < ALIKE)
     best = _best(search, clearest, apart)
     expected, now = _expected(best, apart), _expected(repeated, apart)
-    times = len(best.record) // len(search.setting.one.record)
+    times = len(best.record) // len(search.conditions.one.record)
     record = simulate(search.system, best.record)
     named = {entry.candidate.label: entry.candidate for entry in entries}
-    faster = best.record.sample_time < search.setting.one.record.sample_time
+    faster = best.record.sample_time < search.conditions.one.record.sample_time
     besides = _besides(best.record, faster, times, best.measurement)
     text = _advice(named, alike, apart, expected, now, besides)
     return NextExperiment(record, expected, now, best.pairs, alike, text, best.measurement,
@@ -219,7 +219,7 @@ def _expected(trial: Trial, apart: Sequence[Pair]) -> float:
 
 
 def _best(search: Search, clearest: Sequence[Trial], apart: Sequence[Pair]) -> Trial:
-    """The trial that tells most, prolonged where that is worth its trouble."""
+    """The most informative trial, prolonged where that is worth its trouble."""
     best = clearest[0]
     for trial in clearest:
         if trial is best or trial.worth(LONGEST) > best.worth():
@@ -241,13 +241,13 @@ def _advice(named: Mapping[str, Candidate], alike: Sequence[Pair], apart: Sequen
     text = []
     if apart and expected > _HELPS:
         text.append(f"Apply the inputs of this plan: expected ΔBIC {expected:.0f} between the closest two candidates "
-                    f"that it tells apart (the present inputs once more: {now:.0f}).{besides}")
+                    f"that it separates (the present inputs once more: {now:.0f}).{besides}")
     elif apart:
         hints = {named[label].effect.separated_by for pair in apart for label in pair} - {""}
         text.append(f"The inputs of this plan separate them little (expected ΔBIC {expected:.1f}). "
                     f"What separates them: {'; '.join(sorted(hints))}.{besides}")
     if alike:
         labels = list(dict.fromkeys(label for pair in alike for label in pair))
-        text.append(f"No input within the limits tells {' from '.join(labels)}. Measure something else: "
+        text.append(f"No input within the limits separates {' from '.join(labels)}. Measure something else: "
                     f"{instead(named[label] for label in labels)}.")
     return " ".join(text)

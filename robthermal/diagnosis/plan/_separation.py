@@ -1,4 +1,4 @@
-"""How far apart a record would put candidates, with everything refitted and the present records kept."""
+"""Expected ΔBIC between candidates on one more record, with everything refitted and the present records kept."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..data import RecordData
 from ..fit import Structure, Whitened, filters
 from ..search import Entry
 from ._measurement import Measurement
-from ._setting import Setting
+from ._trial_conditions import TrialConditions
 
 Array = NDArray[np.float64]
 Pair = tuple[str, str]
@@ -32,7 +32,7 @@ class Hypothesis:
     structure : Structure
         With all accepted effects.
     v : ndarray
-        Unknowns.
+        Values of the unknowns.
     present : ndarray, shape (p, p)
         Triangular factor of the present records' whitened derivatives, priors included: what they know.
     """
@@ -42,9 +42,9 @@ class Hypothesis:
     v: Array
     present: Array
 
-    def on(self, trial: RecordData, setting: Setting) -> tuple[Structure, Array]:
+    def on(self, trial: RecordData, conditions: TrialConditions) -> tuple[Structure, Array]:
         """The structure and its unknowns on one new record."""
-        start = setting.start(self.structure, self.structure.system(self.v))
+        start = conditions.start(self.structure, self.structure.system(self.v))
         own = replace(self.structure, data=(trial,), starts=(start,))
         values = own.ranges.values(self.v[:own.n_parameters])
         return own, own.start(values, self.structure.quantities(self.v))
@@ -66,7 +66,7 @@ class Separation:
     Parameters
     ----------
     hypotheses : tuple of Hypothesis
-        Candidates.
+        Candidates to be separated.
     z : tuple of ndarray, shape (m,)
         Whitened residuals of the new record, up to what is common to all.
     rows : tuple of ndarray, shape (m + p + ..., p)
@@ -87,7 +87,7 @@ class Separation:
         Parameters
         ----------
         measured : Measurement, optional
-            Which.
+            Parameter measured by itself.
         """
         out: dict[Pair, float] = {}
         for j, k in permutations(range(len(self.hypotheses)), 2):
@@ -110,23 +110,23 @@ class Separation:
         return row, float(true[at] - own[at]) / std
 
 
-def separation(hypotheses: Sequence[Hypothesis], setting: Setting, record: Record) -> Separation:
+def separation(hypotheses: Sequence[Hypothesis], conditions: TrialConditions, record: Record) -> Separation:
     """Simulate all candidates on one more record.
 
     Parameters
     ----------
     hypotheses : sequence of Hypothesis
         Two or more.
-    setting : Setting
+    conditions : TrialConditions
         Its sensors, start and noise.
     record : Record
         Inputs to apply.
     """
-    one = setting.one
+    one = conditions.one
     readings = np.zeros((len(record), len(one.sensors)))  # only differences count
     trial = RecordData(record, one.sensors, one.columns, readings)
-    on = [hypothesis.on(trial, setting) for hypothesis in hypotheses]
-    _, whiteners = filters(*on[0], setting.floor, setting.levels)
+    on = [hypothesis.on(trial, conditions) for hypothesis in hypotheses]
+    _, whiteners = filters(*on[0], conditions.floor, conditions.levels)
     n, z, rows = trial.readings.size, [], []
     for hypothesis, (own, v) in zip(hypotheses, on, strict=True):
         problem = Whitened(own, whiteners)

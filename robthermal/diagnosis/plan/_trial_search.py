@@ -13,17 +13,17 @@ from ...signals import Record
 from ...thermal import System, trajectory
 from ..evidence import BIC_GAP
 from ..search import Entry
-from ._measurement import Measurement, measurements, most_telling
+from ._measurement import Measurement, measurements, most_informative
 from ._separation import Hypothesis, Pair, hypotheses_of, separation
-from ._setting import Setting, setting_of
+from ._trial_conditions import TrialConditions, trial_conditions
 from ._trial_inputs import Limits, limits_of, repeated, towards_rest
 
 MOST = 6  # candidates that one experiment is designed for
 _ENOUGH = 40.0  # expected ΔBIC that exceeds 10 with a probability of 0.99
 _PLENTY = 80.0  # a search that reaches it ends
-_LITTLE = 1e-3  # pairs per unit of ΔBIC: so that a search finds its way where nothing is told apart yet
+_LITTLE = 1e-3  # pairs per unit of ΔBIC: so that a search finds its way where nothing is separated yet
 _TIE = 1e-7  # pairs per unit of ΔBIC of the closest pair: of equals the clearest
-_MORE = 0.2  # pairs told apart: what makes another measurement, or a longer one, worth its trouble
+_MORE = 0.2  # pairs separated: what makes another measurement, or a longer one, worth its trouble
 _HOPELESS = 6  # trials
 LONGEST = 8  # times the present number of samples, where a plan separates too little
 ALIKE = 0.5  # expected ΔBIC below which no input is said to separate a pair
@@ -38,12 +38,12 @@ class Trial:
     measurement: Measurement | None = None
 
     def worth(self, times: int = 1) -> float:
-        """How much it tells, about, if so many times as long."""
+        """Approximate information if so many times as long."""
         return _worth(self.pairs, times)
 
 
 def _worth(pairs: Mapping[Pair, float], times: int = 1) -> float:
-    """Expected number of pairs that will be told apart; where that is none, or all, the gains themselves, a little.
+    """Expected number of pairs that will be separated; where that is none, or all, the gains themselves, a little.
 
     The gain of ΔBIC is normal with mean λ and variance 4 λ, and has to exceed 10; λ grows about as the record.
     """
@@ -58,7 +58,7 @@ class Search:
     """What all trials share."""
 
     hypotheses: tuple[Hypothesis, ...]
-    setting: Setting
+    conditions: TrialConditions
     system: System
     limits: Mapping[str, Limits]
     temperature: tuple[float, float] | None
@@ -68,7 +68,7 @@ class Search:
         for _ in range(4):
             try:
                 if self._allowed(record):
-                    return Trial(record, separation(self.hypotheses, self.setting, record).pairs())
+                    return Trial(record, separation(self.hypotheses, self.conditions, record).pairs())
             except (Diverged, InputError):  # one of the candidates runs away
                 pass
             record = towards_rest(record, self.limits, 0.6)
@@ -85,13 +85,13 @@ class Search:
         return min(max(tried, key=Trial.worth).pairs.values(), default=0.0) >= gain
 
     def measured(self, trial: Trial) -> Trial:
-        """With the parameter that tells most if measured by itself, where the trial is not enough."""
+        """With the most informative parameter measured by itself, where the trial is not enough."""
         if self.enough([trial]):
             return trial
         possible = measurements(self.hypotheses[0].structure.ranges)
-        found = separation(self.hypotheses, self.setting, trial.record) if possible else None
+        found = separation(self.hypotheses, self.conditions, trial.record) if possible else None
         options = {option: found.pairs(option) for option in possible} if found else {}
-        best = most_telling({option: _worth(pairs) for option, pairs in options.items()}, trial.worth() + _MORE)
+        best = most_informative({option: _worth(pairs) for option, pairs in options.items()}, trial.worth() + _MORE)
         return trial if best is None else Trial(trial.record, options[best], best)
 
     def prolonged(self, trial: Trial, expected: float) -> Trial:
@@ -103,7 +103,7 @@ class Search:
         try:
             if not self._allowed(long):
                 return trial
-            pairs = separation(self.hypotheses, self.setting, long).pairs(trial.measurement)
+            pairs = separation(self.hypotheses, self.conditions, long).pairs(trial.measurement)
         except (Diverged, InputError):  # one of the candidates runs away
             return trial
         return Trial(long, pairs, trial.measurement)
@@ -123,12 +123,12 @@ def search_of(entries: Sequence[Entry], temperature: tuple[float, float] | None)
         Fewer than two entries; no record, and no noise declared of any sensor.
     """
     if len(entries) < 2:
-        raise InputError(f"{len(entries)} candidates", where="argument entries", expected="two or more to tell apart")
+        raise InputError(f"{len(entries)} candidates", where="argument entries", expected="two or more to separate")
     best = entries[0].fit
-    setting = setting_of(best)
-    if setting is None:
+    conditions = trial_conditions(best)
+    if conditions is None:
         raise InputError("no record, and no noise declared of any sensor", where="argument entries",
                          remedy="Declare noise of the sensors in the system: a record is planned, not a response.")
-    system = best.system if setting.place is None else best.structure.systems(best.v)[setting.place]
-    limits = limits_of(best.system, setting.one.record)
-    return Search(hypotheses_of(entries), setting, system, limits, temperature)
+    system = best.system if conditions.place is None else best.structure.systems(best.v)[conditions.place]
+    limits = limits_of(best.system, conditions.one.record)
+    return Search(hypotheses_of(entries), conditions, system, limits, temperature)

@@ -1,5 +1,6 @@
 """Which effects: short lists, decisions, joint selection, revision."""
 
+from ._contradicted import without_contradicted as without_contradicted
 from ._decide import Accepted as Accepted
 from ._decide import Decision as Decision
 from ._decide import decide as decide
@@ -9,11 +10,13 @@ from ._joint_check import JointCheck as JointCheck
 from ._joint_check import checked_jointly as checked_jointly
 from ._joint_sets import EffectSet as EffectSet
 from ._joint_sets import refit_set as refit_set
+from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
+from ._resolve_alternatives import ruled_out as ruled_out
 from ._revise import needed as needed
 from ._revise import revised as revised
 from ._short_list import Entry as Entry
 from ._short_list import ShortList as ShortList
-from ._short_list import flails as flails
+from ._short_list import leaves_large_misfit as leaves_large_misfit
 from ._short_list import quantities_of as quantities_of
 from ._short_list import refit_short_list as refit_short_list
 from ._stages import accept as accept
@@ -24,12 +27,10 @@ from ._stages import revise as revise
 from ._stages import shortlist as shortlist
 from ._stages import validate as validate
 from ._state import SearchState as SearchState
-from ._told_apart import ruled_out as ruled_out
-from ._told_apart import told_apart as told_apart
-from ._unseen_doubts import supported as supported
 from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState", "ShortList",
-           "accept", "begin", "checked_jointly", "compare", "decide", "flails", "needed", "quantities_of",
-           "refit_candidates", "refit_set", "refit_short_list", "revise", "revised", "ruled_out", "select_jointly",
-           "shortlist", "supported", "told_apart", "validate", "with_wider_noise"]
+           "accept", "begin", "checked_jointly", "compare", "decide", "leaves_large_misfit", "needed",
+           "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise",
+           "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_wider_noise",
+           "without_contradicted"]

@@ -1,4 +1,4 @@
-"""Stage 6: name the effect, or the set of effects that the records cannot tell apart, or nothing."""
+"""Stage 6: name the effect, or the set of effects that the records cannot distinguish, or nothing."""
 
 from __future__ import annotations
 

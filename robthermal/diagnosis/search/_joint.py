@@ -118,7 +118,7 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit |
 
     minimise ½‖z' - J'β‖² + λ Σ_g w_g ‖β_g‖ within the physical bounds, for λ from the smallest that selects nothing
     down to the noise. Up to six candidates, from the best pairs and as they enter the path, are a pool; its sets of
-    up to three effects are compared by the linearised ΔBIC. The best, and the best pair, are refitted with the nominal
+    up to three effects are compared by the linearized ΔBIC. The best, and the best pair, are refitted with the nominal
     parameters.
 
     Parameters
@@ -128,7 +128,7 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit |
     scores : Scores
         Of all candidates on it.
     tries : int
-        Sets refitted.
+        Number of sets to refit.
     known : Refit, optional
         With some set of effects that has been refitted: where it is among those to refit it is warm.
 

@@ -55,11 +55,11 @@ def checked_jointly(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, sc
     fit : Refit
         With all of them.
     nominal : Refit
-        Without any.
+        Fit without any effect.
     scores : Scores
         On the nominal fit.
     effects : iterable of str, optional
-        Catalogue.
+        Effects of the catalogue to try.
     """
     stepwise = fit.structure.effects
     selection = select_jointly(nominal, scores, known=fit)

@@ -29,7 +29,7 @@ class EffectSet:
     Parameters
     ----------
     candidates : tuple of Candidate
-        What.
+        Effects of the set.
     fit : Refit
         With all of them.
     delta_bic : float
@@ -84,7 +84,7 @@ def best_sets(fit: Refit, pool: tuple[Candidate, ...], sizes: Sequence[float], t
     """The best sets of up to three candidates of a pool, and some more sets, refitted; one that is known from there.
 
     The whole pool is refitted first: there the nominal parameters and the shapes are near the truth, and the sums of
-    squares of its subsets follow from one linearisation.
+    squares of its subsets follow from one linearization.
     """
     found: dict[frozenset[Key], EffectSet] = {}
     starts = [(chosen, own, fit) for chosen, own in more]

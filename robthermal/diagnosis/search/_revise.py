@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import Diverged, InputError
 from ..evidence import BIC_GAP, score
-from ..fit import Refit, Whitened, extended, relinearised
+from ..fit import Refit, Whitened, extended, relinearized
 from ._decide import Accepted, settled
 from ._short_list import Entry, delta_bic, quantities_of, refit_short_list
 
@@ -30,7 +30,7 @@ def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str]
     nominal : Refit
         Without any effect.
     effects : iterable of str, optional
-        Catalogue.
+        Effects of the catalogue to try.
     last_is_new : bool
         Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
     """
@@ -110,7 +110,7 @@ def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None)
     place : int
         Of the effect to leave out.
     nominal : Refit
-        Without any.
+        Fit without any effect.
     before : Refit, optional
         From which the effect was chosen; if it had the other effects, its unknowns are a start, too.
     """
@@ -123,6 +123,6 @@ def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None)
             starts.append(structure.carried(before.structure, before.v, before.structure.quantities(before.v)))
         problem = Whitened(structure, fit.whiteners)
         v = starts[0] if len(starts) == 1 else min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))
-        return relinearised(extended(fit, structure, v, _EVALUATIONS))
+        return relinearized(extended(fit, structure, v, _EVALUATIONS))
     except (Diverged, InputError):
         return None

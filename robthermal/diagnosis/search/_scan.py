@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _FINE = 12  # values on either side, as far as the next value tried when candidates were scored
 _LOWER = 1e-3  # of the sum of squares: a minimum of its own
 _FACTORS = (0.1, 0.25, 0.5, 2.0, 4.0, 10.0)  # other time constants than the one found
-_HELD = 4  # evaluations with such a time constant held
+_WITH_FIXED = 4  # evaluations with such a time constant held
 _NEAR = 30.0  # ΔBIC that releasing it may well bring
 
 
@@ -100,7 +100,7 @@ def _from_other_times(fit: Refit, before: Refit, at: int) -> Iterator[Refit]:
             v, (low, high) = start.copy(), (bound.copy() for bound in structure.bounds)
             v[at] = low[at] = high[at] = fit.v[at] + math.log(factor)
             try:
-                held = descend(Whitened(structure, fit.whiteners), v, (low, high), _HELD, ENOUGH).at
+                held = descend(Whitened(structure, fit.whiteners), v, (low, high), _WITH_FIXED, ENOUGH).at
                 if held.z @ held.z < fit.rss * math.exp(_NEAR / fit.n_readings):
                     yield extended(fit, structure, held.v, LIMIT)
                     break

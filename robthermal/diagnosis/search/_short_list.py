@@ -20,9 +20,9 @@ from ._starts import BEHIND, Origin, in_reach, started
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 LENGTH = 7
-_FIRST = 2  # evaluations before the hopeless ones are dropped
+_FIRST = 2  # evaluations before those out of reach are dropped
 _LAST = 15  # more evaluations, for the others
-_PROMISED = 0.1  # of the best ΔBIC reached: below it, a candidate's linearisation would have to be very wrong
+_PROMISED = 0.1  # of the best ΔBIC reached: below it, a candidate's linearization would have to be very wrong
 _NEAR = 0.7  # of the best ΔBIC: from another time constant it may be the best
 _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
@@ -37,13 +37,13 @@ class Entry:
     candidate : Candidate
         What was added last.
     fit : Refit
-        With it.
+        Fit with the candidate.
     delta_bic : float
         N log(RSS₀/RSS) - dim log N against the structure without it: above 10 is very strong.
     p_value : float
         Family-wise, from its score.
     aliases : tuple of Candidate
-        What no reading could tell from it.
+        Effects with the same change of every reading.
     """
 
     candidate: Candidate
@@ -72,7 +72,7 @@ class ShortList:
     before : Refit
         Without any of them.
     entries : tuple of Entry
-        By ΔBIC.
+        Refitted candidates in the order of ΔBIC.
     failed : dict
         Candidates whose refit failed, with the reason.
     """
@@ -151,13 +151,13 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
                                     aliases, best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    return ShortList(fit, tuple(_looked_at_again(fit, map(finished, hopeful(entries)), tried)), failed)
+    return ShortList(fit, tuple(_reconsidered(fit, map(finished, competitive(entries)), tried)), failed)
 
 
-def _looked_at_again(before: Refit, entries: Iterable[Entry], tried: Key | None) -> list[Entry]:
-    """By ΔBIC; the best and what comes near it from other times, too, unless all of them flail."""
+def _reconsidered(before: Refit, entries: Iterable[Entry], tried: Key | None) -> list[Entry]:
+    """By ΔBIC; the best and what comes near it from other times, too, unless all of them leave a large misfit."""
     ordered = sorted(entries, key=lambda entry: -entry.delta_bic)
-    if not ordered or flails(before, ordered[0]):
+    if not ordered or leaves_large_misfit(before, ordered[0]):
         return ordered
     ordered[0] = replaced(ordered[0], scanned(ordered[0].fit))
     if ordered[0].delta_bic < BIC_GAP:
@@ -168,14 +168,14 @@ def _looked_at_again(before: Refit, entries: Iterable[Entry], tried: Key | None)
     return sorted(again, key=lambda entry: -entry.delta_bic)
 
 
-def flails(before: Refit, best: Entry) -> bool:
+def leaves_large_misfit(before: Refit, best: Entry) -> bool:
     """Whether the best candidate leaves most of a large misfit: more of the same kind would only be curve fitting."""
     n = before.n_readings
     after = before.rss * math.exp(-best.delta_bic / n)
     return bool(after > _LARGE * n and after - n > _MOST * (before.rss - n))
 
 
-def hopeful(entries: Sequence[Entry]) -> list[Entry]:
+def competitive(entries: Sequence[Entry]) -> list[Entry]:
     """Entries that further iterations could bring to the top: not those far behind already."""
     best = max((entry.delta_bic for entry in entries), default=0.0)
     return [entry for entry in entries if in_reach(entry.delta_bic, best)]

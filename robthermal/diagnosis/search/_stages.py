@@ -8,13 +8,13 @@ from dataclasses import replace
 from ..data import DataSet
 from ..evidence import Scores, explains, promising, score
 from ..fit import Refit
+from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
 from ._joint_check import checked_jointly
+from ._resolve_alternatives import resolve_alternatives
 from ._revise import needed, revised
-from ._short_list import ShortList, flails, refit_short_list
+from ._short_list import ShortList, leaves_large_misfit, refit_short_list
 from ._state import SearchState
-from ._told_apart import told_apart
-from ._unseen_doubts import supported
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
@@ -78,7 +78,7 @@ def accept(state: SearchState) -> SearchState:
     if not isinstance(decision, Accepted):
         return replace(state, complete=True)
     rounds, fit = (*state.rounds, decision), decision.best.fit
-    left = flails(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
+    left = leaves_large_misfit(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
     return replace(state, rounds=rounds, fit=fit, complete=left, misfit_left=left)
 
 
@@ -114,7 +114,7 @@ def compare(state: SearchState) -> SearchState:
 
 
 def validate(state: SearchState, data: Sequence[DataSet]) -> SearchState:
-    """Take effects back that validation data speak against, and resolve sets of alternatives where the data can.
+    """Take effects back that validation data contradict, and resolve sets of alternatives where the data can.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def validate(state: SearchState, data: Sequence[DataSet]) -> SearchState:
     """
     rounds, fit = state.rounds, state.fit
     for _ in state.rounds if not state.misfit_left else ():  # a name in another's place may leave nothing of a third
-        rounds, fit = told_apart(*supported(rounds, fit, state.nominal, data), data)
+        rounds, fit = resolve_alternatives(*without_contradicted(rounds, fit, state.nominal, data), data)
         fewer, less = needed(rounds, fit, state.nominal)
         if len(fewer) == len(rounds):
             break

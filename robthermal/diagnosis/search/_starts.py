@@ -1,6 +1,6 @@
 """Where the refit of a candidate starts: from the nominal fit, or from the declared parameters.
 
-A strong effect that is missing pulls the nominal parameters far away; the linearisation there knows little of the
+A strong effect that is missing pulls the nominal parameters far away; the linearization there knows little of the
 truth. The declared parameters are wrong by their priors only.
 """
 
@@ -23,7 +23,7 @@ _SETTLING = 2  # evaluations before what shapes an effect is moved
 _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
 _MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
-_MANY = 12  # evaluations along a bent valley
+_MANY = 12  # evaluations along a curved valley
 BEHIND = 60.0  # ΔBIC by which a candidate may lie below the best, and still get there
 _SHARE = 0.3  # of the best ΔBIC, less that much
 
@@ -84,13 +84,13 @@ def _from_nothing(fit: Refit, candidate: Candidate, size: float, tried: list[Ref
     new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
     if new is None and not tried:
         raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
-    further = _along_the_valley(fit, tried, least, fit.rss if new is None else new.rss)
+    further = _further_iterations(fit, tried, least, fit.rss if new is None else new.rss)
     return [one for one in (new, further) if one is not None]
 
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Linearised at a fit: trial values, unknowns, size, and the sum of squares that the linearisation promises."""
+    """Linearized at a fit: trial values, unknowns, size, and the sum of squares that the linearization promises."""
 
     at: Refit
     trial: Candidate
@@ -137,10 +137,10 @@ def held(structure: Structure, v: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
+def _further_iterations(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
     """The best of the starts iterated on, where a start from nothing stands still and much more is promised.
 
-    A capacity beside a capacity lies in a bent valley: from nothing no step along its tangent survives.
+    A capacity beside a capacity lies in a curved valley: from nothing no step along its tangent survives.
     """
     promised = fit.rss - least
     if not tried or fit.rss - stands > _MOVES * promised or fit.n_readings * np.log(fit.rss / least) < 2.0 * BIC_GAP:
@@ -150,7 +150,7 @@ def _along_the_valley(fit: Refit, tried: list[Refit], least: float, stands: floa
 
 
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
-    """Optimum of the linearised problem for a size within its bounds, and its sum of squares."""
+    """Optimum of the linearized problem for a size within its bounds, and its sum of squares."""
     size = _believable(candidate, size)
     target = fit.z - size * fit.whiten([path.columns([candidate]) for path in fit.paths])[:, 0]
     shift = np.linalg.lstsq(fit.J, target, rcond=1e-9)[0]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ...errors import Diverged
 from ..evidence import Adequacy, Scores, adequacy, promising, score
-from ..fit import LARGEST_FACTOR, WIDE, Levels, Refit, fitted, with_slow_part
+from ..fit import LARGEST_FACTOR, WIDE, NoiseScaling, Refit, fitted, with_slow_part
 
 Answer = tuple[Refit, Scores, Adequacy]
 
@@ -16,15 +16,15 @@ def with_wider_noise(nominal: Refit, effects: Iterable[str] | None, slow: bool =
     """The nominal fit with noise unlike the declared one, if that leaves nothing to explain; else None.
 
     First levels up to 2.2 times off; then a slow part of the sensors' noise, at most as large as the declared noise,
-    with levels as near as ever. Asked last: such noise would also swallow small physics, so that a name is never looked
-    for with it. What it cannot swallow is a large misfit.
+    with levels as near as ever. Asked last: such noise would also absorb small physics, so that a name is never looked
+    for with it. What it cannot absorb is a large misfit.
 
     Parameters
     ----------
     nominal : Refit
         Without any effect.
     effects : iterable of str, optional
-        Catalogue.
+        Effects of the catalogue to try.
     slow : bool
         Whether to ask the second question too.
     """
@@ -42,12 +42,12 @@ def _with_wide_levels(nominal: Refit, effects: list[str] | None) -> Answer | Non
 
 
 def _with_slow_part(nominal: Refit, effects: list[str] | None) -> Answer | None:
-    levels = with_slow_part(nominal.along, nominal.floor, nominal.levels) if nominal.along else None
+    levels = with_slow_part(nominal.records, nominal.floor, nominal.levels) if nominal.records else None
     fit = None if levels is None else _refitted(nominal, levels)
     return None if fit is None else _if_nothing_left(fit, effects)
 
 
-def _refitted(nominal: Refit, levels: Levels) -> Refit | None:
+def _refitted(nominal: Refit, levels: NoiseScaling) -> Refit | None:
     try:
         return fitted(nominal.structure, nominal.v, nominal.floor, levels)
     except Diverged:

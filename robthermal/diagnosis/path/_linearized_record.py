@@ -1,4 +1,4 @@
-"""A system linearised along a simulated record: how readings answer to a small extra heat, sample by sample.
+"""A system linearized along a simulated record: how readings answer to a small extra heat, sample by sample.
 
 dδ/dt = E⁻¹(∂f/∂x δ + q): with ∂f/∂x frozen at the middle of each sample and the extra heat q linear within it, the step
 is exact, δ(k+1) = A δ(k) + h φ₁(Mh) q₀ + h φ₂(Mh)(q₁ - q₀). All candidates go through the recursion together.
@@ -32,8 +32,8 @@ _SAME = 1e-4  # change of a rate times the sample time [-]
 
 
 @dataclass(frozen=True, eq=False)
-class Along:
-    """A simulated record and the system linearised along it.
+class LinearizedRecord:
+    """A simulated record and the system linearized along it.
 
     Parameters
     ----------
@@ -84,9 +84,9 @@ class Along:
         Parameters
         ----------
         ax : matplotlib.axes.Axes
-            Where.
+            Axes to draw on.
         r : ndarray, shape (n, n_sensors)
-            Residuals [K].
+            Residuals of the sensors [K].
         """
         ax.plot(self.time, r, linewidth=0.7, label=self.one.sensors)
         ax.set(xlabel="time [s]", ylabel="measured − model [K]")
@@ -101,7 +101,7 @@ class Along:
         """Free-run residual, measured − modelled, (n, n_sensors) [K]."""
         return residual(self.one.readings, self.readings[:, self.one.columns])
 
-    def white(self, noise: Callable[[Along], tuple[Any, ...]]) -> Whitener:
+    def white(self, noise: Callable[[LinearizedRecord], tuple[Any, ...]]) -> Whitener:
         """As `Linearized.white`: a Kalman filter along the record."""
         return whitener(self, *noise(self))
 
@@ -286,14 +286,14 @@ def heat_splines(time: Array, count: int = N_SPLINES) -> Array:
     return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
 
 
-def along(system: System, one: RecordData, run: Trajectory | None = None) -> Along:
-    """Simulate a record, unless it has been, and prepare its linearisation."""
+def linearized_record(system: System, one: RecordData, run: Trajectory | None = None) -> LinearizedRecord:
+    """Simulate a record, unless it has been, and prepare its linearization."""
     run = trajectory(system, one.record) if run is None else run
     columns = [one.record[name] if name in one.record.input_names
                else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
     if not np.isfinite(run.lumps).all():
         raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
-    return Along(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
+    return LinearizedRecord(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
                  np.column_stack(columns), run)
 
 

@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._fitting import residual, rmse
-from ..data import NoiseFloor
-from ..path import Along, SlowNoise, settled_cost
+from ..data import NoiseEstimate
+from ..path import LinearizedRecord, SlowNoise, settled_cost
 
 Array = NDArray[np.float64]
 LARGEST_FACTOR = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
 WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
 _CLOSE = 0.03
 _N_TRIED = 15  # five per cent apart
-_SHARES = np.geomspace(0.25, 1.0, 9)  # never more than the declared noise: it must not swallow physics
+_SHARES = np.geomspace(0.25, 1.0, 9)  # never more than the declared noise: it must not absorb physics
 _MEMORIES = np.geomspace(2.0, 30.0, 9)  # samples; what drifts more slowly is physics
 _ROUNDS = 2  # of slow part and levels: each was found with the other
 
 
 @dataclass(frozen=True)
-class Levels:
+class NoiseScaling:
     """Factors on the noise levels.
 
     Parameters
@@ -53,15 +53,15 @@ class Levels:
         """Whether any level would be higher still, but for the limit."""
         return max([self.disturbance, *self.noise.values()]) > 0.98 * self.limit
 
-    def of(self, path: Along, floor: NoiseFloor) -> tuple[Array, Array]:
+    def of(self, path: LinearizedRecord, floor: NoiseEstimate) -> tuple[Array, Array]:
         """Noise of the record's sensors [K] and random heat of all lumps [W/√Hz]; lumps added since have none.
 
         Parameters
         ----------
-        path : Along
-            Simulated record.
-        floor : NoiseFloor
-            Declared levels.
+        path : LinearizedRecord
+            Simulated record with its sensors.
+        floor : NoiseEstimate
+            Declared noise levels.
 
         Returns
         -------
@@ -70,15 +70,15 @@ class Levels:
         noise = np.array([floor.noise[name] * self.noise.get(name, 1.0) for name in path.one.sensors])
         return noise, self.disturbance * np.array([floor.disturbance.get(name, 0.0) for name in path.system.lumps])
 
-    def slow(self, path: Along, floor: NoiseFloor) -> SlowNoise | None:
+    def slow(self, path: LinearizedRecord, floor: NoiseEstimate) -> SlowNoise | None:
         """Slow part of the noise of the record's sensors, at most as large as the declared noise; None without one.
 
         Parameters
         ----------
-        path : Along
-            Simulated record.
-        floor : NoiseFloor
-            Declared levels.
+        path : LinearizedRecord
+            Simulated record with its sensors.
+        floor : NoiseEstimate
+            Declared noise levels.
 
         Returns
         -------
@@ -90,12 +90,12 @@ class Levels:
         std = np.minimum(self.share * self.of(path, floor)[0], declared)
         return SlowNoise(std, float(np.exp(-path.h / self.memory)))
 
-    def close_to(self, other: Levels) -> bool:
+    def close_to(self, other: NoiseScaling) -> bool:
         """Whether all factors agree within three per cent, with the same slow part.
 
         Parameters
         ----------
-        other : Levels
+        other : NoiseScaling
             To compare with.
 
         Returns
@@ -115,7 +115,7 @@ class Levels:
             f"its size that remembers {self.memory:.3g} s")
 
 
-def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels:
+def refined(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling) -> NoiseScaling:
     """Most likely factors within the limits, one after the other, once round."""
     residuals = _residuals(paths)
     cost = partial(_cost, paths, residuals, floor)
@@ -128,7 +128,8 @@ def refined(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels
     return _best([replace(levels, disturbance=factor) for factor in tried], cost) if heated else levels
 
 
-def with_slow_part(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> Levels | None:
+def with_slow_part(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling
+                   ) -> NoiseScaling | None:
     """Most likely slow part of the sensors' noise, one for all, and the factors that go with it.
 
     None if the smallest size or the longest memory tried is the most likely, or if any sensor is more likely to have
@@ -143,7 +144,7 @@ def with_slow_part(paths: Sequence[Along], floor: NoiseFloor, levels: Levels) ->
     return levels if inside and all(_is_slow(name, paths, floor, levels) for name in floor.noise) else None
 
 
-def _is_slow(name: str, paths: Sequence[Along], floor: NoiseFloor, levels: Levels) -> bool:
+def _is_slow(name: str, paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling) -> bool:
     """Whether a slow part of this sensor's noise is more likely than white noise of the same size."""
     gain = 0.0
     for path, r in zip(paths, _residuals(paths), strict=True):
@@ -155,17 +156,18 @@ def _is_slow(name: str, paths: Sequence[Along], floor: NoiseFloor, levels: Level
     return gain > 0.0 or not any(name in path.one.sensors for path in paths)
 
 
-def _residuals(paths: Sequence[Along]) -> list[Array]:
+def _residuals(paths: Sequence[LinearizedRecord]) -> list[Array]:
     return [residual(path.one.readings, path.readings[:, path.one.columns]) for path in paths]
 
 
-def _cost(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, levels: Levels) -> float:
+def _cost(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], floor: NoiseEstimate, levels: NoiseScaling
+          ) -> float:
     """-2 log likelihood of the residuals of all records."""
     return sum(settled_cost(path, r, *levels.of(path, floor), levels.slow(path, floor))
                for path, r in zip(paths, residuals, strict=True))
 
 
-def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseFloor, limit: float
+def _by_spread(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], floor: NoiseEstimate, limit: float
                ) -> dict[str, float]:
     """Without random heat the most likely level is the root mean square of the residual."""
     out = {}
@@ -177,5 +179,5 @@ def _by_spread(paths: Sequence[Along], residuals: Sequence[Array], floor: NoiseF
     return out
 
 
-def _best(tried: list[Levels], cost: Callable[[Levels], float]) -> Levels:
+def _best(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float]) -> NoiseScaling:
     return min(tried, key=cost)

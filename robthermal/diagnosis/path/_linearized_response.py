@@ -26,15 +26,15 @@ _PROBE = "extra heat"
 
 
 @dataclass(frozen=True, eq=False)
-class AlongResponse:
-    """A measured frequency response and the one of a system, the counterpart of `Along`.
+class LinearizedResponse:
+    """A measured frequency response and the one of a system, the counterpart of `LinearizedRecord`.
 
     Parameters
     ----------
     system : System
-        Whose.
+        System whose response it is.
     one : ResponseData
-        Measured.
+        Measured frequency response.
     readings : ndarray, shape (2 n_b, m)
         The system's, in the form of `ResponseData.readings`.
     """
@@ -119,9 +119,9 @@ class AlongResponse:
         return slope(at, 0.0, size.typical, size.lower, size.upper)
 
     def splines(self, lump: int) -> Array:
-        """Change of the response (2 n_b, m, k) by heat into one lump that follows every input by some smooth law.
+        """Change of the response (2 n_b, m, k) by heat into one lump that follows every input smoothly.
 
-        The law is a cubic spline in log frequency, real and imaginary part of each input.
+        The heat is a cubic spline in log frequency, real and imaginary part of each input.
         """
         probed = self.system.model_copy(update={"inputs": {
             **self.system.inputs, _PROBE: Input(lump=self.system.lump_names[lump])}})
@@ -135,9 +135,9 @@ class AlongResponse:
         return as_real(np.concatenate([flat, 1j * flat], axis=2))
 
 
-def along_response(system: System, one: ResponseData) -> AlongResponse:
+def linearized_response(system: System, one: ResponseData) -> LinearizedResponse:
     """Response of a system at the bins of a measured one."""
-    return AlongResponse(system, one, one.model(system))
+    return LinearizedResponse(system, one, one.model(system))
 
 
 def _worst(name: str, frequencies: Array, power: Array) -> str:

@@ -21,7 +21,7 @@ _DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])  # kills parabolas: what is left 
 
 
 @dataclass(frozen=True)
-class NoiseFloor:
+class NoiseEstimate:
     """Noise of the sensors and random heat of the lumps, before any model has been fitted.
 
     Parameters
@@ -73,7 +73,7 @@ class NoiseFloor:
 
 def noise_floor(system: System, records: Measured | Sequence[Measured], *,
                 noise: Mapping[str, float] | float | None = None,
-                operating_point: Mapping[str, float] | None = None) -> NoiseFloor:
+                operating_point: Mapping[str, float] | None = None) -> NoiseEstimate:
     """Find the noise of every sensor: declared, or else read off the record.
 
     Parameters
@@ -90,7 +90,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
 
     Returns
     -------
-    NoiseFloor
+    NoiseEstimate
 
     Raises
     ------
@@ -117,8 +117,9 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
         raise InputError("noise is given with a frequency response", where="argument noise",
                          remedy="Leave it out: the response brings its covariance.")
     if not data:
-        return NoiseFloor(relative, (), {}, relative, Outcome(True, "estimated", "Noise of the elements as estimated "
-                                                              "with the frequency response, relative to its size."))
+        outcome = Outcome(True, "estimated", "Noise of the elements as estimated with the frequency response, relative "
+                          "to its size.")
+        return NoiseEstimate(relative, (), {}, relative, outcome)
     _refuse_short(data)
     levels = declared_noise(system, data, noise)
     rough = {name: _rough(data, name) for name in levels}
@@ -127,7 +128,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
-    return NoiseFloor({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
+    return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
                       _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
 
 

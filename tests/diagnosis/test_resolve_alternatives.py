@@ -1,4 +1,4 @@
-"""Effects that weak inputs cannot tell apart: strong ones in the unseen record can, weak ones there cannot either."""
+"""Alternatives that weak inputs cannot resolve: strong ones in the validation record can, weak ones there cannot."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.evidence._hold_out import surprises, unseen_data
+from robthermal.diagnosis.evidence._hold_out import negative_log_predictive_density, validation_data
 from robthermal.diagnosis.fit._refitting import extended
-from robthermal.diagnosis.search._told_apart import told_apart
+from robthermal.diagnosis.search._resolve_alternatives import resolve_alternatives
 from robthermal.project._diagnose import Diagnosed
 from robthermal.project._diagnose_claims import diagnosis_claims
 from robthermal.project._diagnose_ranking import ranking
@@ -82,14 +82,14 @@ def test_the_first_name_gives_way(unsure: rt.diagnosis.Diagnosis, strong: rt.Rec
     round_ = unsure.rounds[0]
     entries = {entry.candidate.key: entry for entry in (round_.best, *round_.contenders) if entry is not None}
     wrong = replace(round_, best=entries[LAG], contenders=(entries[DELAY],))
-    data = unseen_data(entries[LAG].fit, strong, None)
-    (told,), fit = told_apart((wrong,), entries[LAG].fit, data)
+    data = validation_data(entries[LAG].fit, strong, None)
+    (told,), fit = resolve_alternatives((wrong,), entries[LAG].fit, data)
     assert told.best is not None and told.best.candidate.key == DELAY and told.best.fit is fit
     assert [c.key for c in fit.structure.effects] == [DELAY] and not told.contenders
     # both were fitted with the same filters and have as many quantities: ΔBIC is the logarithm of the sums of squares
     lag, delay = entries[LAG].fit, entries[DELAY].fit
     by_training = lag.n_readings * np.log(lag.rss / delay.rss)
-    by_unseen = np.subtract(*surprises([lag, delay], lag, data))
+    by_unseen = np.subtract(*negative_log_predictive_density([lag, delay], lag, data))
     assert abs(by_training) < 10.0 < by_training + by_unseen
     assert told.best.delta_bic - entries[LAG].delta_bic == pytest.approx(by_training, abs=0.1)
 
@@ -103,7 +103,7 @@ def test_a_name_fitted_beside_other_effects_is_not_weighed(unsure: rt.diagnosis.
     values = [*rival.fit.structure.quantities(rival.fit.v), {offset.effect.size.name: 0.0, **offset.shape}]
     beside = extended(rival.fit, both, both.carried(rival.fit.structure, rival.fit.v, values))
     stale = replace(round_, contenders=(replace(rival, fit=beside),))
-    rounds, fit = told_apart((stale,), best.fit, unseen_data(best.fit, strong, None))
+    rounds, fit = resolve_alternatives((stale,), best.fit, validation_data(best.fit, strong, None))
     assert rounds == (stale,) and fit is best.fit
 
 
@@ -122,6 +122,6 @@ def test_other_effects_keep_their_places(plant: rt.System, unsure: rt.diagnosis.
     first = replace(round_, best=replace(entries[LAG], fit=fits[LAG]),
                     contenders=(replace(entries[DELAY], fit=fits[DELAY]),))
     second = replace(round_, best=replace(entries[LAG], candidate=offset, fit=fits[LAG]), contenders=())
-    rounds, fit = told_apart((first, second), fits[LAG], unseen_data(fits[LAG], strong, None))
+    rounds, fit = resolve_alternatives((first, second), fits[LAG], validation_data(fits[LAG], strong, None))
     keys = [one.best.candidate.key for one in rounds if one.best is not None]
     assert keys == [c.key for c in fit.structure.effects] == [offset.key, DELAY]

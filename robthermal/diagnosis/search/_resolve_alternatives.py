@@ -1,4 +1,4 @@
-"""Effects that the training records cannot tell apart, and the unseen records can."""
+"""Sets of alternatives that the training records cannot resolve, and the validation records can."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from dataclasses import replace
 
 from ..data import DataSet
 from ..effects import Candidate
-from ..evidence import BIC_GAP, surprises
+from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, fitted
 from ._decide import Accepted, Decision
 from ._short_list import Entry, Key, delta_bic, refiltered
 
 
-def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet]
+def resolve_alternatives(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet]
                ) -> tuple[tuple[Accepted, ...], Refit]:
     """Order the names of every ambiguous set by the evidence of all records, and drop those beyond doubt worse.
 
-    BIC stands for -2 log p(training); -2 log p(unseen | training) is added. Nothing is fitted to the unseen records,
-    and no name comes back that the training records have excluded.
+    BIC stands for -2 log p(training); -2 log p(validation | training) is added. Nothing is fitted to the validation
+    records, and no name comes back that the training records have excluded.
 
     Parameters
     ----------
     rounds : tuple of Accepted
         In the order of the effects of the fit.
     fit : Refit
-        With them.
+        Fit with these effects.
     data : sequence of DataSet
-        Unseen.
+        Validation data, which no fit has seen.
     """
     for round_ in rounds:
         rivals = [entry for entry in round_.contenders if _takes_the_place(entry, round_, fit)]
@@ -39,7 +39,7 @@ def told_apart(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet]
 
 
 def ruled_out(rounds: Sequence[Decision]) -> tuple[Candidate, ...]:
-    """Everything that the unseen records have dropped from the sets."""
+    """Everything that the validation records have dropped from the sets."""
     return tuple(entry.candidate for round_ in rounds for entry in round_.ruled_out)
 
 
@@ -49,8 +49,8 @@ def _weighed(round_: Accepted, rivals: Sequence[Entry], fit: Refit, data: Sequen
     best = round_.best
     own = replace(best, fit=fit, delta_bic=delta_bic(round_.before, fit))
     entries = [own, *refiltered(round_.before, fit, rivals)]
-    unseen = surprises([entry.fit for entry in entries], fit, data)
-    evidence = [density - entry.delta_bic for density, entry in zip(unseen, entries, strict=True)]
+    validation = negative_log_predictive_density([entry.fit for entry in entries], fit, data)
+    evidence = [density - entry.delta_bic for density, entry in zip(validation, entries, strict=True)]
     order = sorted(range(len(entries)), key=evidence.__getitem__)
     most = evidence[order[0]] + BIC_GAP
     alike = [entries[i] for i in order if evidence[i] <= most]

@@ -9,14 +9,14 @@ import numpy as np
 from ..._fitting import Initial
 from ...signals import Record
 from ...thermal import System, steady_state
-from ..data import NoiseFloor, RecordData, records_of, responses_of
-from ..fit import Levels, Refit, Structure
+from ..data import NoiseEstimate, RecordData, records_of, responses_of
+from ..fit import NoiseScaling, Refit, Structure
 
 _MOST = 2000  # samples planned after a frequency response: its record may have had a million
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class TrialConditions:
     """Where a trial is run.
 
     Parameters
@@ -25,26 +25,26 @@ class Setting:
         Its sensors, its number of samples, and the inputs that cannot be chosen.
     place : int or None
         Of the present record that it continues; None after frequency responses.
-    floor : NoiseFloor
+    floor : NoiseEstimate
         Of its sensors.
-    levels : Levels
+    levels : NoiseScaling
         Factors on it.
     """
 
     one: RecordData
     place: int | None
-    floor: NoiseFloor
-    levels: Levels
+    floor: NoiseEstimate
+    levels: NoiseScaling
 
     def start(self, structure: Structure, system: System) -> Initial:
         """Prior of the initial temperatures."""
         return self.one.initial(system, "free") if self.place is None else structure.starts[self.place]
 
 
-def setting_of(fit: Refit) -> Setting | None:
+def trial_conditions(fit: Refit) -> TrialConditions | None:
     """As the first record; after frequency responses, as their record was, if the system declares sensor noise."""
     for one in records_of(fit.structure.data):
-        return Setting(one, fit.structure.data.index(one), fit.floor, fit.levels)
+        return TrialConditions(one, fit.structure.data.index(one), fit.floor, fit.levels)
     first, system = responses_of(fit.structure.data)[0], fit.system
     noise = {name: sensor.noise for name, sensor in system.sensors.items() if sensor.noise}
     found = steady_state(system, first.operating_point)
@@ -59,4 +59,4 @@ def setting_of(fit: Refit) -> Setting | None:
     one = RecordData(record, tuple(noise), np.array([system.sensor_names.index(name) for name in noise], np.intp),
                record.outputs)
     heat = {name: lump.disturbance for name, lump in system.lumps.items()}
-    return Setting(one, None, replace(fit.floor, noise=noise, disturbance=heat), Levels(1.0, {}))
+    return TrialConditions(one, None, replace(fit.floor, noise=noise, disturbance=heat), NoiseScaling(1.0, {}))

@@ -1,19 +1,19 @@
-"""An accepted effect that the unseen records speak against is taken back."""
+"""An accepted effect that the validation records contradict is taken back."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from ..data import DataSet
-from ..evidence import BIC_GAP, surprises
+from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, fitted
 from ._decide import Accepted
 from ._revise import without
 
 
-def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Sequence[DataSet]
+def without_contradicted(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Sequence[DataSet]
               ) -> tuple[tuple[Accepted, ...], Refit]:
-    """Drop effects, the worst first, without which the unseen records are predicted beyond doubt better.
+    """Drop effects, the worst first, without which the validation records are predicted beyond doubt better.
 
     Parameters
     ----------
@@ -22,12 +22,13 @@ def supported(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, data: Se
     fit, nominal : Refit
         With them, without any.
     data : sequence of DataSet
-        Unseen. They only take names back: no parameter and no name comes from them.
+        Validation data. They only take names back: no parameter and no name comes from them.
     """
     while rounds:
         lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal, round_.before)
                   for place, round_ in enumerate(rounds)]
-        with_all, *others = surprises([fit, *(fit if less is None else less for less in lesser)], fit, data)
+        tried = [fit, *(fit if less is None else less for less in lesser)]
+        with_all, *others = negative_log_predictive_density(tried, fit, data)
         gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
         worst = max(range(len(gains)), key=gains.__getitem__)
         less = lesser[worst]

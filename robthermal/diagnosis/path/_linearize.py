@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from ...thermal import System, trajectory
 from ..data import DataSet, RecordData, ResponseData
-from ._along import Along, along
-from ._frequency_model import along_response
 from ._linearized import Linearized
+from ._linearized_record import LinearizedRecord, linearized_record
+from ._linearized_response import linearized_response
 
 
 def linearize(system: System, one: DataSet, tolerance: float = 1e-4) -> Linearized:
@@ -24,13 +24,13 @@ def linearize(system: System, one: DataSet, tolerance: float = 1e-4) -> Lineariz
         Tolerance of the simulation [K].
     """
     if isinstance(one, ResponseData):
-        return along_response(system, one)
+        return linearized_response(system, one)
     if isinstance(one, RecordData):
-        return along(system, one, trajectory(system, one.record, tolerance=tolerance))
+        return linearized_record(system, one, trajectory(system, one.record, tolerance=tolerance))
     raise TypeError(f"{type(one).__name__} is neither a record nor a frequency response")
 
 
-def linearized_records(paths: Sequence[Linearized]) -> tuple[Along, ...]:
+def linearized_records(paths: Sequence[Linearized]) -> tuple[LinearizedRecord, ...]:
     """The linearized records, without the frequency responses.
 
     Parameters
@@ -38,4 +38,4 @@ def linearized_records(paths: Sequence[Linearized]) -> tuple[Along, ...]:
     paths : sequence of Linearized
         Models beside all data sets of a fit.
     """
-    return tuple(path for path in paths if isinstance(path, Along))
+    return tuple(path for path in paths if isinstance(path, LinearizedRecord))
