@@ -150,7 +150,8 @@ def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcom
     labels = ", ".join(candidate.label for candidate in ruled_out(state.rounds))
     excluded = f" The validation records rule out {labels}, which the others could not." if labels else ""
     if any(map(alternatives, state.rounds)):
-        text = "The records cannot distinguish some effects: see alternatives, and next_experiment for what separates them."
+        text = ("The records cannot distinguish some effects: see alternatives, and next_experiment for what separates "
+                "them.")
         return "ambiguous", Outcome(False, "ambiguous", text + excluded)
     return "named", Outcome(True, "named", f"One set of effects explains the records.{excluded}")
 
