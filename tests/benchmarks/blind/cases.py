@@ -84,7 +84,7 @@ def made(case: Case) -> tuple[Given, Truth]:
 
 
 def _declared(levels: dict[str, float], rng: np.random.Generator) -> dict[str, float]:
-    """NoiseScaling in the system file: 5 to 20 % off, either way."""
+    """Levels in the system file: 5 to 20 % off, either way."""
     return {name: value * (1.0 + float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.2))) for name, value in levels.items()}
 
 
