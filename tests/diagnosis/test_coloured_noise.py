@@ -15,10 +15,10 @@ from scipy.signal import lfilter
 
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
-from robthermal.diagnosis.fit._noise_scaling import NoiseScaling, refined, with_slow_part
-from robthermal.diagnosis.path._linearized_record import LinearizedRecord, linearized_record
-from robthermal.diagnosis.path._whitening import SlowNoise, settled_cost, whitener
-from robthermal.diagnosis.search._wider_noise import with_wider_noise
+from robthermal.diagnosis.fit import NoiseScaling, with_slow_part
+from robthermal.diagnosis.fit._noise_scaling import refined
+from robthermal.diagnosis.path import LinearizedRecord, SlowNoise, linearized_record, settled_cost, whitener
+from robthermal.diagnosis.search import with_wider_noise
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from blind.cases import Case, made  # noqa: E402 - beside the benchmarks, not on the path before

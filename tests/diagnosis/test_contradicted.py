@@ -14,8 +14,8 @@ from robthermal.diagnosis.evidence._hold_out import (
     negative_log_predictive_density,
     validation_data,
 )
-from robthermal.diagnosis.fit._refit import Refit
-from robthermal.diagnosis.search._contradicted import without_contradicted
+from robthermal.diagnosis.fit import Refit
+from robthermal.diagnosis.search import without_contradicted
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 FEW = ["missing_ambient_link", "natural_convection", "sensor_lag", "heat_source"]

@@ -11,15 +11,10 @@ import pytest
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.data._glitches import outliers
-from robthermal.diagnosis.fit._descent import descend
-from robthermal.diagnosis.fit._refitting import extended
-from robthermal.diagnosis.fit._whitened import Whitened
-from robthermal.diagnosis.path._linearized_record import linearized_record
-from robthermal.diagnosis.path._whitening import whitener
-from robthermal.diagnosis.search import _revise
-from robthermal.diagnosis.search._decide import Accepted
+from robthermal.diagnosis.fit import Whitened, descend, extended
+from robthermal.diagnosis.path import linearized_record, whitener
+from robthermal.diagnosis.search import Accepted, Entry, ShortList, _revise
 from robthermal.diagnosis.search._scan import scanned
-from robthermal.diagnosis.search._short_list import Entry, ShortList
 from robthermal.diagnosis.search._starts import Origin, held, started
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]

@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.evidence._score import Scores
-from robthermal.diagnosis.search._decide import Accepted
-from robthermal.diagnosis.search._joint_check import checked_jointly
+from robthermal.diagnosis.evidence import Scores
+from robthermal.diagnosis.search import Accepted, EffectSet, Entry, checked_jointly, refit_set
 from robthermal.diagnosis.search._joint_program import Program
-from robthermal.diagnosis.search._joint_sets import EffectSet, refit_set
-from robthermal.diagnosis.search._short_list import Entry
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 CUBIC, SLOPE, GAIN = 5e-4, 8e-3, 0.02

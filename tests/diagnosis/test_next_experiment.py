@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.plan._next_experiment import _clearest, rivals
+from robthermal.diagnosis.plan import rivals, trial_conditions
+from robthermal.diagnosis.plan._next_experiment import _clearest
 from robthermal.diagnosis.plan._separation import hypotheses_of, separation
-from robthermal.diagnosis.plan._trial_conditions import trial_conditions
 from robthermal.diagnosis.plan._trial_inputs import limits_of
 from robthermal.diagnosis.plan._trial_search import LONGEST, Trial, search_of
 

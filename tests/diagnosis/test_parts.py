@@ -12,9 +12,8 @@ from scipy.optimize import lsq_linear, nnls
 
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
-from robthermal.diagnosis.fit._descent import descend
-from robthermal.diagnosis.path._linearized_record import LinearizedRecord, linearized_record
-from robthermal.diagnosis.path._whitening import gathered, whitener
+from robthermal.diagnosis.fit import descend
+from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_record, whitener
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.evidence._hold_out import negative_log_predictive_density, validation_data
-from robthermal.diagnosis.fit._refitting import extended
-from robthermal.diagnosis.search._resolve_alternatives import resolve_alternatives
+from robthermal.diagnosis.evidence import negative_log_predictive_density, validation_data
+from robthermal.diagnosis.fit import extended
+from robthermal.diagnosis.search import resolve_alternatives
 from robthermal.project._diagnose import Diagnosed
 from robthermal.project._diagnose_claims import diagnosis_claims
 from robthermal.project._diagnose_ranking import ranking

@@ -11,10 +11,8 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis.effects import Candidate
-from robthermal.diagnosis.evidence._score import Scores, explains
-from robthermal.diagnosis.fit._descent import Point, descend
-from robthermal.diagnosis.fit._refit import Refit
-from robthermal.diagnosis.fit._refitting import extended
+from robthermal.diagnosis.evidence import Scores, explains
+from robthermal.diagnosis.fit import Point, Refit, descend, extended
 from robthermal.diagnosis.search import _revise, _short_list
 from robthermal.diagnosis.search._stages import too_much_left
 
