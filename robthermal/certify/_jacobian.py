@@ -91,7 +91,7 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
             spread = (high - low) * np.array([[-1.0, 1.0], [1.0, -1.0]])
             blocks.append(Block(index[a], index.get(b, -1), np.stack([0.0 * spread, spread])))
         if link.natural is not None or link.radiation is not None:
-            slopes = _link_vertices(link, ends[a], ends[b], ambient=b not in index)
+            slopes = _link_vertices(link, ends[a], ends[b], parameters, ambient=b not in index)
             blocks.append(Block(index[a], index.get(b, -1), slopes))
     return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
 
@@ -132,16 +132,20 @@ def _module_vertices(module: Any, hot: list[float], cold: list[float], points: A
     return np.stack([np.stack([hh, hc], -1), np.stack([ch, cc], -1)], -2)
 
 
-def _link_vertices(link: Any, a: list[float], b: list[float], ambient: bool) -> NDArray[np.float64]:
+def _link_vertices(link: Any, a: list[float], b: list[float], parameters: Mapping[str, Any],
+                   ambient: bool) -> NDArray[np.float64]:
     """Slopes at the ends of their ranges; towards an ambient of unknown temperature natural convection may vanish."""
+    own = (link.natural.gain if link.natural else 0.0), link.radiation or 0.0
+    gains, coefficients = (parameters.get(f"links.{link.name}.{key}", (value, value))
+                           for key, value in zip(("natural.gain", "radiation"), own, strict=True))
+    exponent = link.natural.exponent if link.natural else 0.0
     apart = np.array([a[0] - b[1], a[1] - b[0]])
     largest = np.abs(apart).max()
     smallest = 0.0 if ambient or apart[0] <= 0 <= apart[1] else np.abs(apart).min()
     vertices = []
-    for dT in (smallest, largest):
-        g = link.natural.gain * (1 + link.natural.exponent) * dT**link.natural.exponent if link.natural else 0.0
-        for Ta in np.unique(a):
-            for Tb in np.unique(b):
-                ra, rb = (4 * (link.radiation or 0.0) * T**3 for T in (Ta, Tb))
-                vertices.append([[-g - ra, g + rb], [g + ra, -g - rb]])
+    for dT, gain in zip((smallest, largest), gains, strict=True):
+        g = gain * (1 + exponent) * dT**exponent
+        for c, Ta, Tb in product(np.unique(coefficients), np.unique(a), np.unique(b)):
+            ra, rb = 4 * c * Ta**3, 4 * c * Tb**3
+            vertices.append([[-g - ra, g + rb], [g + ra, -g - rb]])
     return np.array(vertices)

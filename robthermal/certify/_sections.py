@@ -15,8 +15,8 @@ from ..thermal import System
 Interval = tuple[float, float]
 Currents = Mapping[str, Interval]
 Temperatures = Interval | Mapping[str, Interval]
-_UNCERTAIN = (".capacity", ".conductance", *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance")
-                                             for part in ("value", "slope")))
+_UNCERTAIN = (".capacity", ".conductance", ".natural.gain", ".radiation",
+              *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance") for part in ("value", "slope")))
 
 _NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
 _HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to the network
@@ -101,7 +101,8 @@ def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[st
             continue
         if not name.endswith(_UNCERTAIN):
             raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
-                             expected="ranges of capacities, conductances, and values and slopes of modules",
+                             expected="ranges of capacities, conductances, natural.gain and radiation of links, "
+                                      "and values and slopes of modules",
                              remedy="Leave it out of `parameters`, and hold it at its value in the calibration too.")
         if not low <= value <= high:
             raise InputError(f"({low}, {high}) excludes the system's own value {value}", where=where,

@@ -161,7 +161,7 @@ def _ambient_heat(system: ThermalSystem, region: Region, ambient: dict[str, Inte
 
 def _steepest(link: Link, own: Interval, far: Interval | None) -> fmpq:
     if far is None:
-        if link.gain != 0 or link.radiation != 0:
+        if link.convects or link.radiates:
             raise InputError("a link to an ambient that is not linear", where="region.ambient",
                              expected="the range of that ambient's temperature")
         return link.conductance + link.spread

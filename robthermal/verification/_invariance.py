@@ -48,7 +48,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     """Return the exact problem, or raise InputError."""
     nominal, table = read_system(system), mapping(region, "region")
     parameters = read_parameters(table)
-    network = worst_system(nominal, system, parameters)
+    network = worst_system(nominal, system, parameters, bent=True)
     mapping(evidence, "evidence")
     given = get(table, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")
@@ -136,11 +136,13 @@ def _largest(problem: Invariance, lump: int, sign: int, links: list[Link], own_m
 def _bent_heat(link: Link, own: fmpq, far: fmpq, sign: int) -> fmpq:
     """Return an upper bound of sign times the heat of natural convection and radiation from ``far`` to ``own``."""
     difference = far - own
-    value = sign * link.radiation * (far**4 - own**4)
-    if link.gain == 0 or difference == 0:
+    radiated = sign * (far**4 - own**4)
+    value = max(coefficient * radiated for coefficient in (link.radiation, link.radiation + link.radiation_spread))
+    if not link.convects or difference == 0:
         return value
-    low, high = power(abs(difference), link.exponent)
-    return value + max(sign * link.gain * difference * bound for bound in (low, high))
+    gains = (link.gain, link.gain + link.gain_spread)
+    return value + max(sign * gain * difference * bound for gain in gains
+                       for bound in power(abs(difference), link.exponent))
 
 
 def _partner(problem: Invariance, lump: int, partner: int, members: list[int], conductance: Interval, own: fmpq,

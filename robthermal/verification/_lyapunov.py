@@ -162,9 +162,9 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
         if len(ends) == 2:
             i, j = ends
             exchange: Entries = {(i, i): fmpq(-1), (i, j): fmpq(1), (j, j): fmpq(-1), (j, i): fmpq(1)}
-            if link.gain != 0 or link.spread != 0:
+            if link.convects or link.spread != 0:
                 bent.append(_ends(exchange_slope(link, temperature[i], temperature[j]), exchange, "conductance"))
-        elif ends and link.gain != 0:
+        elif ends and link.convects:
             return base, bent, (f"natural convection from lump {name_of(names[ends[0]])} to an ambient has no bounded "
                                 "slope; use energy, sum or max")
         else:
@@ -173,7 +173,7 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
                 bent.append(_ends((fmpq(0), link.spread), exchange, "uncertain conductance"))
         for place, value in exchange.items():
             base[place] = base.get(place, fmpq(0)) + link.conductance * value
-        if link.radiation != 0:
+        if link.radiates:
             for i in ends:
                 column = {place: value for place, value in exchange.items() if place[1] == i}
                 bent.append(_ends(radiation_slope(link, temperature[i]), column, f"radiation at {name_of(names[i])}"))

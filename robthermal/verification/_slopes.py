@@ -23,20 +23,22 @@ def exchange_slope(link: Link, first: Interval, second: Interval) -> Interval:
     """Return bounds of what a link conducts beyond its conductance [W/K].
 
     That is the spread of an uncertain conductance and the slope gain (1 + e) |dT|^e of gain |dT|^e dT, dT between two
-    intervals.
+    intervals, at the least and the largest gain.
     """
-    if link.gain == 0:
+    if not link.convects:
         return fmpq(0), link.spread
     low, high = first[0] - second[1], first[1] - second[0]
     far = max(abs(low), abs(high))
     near = fmpq(0) if low <= 0 <= high else min(abs(low), abs(high))
-    factor = link.gain * (1 + link.exponent)
-    return factor * power(near, link.exponent)[0], factor * power(far, link.exponent)[1] + link.spread
+    factor = 1 + link.exponent
+    return (link.gain * factor * power(near, link.exponent)[0],
+            (link.gain + link.gain_spread) * factor * power(far, link.exponent)[1] + link.spread)
 
 
 def radiation_slope(link: Link, temperature: Interval) -> Interval:
     """Return bounds of 4 c T³ at one end of a link [W/K]."""
-    return 4 * link.radiation * temperature[0] ** 3, 4 * link.radiation * temperature[1] ** 3
+    return (4 * link.radiation * temperature[0] ** 3,
+            4 * (link.radiation + link.radiation_spread) * temperature[1] ** 3)
 
 
 def least_ambient_slope(link: Link, lump: int, region: Region) -> fmpq:

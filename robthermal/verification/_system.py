@@ -33,7 +33,8 @@ _PROPERTIES = ("seebeck", "resistance", "conductance")
 class Link:
     """Heat path between two nodes; a node is a lump's index or an ambient's name.
 
-    The conductance is anything between ``conductance`` and ``conductance + spread``, constant in time or not.
+    The conductance is anything between ``conductance`` and ``conductance + spread``, constant in time or not; so are
+    the gain of natural convection and the coefficient of radiation with their own spreads.
     """
 
     nodes: tuple[int | str, int | str]
@@ -42,6 +43,18 @@ class Link:
     exponent: fmpq
     radiation: fmpq
     spread: fmpq = fmpq(0)
+    gain_spread: fmpq = fmpq(0)
+    radiation_spread: fmpq = fmpq(0)
+
+    @property
+    def convects(self) -> bool:
+        """Whether natural convection may be part of it."""
+        return bool(self.gain != 0 or self.gain_spread != 0)
+
+    @property
+    def radiates(self) -> bool:
+        """Whether radiation may be part of it."""
+        return bool(self.radiation != 0 or self.radiation_spread != 0)
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,14 @@
 """Uncertain numbers of a system: the network with each at its worst end, or with every end as one more vertex.
 
-Links: the least conductance stays linear, what may be on top of it is a slope between zero and the width of the range.
+Links: the least conductance stays linear, what may be on top of it is a slope between zero and the width of the range;
+natural convection and radiation: the slopes reach from those of the least to those of the largest coefficient.
 Capacities: the largest (the inequalities only ask for more where a capacity is larger). Modules: the Jacobian is affine
 in the values and slopes of S, R and K, so the combinations of their ends suffice (proof note, 9).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
@@ -19,11 +21,12 @@ from robthermal.errors import InputError
 from ._fields import Interval, interval, mapping
 from ._hash import short_hash
 from ._numbers import name_of, show
-from ._system import Module, ThermalSystem, link_names, say_interval, say_system
+from ._system import Link, Module, ThermalSystem, link_names, say_interval, say_system
 
 Parameters = tuple[tuple[str, Interval], ...]
 _PROPERTIES = ("seebeck", "resistance", "conductance")
 _WHERE = "region.parameters"
+_NUMBERS = {"conductance": "conductance", "natural.gain": "gain", "radiation": "radiation"}  # of a link
 _LISTED = 12  # ranges in a sentence; more are counted, with the hash of their table
 
 
@@ -48,36 +51,64 @@ def say_subject(system: ThermalSystem, parameters: Parameters, machine: str, pla
     return f"{say_system(system, machine)}, {plant}, {say_parameters(parameters)}"
 
 
-def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: Parameters) -> ThermalSystem:
-    """Return the network whose inequalities imply those of every network in the ranges."""
-    ends: list[dict[tuple[str, int], Interval]] = [{} for _ in system.modules]
+def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: Parameters, *,
+                 bent: bool = False) -> ThermalSystem:
+    """Return the network whose inequalities imply those of every network in the ranges.
+
+    ``bent``: whether the claim covers ranges of natural convection and radiation.
+    """
     modules = {module.name: k for k, module in enumerate(system.modules)}
-    links = link_names(section)
+    lumps = {name: k for k, name in enumerate(system.lumps)}
+    links = _unique(link_names(section))
+    ends: list[dict[tuple[str, int], Interval]] = [{} for _ in system.modules]
     capacity, changed = list(system.capacity), list(system.links)
     for name, (low, high) in parameters:
         where = f"{_WHERE}[{name_of(name)}]"
         table, _, rest = name.partition(".")
         part, _, key = rest.rpartition(".")
-        if table == "lumps" and key == "capacity" and part in system.lumps:
-            k = system.lumps.index(part)
+        if table == "lumps" and key == "capacity" and part in lumps:
             _at_least(low, fmpq(0), where, strict=True)
-            must_contain((low, high), system.capacity[k], where)
-            capacity[k] = high
-        elif table == "links" and key == "conductance" and links.count(part) == 1:
+            must_contain((low, high), system.capacity[lumps[part]], where)
+            capacity[lumps[part]] = high
+        elif table == "links" and (place := _link_number(rest, links, bent)) is not None:
+            k, field = place
             _at_least(low, fmpq(0), where, strict=False)
-            k = links.index(part)
-            must_contain((low, high), system.links[k].conductance, where)
-            changed[k] = replace(changed[k], conductance=low, spread=high - low)
+            must_contain((low, high), getattr(system.links[k], field), where)
+            changed[k] = _with_range(changed[k], field, low, high)
         elif table == "modules" and (found := _property(part, key, modules)) is not None:
             k, (prop, index) = found
             must_contain((low, high), getattr(system.modules[k], prop)[index], where)
             ends[k][prop, index] = (low, high)
         else:
             raise InputError("no such number can be uncertain", where=where,
-                             expected="lumps.NAME.capacity, links.NAME.conductance (of one link), or "
-                                      "modules.NAME.{seebeck,resistance,conductance}.{value,slope}")
+                             expected="lumps.NAME.capacity, links.NAME.conductance (of one link)"
+                                      + (", links.NAME.natural.gain, links.NAME.radiation" if bent else "")
+                                      + ", or modules.NAME.{seebeck,resistance,conductance}.{value,slope}")
     variants = tuple(_variants(module, own) for module, own in zip(system.modules, ends, strict=True))
     return replace(system, capacity=tuple(capacity), links=tuple(changed), variants=variants)
+
+
+def _link_number(rest: str, links: Mapping[str, int], bent: bool) -> tuple[int, str] | None:
+    """Return which link and which of its numbers a name after "links." means."""
+    for key, field in _NUMBERS.items():
+        part = rest.removesuffix(f".{key}")
+        if part != rest and part in links and (bent or field == "conductance"):
+            return links[part], field
+    return None
+
+
+def _with_range(link: Link, field: str, low: fmpq, high: fmpq) -> Link:
+    if field == "conductance":
+        return replace(link, conductance=low, spread=high - low)
+    if field == "gain":
+        return replace(link, gain=low, gain_spread=high - low)
+    return replace(link, radiation=low, radiation_spread=high - low)
+
+
+def _unique(names: list[str]) -> dict[str, int]:
+    """Return the places of names that are given once."""
+    counts = Counter(names)
+    return {name: k for k, name in enumerate(names) if counts[name] == 1}
 
 
 def must_contain(box: Interval, value: fmpq, where: str) -> None:

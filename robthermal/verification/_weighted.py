@@ -88,7 +88,7 @@ def _collect(problem: Contraction) -> tuple[list[fmpq], list[dict[int, _Pair]]]:
         if isinstance(a, int) and isinstance(b, int):
             shared = _between(pairs, a, b)
             shared.conductance += link.conductance
-            if link.gain != 0 or link.radiation != 0 or link.spread != 0:
+            if link.convects or link.radiates or link.spread != 0:
                 shared.bent.append(link)
         else:
             for lump in (node for node in (a, b) if isinstance(node, int)):

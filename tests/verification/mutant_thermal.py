@@ -47,7 +47,8 @@ def make_contraction(rng: np.random.Generator) -> Document:
                                  bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.3))
     region = truth.box(system, float(rng.uniform(0.2, 2.0)))
     if uncertain:
-        names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov") + names_of(system)
+        names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
+        names += 2 * names_of(system, bent=True)
         region["parameters"] = spans(system, names, rng, 3, 0.8, 1.2)
     evidence = truth.evidence_for(method, system, region, 1e-4, rng)
     good = establish("contraction", system=system, region=region, evidence=evidence, made_by={})
@@ -71,7 +72,7 @@ def make_invariance(rng: np.random.Generator) -> Document:
     region = {"temperature": [float(rng.uniform(200, 280)), float(rng.uniform(320, 450))],
               "current": {name: [-0.3 * top, top] for name in system["modules"]}, "ambient": {"room": [290.0, 300.0]}}
     if rng.random() < 0.3:
-        region["parameters"] = spans(system, names_of(system), rng, 3, 0.8, 1.2)
+        region["parameters"] = spans(system, names_of(system, bent=True), rng, 3, 0.8, 1.2)
     good = establish("invariance", system=system, region=region, evidence={}, made_by={})
     if not good.holds:
         return make_invariance(rng)

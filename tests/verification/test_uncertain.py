@@ -46,9 +46,8 @@ def machines(system, ranges, rng, count):
             if table == "lumps":
                 other["lumps"][rest.removesuffix(".capacity")]["capacity"] = value
             elif table == "links":
-                link = next(li for li in other["links"] if li.get("name", "-".join(li["between"]))
-                            == rest.removesuffix(".conductance"))
-                link["conductance"] = value
+                table, key = link_number(other, rest)
+                table[key] = value
             else:
                 part, prop, key = rest.split(".")
                 other["modules"][part][prop][key] = value
@@ -62,7 +61,7 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
         method = list(METHODS)[k % 4]
         system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.4))
         names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
-        ranges = spans(system, names + names_of(system), rng, 4)
+        ranges = spans(system, names + 2 * names_of(system, bent=True), rng, 4)
         region = truth.box(system, float(rng.uniform(0.5, 6)))
         evidence = truth.evidence_for(method, system, region, float(10 ** rng.uniform(-2.5, -1.3)), rng)
         cert = establish("contraction", system=system, region={**region, "parameters": ranges}, evidence=evidence,
@@ -75,10 +74,13 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
     assert accepted > 20 and violated > 20
 
 
-def names_of(system):
-    """Links and module properties that can be uncertain."""
+def names_of(system, bent=False):
+    """Links and module properties that can be uncertain, with ``bent`` natural convection and radiation too."""
     links = ["-".join(link["between"]) for link in system["links"]]
-    return [f"links.{name}.conductance" for name in links if links.count(name) == 1] + [
+    once = [(name, link) for name, link in zip(links, system["links"], strict=True) if links.count(name) == 1]
+    more = [f"links.{name}.{key}" for name, link in once for key, part in (("natural.gain", "natural"),
+                                                                           ("radiation", "radiation")) if part in link]
+    return [f"links.{name}.conductance" for name, _ in once] + more * bent + [
         f"modules.m0.{prop}.{key}" for prop in ("seebeck", "resistance", "conductance") for key in ("value", "slope")]
 
 
@@ -91,13 +93,19 @@ def spans(system, names, rng, count, least=0.4, most=1.8):
     return found
 
 
+def link_number(system, rest):
+    """The table that holds a number of a link, and its key there."""
+    link = next(li for li in system["links"] if rest.startswith(li.get("name", "-".join(li["between"])) + "."))
+    return (link["natural"], "gain") if rest.endswith(".natural.gain") else (link, rest.rpartition(".")[2])
+
+
 def value_of(system, name):
     table, rest = name.split(".", 1)
     if table == "lumps":
         return system["lumps"][rest.removesuffix(".capacity")]["capacity"]
     if table == "links":
-        return next(li for li in system["links"] if "-".join(li["between"]) == rest.removesuffix(".conductance")
-                    )["conductance"]
+        found, key = link_number(system, rest)
+        return found[key]
     part, prop, key = rest.split(".")
     return system["modules"][part][prop][key]
 
@@ -111,6 +119,58 @@ def value_of(system, name):
 def test_malformed_ranges_are_refused(parameters, message):
     with pytest.raises(InputError, match=message):
         rod("sum", 0.01, parameters)
+
+
+BENT = {**ROD, "links": [{"between": ["rod", "room"], "conductance": 0.5, "radiation": 2e-10,
+                          "natural": {"gain": 0.1, "exponent": 0.0}}]}
+
+
+@pytest.mark.parametrize("method", ["sum", "max", "energy"])
+def test_the_least_convection_and_radiation_decide(method):
+    """Exponent 0: the rod loses g + k + 4 c T³ per kelvin, least at 280 K."""
+    ranges = {"links.rod-room.natural.gain": [0.05, 0.2], "links.rod-room.radiation": [1e-10, 1e-9]}
+    region = {"temperature": [280.0, 350.0], "current": {}, "parameters": ranges}
+    exact = (0.5 + 0.05 + 4e-10 * 280.0**3) / 10.0
+    for rate, holds in ((exact * (1 - 1e-9), True), (exact * (1 + 1e-9), False)):
+        cert = establish("contraction", system=BENT, region=region, made_by={}, margin={},
+                         evidence={"method": method, "rate": rate, **METHODS[method]})
+        assert cert.holds is holds, cert.reason
+    assert "'links.rod-room.natural.gain' in [0.05, 0.2]" in cert.claim
+
+
+def test_a_box_is_never_left_whatever_convection_and_radiation():
+    """Load 10 W: out flow at the upper face is least at the least coefficients, the heat that comes in at the largest.
+    """
+    def region(upper, **more):
+        return {"temperature": [290.0, upper], "current": {}, "ambient": {"room": [290.0, 300.0]}, "parameters": {
+            "links.rod-room.natural.gain": [0.05, 0.2], "links.rod-room.radiation": [1e-10, 1e-9]}, **more}
+
+    def left(upper):
+        return 10.0 - 0.55 * (upper - 300.0) - 1e-10 * (upper**4 - 300.0**4)
+
+    edge = 300.0 + 10.0 / 0.55
+    for _ in range(50):
+        edge += left(edge) / (0.55 + 4e-10 * edge**3)
+    for upper, holds in ((edge + 1e-6, True), (edge - 1e-6, False)):
+        cert = establish("invariance", system=BENT, region=region(upper, heat={"rod": [0.0, 10.0]}), made_by={},
+                         evidence={}, margin={})
+        assert cert.holds is holds, cert.reason
+    inflow = (0.5 + 0.2) * 10.0 + 1e-9 * (330.0**4 - 320.0**4)  # from a room of 330 K, the upper face at 320 K
+    for load, holds in ((inflow + 1e-6, True), (inflow - 1e-6, False)):
+        warm = region(320.0, temperature=[200.0, 320.0], ambient={"room": [290.0, 330.0]}, heat={"rod": [-load, -load]})
+        assert establish("invariance", system=BENT, region=warm, made_by={}, evidence={}, margin={}).holds is holds
+
+
+@pytest.mark.parametrize(("name", "pair", "message"), [
+    ("links.rod-room.natural.gain", [-0.1, 0.2], "negative"), ("links.rod-room.radiation", [-1e-10, 1e-9], "negative"),
+    ("links.rod-room.natural.gain", [0.2, 0.3], "excludes the number of the system"),
+    ("links.rod-room.radiation", [0.0, 1e-10], "excludes the number of the system"),
+    ("links.rod-room.natural.exponent", [0.0, 0.5], "no such number"),
+    ("lumps.rod.capacity", [11.0, 12.0], "excludes the number of the system")])
+def test_ranges_of_convection_and_radiation_contain_the_number_of_the_system(name, pair, message):
+    region = {"temperature": [280.0, 350.0], "current": {}, "parameters": {name: pair}}
+    with pytest.raises(InputError, match=message):
+        establish("contraction", system=BENT, region=region, made_by={}, evidence={"method": "energy", "rate": 0.0})
 
 
 def test_two_links_of_one_name_cannot_be_meant():
@@ -137,7 +197,7 @@ def test_no_machine_of_the_ranges_leaves_an_accepted_box():
     accepted = violated = 0
     for k in range(60):
         system = truth.random_system(rng, modules=1, bent=k % 3 == 0, wild=k % 2 == 0)
-        ranges = spans(system, names_of(system), rng, 4)
+        ranges = spans(system, names_of(system, bent=True), rng, 4)
         region = {**truth.box(system, float(rng.uniform(0.05, 1.5)), 265.0, 340.0), "ambient": {"room": [290.0, 300.0]}}
         cert = establish("invariance", system=system, region={**region, "parameters": ranges}, evidence={}, made_by={},
                          margin={})
