@@ -19,6 +19,7 @@ HOTTEST = 1000.0  # K
 COLDEST = 60.0
 _STEPS = 100
 _SLOW_STEPS = 12  # after as many steps without a solution of the worst cases ahead there is taken to be none
+_ROUNDING = 1e-9
 _CLOSE = 0.4  # share of the least margin within which the heat must come
 
 
@@ -77,7 +78,8 @@ def _newton(found: Outward, room: Array) -> Array | None:
         lu = splu(matrix)
     except RuntimeError:  # exactly singular
         return None
-    if not (lu.solve(np.where(held, 0.0, 1.0)) >= 0).all():  # no M-matrix: beyond a fold
+    answer = lu.solve(np.where(held, 0.0, 1.0))  # zero where held, but for rounding
+    if not (answer >= -_ROUNDING * np.abs(answer).max()).all():  # no M-matrix: beyond a fold
         return None
     return np.asarray(lu.solve(np.where(held, -room, found.heat)))
 

@@ -72,8 +72,14 @@ class ControllerDesign:
 
     @property
     def holds(self) -> bool:
-        """Whether everything required is certified and verified."""
-        return self.certification.holds
+        """Whether all that is required is certified and verified, and the box that is never left ends in the stated one."""
+        return self.certification.holds and self.contained
+
+    @property
+    def contained(self) -> bool:
+        """Whether the box that is never left ends below the upper end of the stated one."""
+        hottest = max((high for _, high in self.certification.safe.temperature.values()), default=float("inf"))
+        return hottest <= self.request.temperature[1]
 
 
 def design_system(system: System, request: DesignRequest,

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 
 from ..design import ClosedLoop, GainObserver
-from ..report import Figure, Report, Section, Table, house_style
+from ..report import Figure, Reason, Report, Section, Table, house_style
 from ..thermal import System
 from ._assumptions import machine_assumptions
+from ._codes import GateCode
 from ._design import ControllerDesign
 from ._design_file import write_design_file
 from ._design_limits import BELOW_FOLD
@@ -68,7 +69,7 @@ def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | P
     report = Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
                     claims=claims(result.certification.checked), sections=tuple(_sections(result)),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
-                    generated=now())
+                    generated=now(), gate=tuple(_reasons(result)), gates=_GATES)
     with output_folder(out) as folder:
         report = write_certification(result.certification.checked, report, folder)
         write_design_file(result, folder / "design.json")
@@ -82,13 +83,31 @@ _ASSUMPTIONS = (
 )
 
 
+_GATES = tuple(code.code for code in (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.CURRENT_BEYOND_INVARIANCE,
+                                      GateCode.NOMINAL_ONLY))
+
+
+def _reasons(result: ControllerDesign) -> Iterator[Reason]:
+    """What the verdict knows beside the claims."""
+    box = result.certification.safe.temperature
+    if box and not result.contained:
+        lump, (_, high) = max(box.items(), key=lambda item: item[1][1])
+        top = result.request.temperature[1]
+        yield Reason("fail", GateCode.CURRENT_BEYOND_INVARIANCE.code, "design", lump, "With these current limits "
+                     f"{lump} may reach {high - _ZERO:.1f} °C, beyond the {top - _ZERO:.1f} °C of the stated box.",
+                     "The set-points need more than the usable current: cool the hot side better, move the "
+                     "set-points, or narrow ambients and heats.", high, top)
+    yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
+                 "robthermal run with [calibrate] and [certify] makes the claims for the calibrated ranges.")
+
+
 def _sections(result: ControllerDesign) -> Iterator[Section]:
     yield _controller_section(result)
     yield _step_section(result)
     if result.collapse is not None:
         yield _linearity_section(result)
     yield _observer_section(result.certification.system, result.observer, result.loop)
-    if not result.certification.safe.holds:
+    if not (result.certification.safe.holds and result.contained):
         yield Section("No box that is never left", f"{result.certification.safe.outcome.text}\n\n"
                       "The set-points need more current than is usable. Inside the temperature box the machine "
                       "contracts at these currents, but that it stays inside is not proven: this design is not "
