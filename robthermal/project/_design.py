@@ -72,7 +72,7 @@ class ControllerDesign:
 
     @property
     def holds(self) -> bool:
-        """Whether all that is required is certified and verified, and the box that is never left is inside the stated."""
+        """Whether all that is required is certified and verified, and its box is never left and inside the stated."""
         return self.certification.holds and self.contained
 
     @property
