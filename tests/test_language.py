@@ -96,13 +96,13 @@ def test_short_descriptions_are_found() -> None:
 def test_a_private_import_is_found(tmp_path: Path) -> None:
     folder = tmp_path / "robthermal" / "design"
     (folder / "parts").mkdir(parents=True)
-    lines = {"_one.py": "from .._fitting._data import Data\nfrom ._two import x\nfrom .parts._three import y\n",
+    lines = {"_one.py": "from ..fitting._data import Data\nfrom ._two import x\nfrom .parts._three import y\n",
              "parts/_three.py": "from ..parts._four import z\nfrom ..._checks import quoted\n"
                                 "from robthermal.thermal._terms import T\n"}
     for name, text in lines.items():
         (folder / name).write_text(text, encoding="utf-8")
     assert list(crossing(folder / "_one.py", tmp_path)) == [
-        "robthermal.design._one imports robthermal._fitting._data",
+        "robthermal.design._one imports robthermal.fitting._data",
         "robthermal.design._one imports robthermal.design.parts._three"]
     assert list(crossing(folder / "parts" / "_three.py", tmp_path)) == [
         "robthermal.design.parts._three imports robthermal.thermal._terms"]

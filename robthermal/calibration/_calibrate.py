@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from .._arrays import Floats
-from .._fitting import (
+from ..errors import Diverged, InputError, Outcome
+from ..fitting import (
     LOSSES,
     STARTS,
     Choice,
@@ -32,7 +33,6 @@ from .._fitting import (
     scaled,
     scipy_loss,
 )
-from ..errors import Diverged, InputError, Outcome
 from ..identify import FrequencyResponse
 from ..signals import Record
 from ..thermal import System

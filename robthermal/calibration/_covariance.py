@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from .._arrays import Floats
-from .._fitting import Loss, Problem, Ranges, score, score_slope
+from ..fitting import Loss, Problem, Ranges, score, score_slope
 from ._autoregression import correlation_of
 from ._score_blocks import block_scores, blocks_of, covariance_scale
 

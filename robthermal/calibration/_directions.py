@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Floats
-from .._fitting import Ranges
+from ..fitting import Ranges
 
 _VISIBLE = 0.1  # components below this part of the largest are not mentioned
 

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .._arrays import Floats
-from .._fitting import rmse_by_sensor
+from ..fitting import rmse_by_sensor
 from ..signals import Record
 from ._estimates import Estimates, plain
 from ._figure import draw

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from .._arrays import Floats
-from .._fitting import Data
+from ..fitting import Data
 from ..thermal import System, linearize, trajectory
 
 _STEADY = 1e-12  # relative change of the state covariance at which the gain counts as constant

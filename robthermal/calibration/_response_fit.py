@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from .._arrays import Floats
-from .._fitting import Choice, OperatingPoint, chosen_ranges
 from ..errors import InputError, Outcome
+from ..fitting import Choice, OperatingPoint, chosen_ranges
 from ..identify import FrequencyResponse
 from ..thermal import System
 from ._covariance import with_priors

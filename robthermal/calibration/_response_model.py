@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Complex, Floats
-from .._fitting import OperatingPoint, Ranges, residual, sampled_response
 from ..errors import Diverged
+from ..fitting import OperatingPoint, Ranges, residual, sampled_response
 from ..identify import FrequencyResponse
 from ..thermal import System
 

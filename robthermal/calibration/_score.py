@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Floats
-from .._fitting import Data, rmse_by_sensor
+from ..fitting import Data, rmse_by_sensor
 
 
 @dataclass(frozen=True)

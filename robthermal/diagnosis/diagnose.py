@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from .._fitting import Choice
+from ..fitting import Choice
 from ..thermal import System
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from .data import Measured, as_measured, noise_floor

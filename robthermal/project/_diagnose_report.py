@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .._fitting import rmse
 from ..diagnosis import Diagnosis, effects
+from ..fitting import rmse
 from ..report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
 from ..signals import Record
 from ..thermal import write_system

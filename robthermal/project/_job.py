@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from .._fitting import as_data, free_run
 from ..calibration import Fit, calibrate
 from ..errors import InputError
+from ..fitting import as_data, free_run
 from ..signals import Record, read_record
 from ..thermal import System
 from ._claims import certify_system, claims_hold

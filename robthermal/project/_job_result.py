@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._fitting import residual, rmse
 from ..calibration import Fit
+from ..fitting import residual, rmse
 from ..report import Reason, Verdict
 from ..signals import Record
 from ..thermal import System

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._fitting import residual as residual_of
 from ..errors import InputError
+from ..fitting import residual as residual_of
 from ._style import COLOURS, canvas, house_style, plain
 
 _ZERO = 273.15

@@ -94,8 +94,8 @@ def test_gathered_noise_is_the_integral() -> None:
 
 def test_whitening_is_the_inverse_root_of_the_residuals_covariance() -> None:
     # L⁻¹ of a filter started at the known state satisfies L⁻¹ Σ L⁻ᵀ = 1 with Σ built by brute force over the samples.
-    from robthermal._fitting._data import as_data
     from robthermal.calibration._innovations import whitener
+    from robthermal.fitting._data import as_data
 
     system, n = plant(), 12
     one = as_data(system, runs(1, n=21)[0][:n], "data")[0]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal._fitting._operating_point import OperatingPoint
-from robthermal._fitting._sampled_response import sampled_response
 from robthermal.errors import InputError
+from robthermal.fitting._operating_point import OperatingPoint
+from robthermal.fitting._sampled_response import sampled_response
 
 AREA, POM_LENGTH, ALUMINIUM_LENGTH, LUMPS = 4e-4, 0.01, 0.06, 3
 CONDUCTIVITY, NOISE, STEP = 0.31, 0.01, 20.0

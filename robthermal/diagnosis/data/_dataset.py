@@ -8,7 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Initial, Start
+from ...fitting import Initial, Start
 from ...thermal import System
 from ..effects import Candidate
 

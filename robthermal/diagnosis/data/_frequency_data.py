@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Initial, OperatingPoint, Start, sampled_response
 from ...errors import Diverged, InputError
+from ...fitting import Initial, OperatingPoint, Start, sampled_response
 from ...identify import FrequencyResponse
 from ...thermal import System
 from ..effects import Candidate

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import SMALLEST, Data, declared_noise, quantum
 from ...errors import InputError, Outcome
+from ...fitting import SMALLEST, Data, declared_noise, quantum
 from ...thermal import System
 from ._glitches import counted
 from ._measured import Measured, as_measured, records_of, responses_of

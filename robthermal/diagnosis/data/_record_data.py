@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Data, Initial, Start, as_data, initial_of, start_values
+from ...fitting import Data, Initial, Start, as_data, initial_of, start_values
 from ...signals import Record
 from ...thermal import System, trajectory
 from ..effects import Candidate

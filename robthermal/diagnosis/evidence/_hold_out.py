@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from ..._fitting import Start, free_run, refuse_same, rmse
 from ...errors import Diverged, InputError, Outcome
+from ...fitting import Start, free_run, refuse_same, rmse
 from ...thermal import System
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
 from ..fit import Point, Refit, Structure, Whitened, descend, filters

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import residual, rmse
+from ...fitting import residual, rmse
 from ..data import NoiseEstimate
 from ..path import LinearizedRecord, SlowNoise, settled_cost
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import rmse
 from ...errors import Outcome
+from ...fitting import rmse
 from ...thermal import System
 from ..data import NoiseEstimate
 from ..effects import Candidate

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import NONE, Choice, chosen_ranges
 from ...errors import Diverged, InputError, Outcome
+from ...fitting import NONE, Choice, chosen_ranges
 from ...thermal import System
 from ..data import Measured, NoiseEstimate, as_measured, noise_floor, without_outliers
 from ..path import Linearized, White, linearized_records

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Initial, Ranges
 from ...errors import InputError
+from ...fitting import Initial, Ranges
 from ...thermal import System
 from ..data import DataSet
 from ..effects import Candidate

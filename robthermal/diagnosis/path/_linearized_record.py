@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import expm
 
-from ..._fitting import residual
 from ...errors import InputError
+from ...fitting import residual
 from ...thermal import Equations, System, Trajectory, trajectory
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from ..._fitting import residual
 from ...errors import Diverged, InputError
+from ...fitting import residual
 from ...thermal import Input, System
 from ..data import Complex, ResponseData, ResponseWhitener, as_complex, as_real
 from ..effects import Candidate

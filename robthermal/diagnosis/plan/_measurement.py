@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ..._fitting import Ranges
+from ...fitting import Ranges
 from ..effects import Candidate
 
 _ACCURACY = {"resistance.value": 0.005, "seebeck.value": 0.01}  # four-wire at a known temperature; open-circuit voltage

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..._fitting import Initial
+from ...fitting import Initial
 from ...signals import Record
 from ...thermal import System, steady_state
 from ..data import NoiseEstimate, RecordData, records_of, responses_of

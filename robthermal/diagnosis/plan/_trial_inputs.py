@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._fitting import Data
+from ...fitting import Data
 from ...signals import Record
 from ...thermal import System
 

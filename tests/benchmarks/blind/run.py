@@ -19,7 +19,7 @@ from .cases import Case, Given, Truth, made
 from .peers import peers
 
 Row = dict[str, Any]
-_SOURCES = ("diagnosis", "calibration", "_fitting", "thermal")
+_SOURCES = ("diagnosis", "calibration", "fitting", "thermal")
 _GENERATOR = ("cases.py", "hidden.py", "integrate.py", "outside.py", "plants.py", "sizes.py")
 
 

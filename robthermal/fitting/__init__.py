@@ -1,6 +1,6 @@
 """What fits of a system to data share: checked data, ranges and priors, starts, noise, residuals and free runs.
 
-Shared by the packages calibration, diagnosis and project; nothing of it is public.
+Shared by the packages calibration, diagnosis, report and jobs; not part of the public interface.
 """
 
 from ._data import Data as Data
