@@ -69,10 +69,10 @@ def _plural(count: int, word: str) -> str:
 def _parameters(parameters: Mapping[str, Interval], parts: Parts) -> str:
     if not parameters:
         return "nominal parameters"
-    title = f"for all {_plural(len(parameters), 'parameter range')} "
+    title = f"for all values of {_plural(len(parameters), 'parameter')}"
     if len(parameters) > _LISTED:
-        return f"{title}of table {short_hash(parts['region']['parameters'])}"
-    return title + ", ".join(f"{short(name)} in {_span(box)}" for name, box in parameters.items())
+        return f"{title} of table {short_hash(parts['region']['parameters'])}"
+    return f"{title}: " + ", ".join(f"{short(name)} in {_span(box)}" for name, box in parameters.items())
 
 
 def _subject(network: Network, parts: Parts, plant: str = "continuous plant") -> str:

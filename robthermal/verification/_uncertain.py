@@ -41,9 +41,9 @@ def say_parameters(parameters: Parameters) -> str:
     if not parameters:
         return "nominal parameters"
     count = len(parameters)
-    words = (", ".join(f"{name_of(name)} in {say_interval(box)}" for name, box in parameters) if count <= _LISTED
-             else f"of table {short_hash(dict(parameters))}")
-    return f"for all {count} parameter range{'' if count == 1 else 's'} {words}"
+    words = (": " + ", ".join(f"{name_of(name)} in {say_interval(box)}" for name, box in parameters)
+             if count <= _LISTED else f" of table {short_hash(dict(parameters))}")
+    return f"for all values of {count} parameter{'' if count == 1 else 's'}{words}"
 
 
 def say_subject(system: ThermalSystem, parameters: Parameters, machine: str, plant: str = "continuous plant") -> str:

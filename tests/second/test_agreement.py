@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import copy
 import json
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import certificate_truth
 import mutant_linear
 import mutant_thermal
 import numpy as np
@@ -96,6 +98,31 @@ def test_a_stored_margin_is_part_of_the_claim():
         document["margin"] = {key: -1.0}
         pair = both(kind, document)
         assert pair.first and pair.second == "valid", kind
+
+
+def test_uncertain_convection_and_radiation_are_judged_alike_by_both():
+    """Ranges of their coefficients, up to 20 times the number of the system, with small and with large currents."""
+    rng = np.random.default_rng(4)
+    seen = set()
+    for trial in range(12):
+        system = certificate_truth.random_system(rng, modules=1, bent=True)
+        ranges = {}
+        for k, link in enumerate(system["links"]):
+            link["name"] = f"l{k}"
+            for key, value in (("radiation", link.get("radiation")), ("natural.gain", link.get("natural", {}).get("gain"))):
+                if value is not None:
+                    ranges[f"links.l{k}.{key}"] = [0.5 * value, (1.5 if trial % 2 else 20.0) * value]
+        assert ranges
+        region = {"temperature": [280.0, 350.0], "current": {"m0": [0.0, 0.05]}, "parameters": ranges}
+        for kind, extra in (("contraction", {}), ("invariance", {"ambient": {"room": [290.0, 300.0]}})):
+            document = {"system": system, "region": {**region, **extra}, "margin": {},
+                        "evidence": {"method": "energy", "rate": 1e-5} if kind == "contraction" else {}}
+            for current in (0.05, 40.0):
+                document["region"]["current"] = {"m0": [0.0, current]}
+                pair = both(kind, copy.deepcopy(document))
+                assert not pair.disagree, (kind, pair.reasons)
+                seen.add((kind, pair.second))
+    assert seen == {(kind, status) for kind in ("contraction", "invariance") for status in ("valid", "not valid")}
 
 
 def test_the_second_checker_imports_the_standard_library_only():
