@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,11 +18,17 @@ _WHERE = "argument certificate"
 
 
 def proven_currents(modules: ModuleSet, authority: Certificate | UsableCurrent) -> tuple[Array, Array]:
-    """Return the current box of a proven certificate of this system, (n_modules,) each [A]."""
+    """Return the current box of a proven certificate of this system, (n_modules,) each [A].
+
+    Of a contraction certificate with a warning: it does not say that the temperatures stay where it holds.
+    """
     if isinstance(authority, UsableCurrent):
         return _usable(modules, authority)
     check_certificate(authority, modules.system, "contraction")
     check_box(modules.system, authority.region["current"], authority.region["temperature"], _WHERE)
+    warnings.warn("the currents of the law are a contraction limit inside the box; not a limit for use: the "
+                  "certificate does not say that temperatures stay in its box. Pass what rt.certify.usable_current returns.",
+                  UserWarning, stacklevel=3)
     return _ends(modules, authority.region["current"])
 
 

@@ -299,9 +299,10 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     slew : float or mapping of module to float, optional
         Largest change of current [A/s].
     certificate : UsableCurrent or Certificate, optional
-        What `certify.usable_current` returned, or a contraction certificate: its current box is the default, and limits
-        beyond it are refused. It is proven again, and must be of exactly this system. A contraction certificate alone
-        says nothing of where the temperatures go: a current inside it can still overheat the machine.
+        What `certify.usable_current` returned, or a contraction certificate: its current range is the default, and
+        limits beyond it are refused. It is proven again, and must be of exactly this system. The range of a contraction
+        certificate is a contraction limit inside the box; not a limit for use: currents within it can overheat the
+        machine.
 
     Returns
     -------
@@ -312,6 +313,11 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     InputError
         Unknown modules; limits that exclude zero, or exceed the system file's or the certificate's; a certificate that
         is not valid or is another system's.
+
+    Warns
+    -----
+    UserWarning
+        The certificate is one of contraction alone.
 
     References
     ----------

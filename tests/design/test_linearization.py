@@ -1,5 +1,6 @@
 """The law (5.15)-(5.18): exact, free of cancellation, inside its limits."""
 
+import warnings
 from dataclasses import replace
 from decimal import Decimal, getcontext
 
@@ -156,9 +157,12 @@ def test_arrays_mappings_and_one_module_agree(system, law):
 def test_a_certificate_sets_the_limits(system):
     box = {"current": {"m1": (0.0, 1.5), "m2": (0.0, 1.5)}, "temperature": (278.15, 358.15)}
     proven = rt.certify.contraction(system, method="energy", **box)
-    law = rt.design.feedback_linearization(system, certificate=proven)
+    with pytest.warns(UserWarning, match="contraction limit inside the box; not a limit for use") as warned:
+        law = rt.design.feedback_linearization(system, certificate=proven)
+    assert warned[0].filename == __file__
     assert law.current_high.tolist() == [1.5, 1.5]
-    with pytest.raises(rt.InputError, match=r"current_limits\['m1'\].*certified range.*usable_current"):
+    message = r"current_limits\['m1'\].*certified range.*usable_current"
+    with pytest.warns(UserWarning), pytest.raises(rt.InputError, match=message):
         rt.design.feedback_linearization(system, certificate=proven, current_limits=(0.0, 2.0))
 
 
@@ -173,7 +177,9 @@ def test_a_certificate_is_no_authority_before_it_is_proven(system, tmp_path):
     for name, factor in (("lumps.x1.capacity", 1 + 1e-12), ("modules.m1.seebeck.value", 0.99)):
         other = system.with_parameters({name: system.parameter(name) * factor})
         proven = rt.certify.contraction(other, method="energy", **box)
-        assert rt.design.feedback_linearization(other, certificate=proven).current_high.tolist() == [1.0, 1.0]
+        with pytest.warns(UserWarning, match="not a limit for use"):
+            law = rt.design.feedback_linearization(other, certificate=proven)
+        assert law.current_high.tolist() == [1.0, 1.0]
         with pytest.raises(rt.InputError, match="about another machine"):
             rt.design.feedback_linearization(system, certificate=proven)
     invariant = rt.certify.invariance(system, ambient={"room": (293.15, 303.15)}, **box)
@@ -185,7 +191,9 @@ def test_a_usable_current_sets_the_limits(system):
     usable = rt.certify.usable_current(system, direction="cooling", temperature=(268.15, 358.15),
                                        ambient={"room": (296.15, 300.15)})
     assert usable.holds
-    law = rt.design.feedback_linearization(system, certificate=usable)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # the currents of a usable current are for use: nothing to warn of
+        law = rt.design.feedback_linearization(system, certificate=usable)
     assert law.current_high.tolist() == [usable.current] * 2 and law.current_low.tolist() == [0.0, 0.0]
     wider = replace(usable, range={name: (0.0, 2 * usable.current) for name in usable.range})
     with pytest.raises(rt.InputError, match="exceeds the currents of its certificate"):

@@ -109,7 +109,8 @@ def test_uncertain_convection_and_radiation_are_judged_alike_by_both():
         ranges = {}
         for k, link in enumerate(system["links"]):
             link["name"] = f"l{k}"
-            for key, value in (("radiation", link.get("radiation")), ("natural.gain", link.get("natural", {}).get("gain"))):
+            natural = link.get("natural", {})
+            for key, value in (("radiation", link.get("radiation")), ("natural.gain", natural.get("gain"))):
                 if value is not None:
                     ranges[f"links.l{k}.{key}"] = [0.5 * value, (1.5 if trial % 2 else 20.0) * value]
         assert ranges
