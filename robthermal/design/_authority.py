@@ -27,8 +27,8 @@ def proven_currents(modules: ModuleSet, authority: Certificate | UsableCurrent) 
     check_certificate(authority, modules.system, "contraction")
     check_box(modules.system, authority.region["current"], authority.region["temperature"], _WHERE)
     warnings.warn("the currents of the law are a contraction limit inside the box; not a limit for use: the "
-                  "certificate does not say that temperatures stay in its box. Pass what rt.certify.usable_current returns.",
-                  UserWarning, stacklevel=3)
+                  "certificate does not say that temperatures stay in its box. Pass what rt.certify.usable_current "
+                  "returns.", UserWarning, stacklevel=3)
     return _ends(modules, authority.region["current"])
 
 
