@@ -322,3 +322,21 @@ def test_measured_records_with_rounded_stamps_and_lost_samples(shared: Path) -> 
     lost = shared / "data" / "tclab_dowling" / "sine_50min_run_2.csv"
     assert [part.n_samples for part in rt.read_records(lost, **names)] == [555, 343]
     assert rt.read_record(lost, jitter=1.0, **names).n_samples == 901
+
+
+@pytest.mark.parametrize("suffix", [".xlsx", ".ods"])
+def test_workbooks(tmp_path: Path, stage: Any, suffix: str) -> None:
+    pytest.importorskip("openpyxl" if suffix == ".xlsx" else "odf", reason="optional extra robthermal[excel]")
+    stamps = pd.date_range("2024-03-01 10:00", periods=N, freq="s")
+    body = pd.DataFrame({"Zeit": stamps, "T1 [°C]": 20.0 + 0.01 * np.arange(N), "m1": 0.5, "heater": 1.0})
+    body.loc[30, "T1 [°C]"] = np.nan
+    path = tmp_path / f"log{suffix}"
+    with pd.ExcelWriter(path, engine="openpyxl" if suffix == ".xlsx" else "odf") as writer:
+        pd.DataFrame({"a": ["a note", "no table"]}).to_excel(writer, sheet_name="Notes", index=False, header=False)
+        body.to_excel(writer, sheet_name="Log 1", index=False, startrow=3)
+    parts = rt.read_records(path, stage)
+    assert [part.n_samples for part in parts] == [30, 29] and all(adds_up(part) for part in parts)
+    assert parts[0].imported is not None and parts[0].imported.time["origin"] == "2024-03-01T10:00:00"
+    assert rt.read_records(path, stage, sheet="Log 1", gaps="fill")[0].n_samples == N
+    with pytest.raises(InputError, match="no sheet 'Log 2'.*'Notes', 'Log 1'"):
+        rt.read_records(path, stage, sheet="Log 2")

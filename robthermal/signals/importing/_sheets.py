@@ -58,7 +58,7 @@ def read_workbook(path: Path, options: ImportOptions) -> Table:
             expected="one of " + ", ".join(map(repr, map(str, book.sheet_names[:10]))),
         )
     for name in names:
-        cells = book.parse(name, header=None, dtype=object, keep_default_na=False, na_values=[])
+        cells = pd.read_excel(book, sheet_name=name, header=None, dtype=object, keep_default_na=False, na_values=[])
         header = _header(cells, options)
         if header is not None:
             return _table(cells, header, path, name, hashlib.sha256(content).hexdigest(), options)
