@@ -21,6 +21,7 @@ from ._numbers import name_of, plain_number
 
 FORMAT = "robthermal-certificate/1"
 _LARGEST = 200_000_000  # bytes
+_MOST_VALUES = 8_000_000
 _DEEPEST = 100  # nested objects and lists
 _SECTIONS = ("system", "region", "evidence", "margin", "made_by")
 
@@ -183,6 +184,10 @@ def _read(path: str | os.PathLike[str]) -> str:
 
 
 def _parse(content: str) -> Any:
+    nodes = sum(map(content.count, ",[{:"))  # at least one stands before every value but the first
+    if nodes > _MOST_VALUES:
+        raise InputError(f"more than {_MOST_VALUES} values", expected="a certificate file",
+                         remedy="Keep large networks in memory.")
     try:
         document = json.loads(content, parse_float=lambda text: plain_number(text, "number"), parse_int=_integer,
                               parse_constant=_no_constant, object_pairs_hook=_no_duplicates)

@@ -13,7 +13,8 @@ from flint import arb, arb_mat, fmpq
 from numpy.typing import NDArray
 
 Rows = list[dict[int, arb]]
-_MOST_UPDATES = 50_000_000  # entries changed by an elimination, about a minute
+_MOST_UPDATES = 20_000_000  # entries changed by an elimination, some 15 s
+_MOST_ENTRIES = 3_000_000  # of its rows at one time, some 500 MB
 
 
 def eliminate(rows: Rows, keep: set[int]) -> int | None:
@@ -25,7 +26,7 @@ def eliminate(rows: Rows, keep: set[int]) -> int | None:
     queue = [(len(row), k) for k, row in enumerate(rows) if k not in keep]
     heapq.heapify(queue)
     done: set[int] = set()
-    updates = 0
+    updates, entries = 0, sum(len(row) for row in rows)
     while queue:
         degree, k = heapq.heappop(queue)
         if k in done or degree != len(rows[k]):
@@ -34,9 +35,11 @@ def eliminate(rows: Rows, keep: set[int]) -> int | None:
         row = rows[k]
         pivot = row.pop(k, arb(0))
         updates += len(row) ** 2
-        if not pivot > 0 or updates > _MOST_UPDATES:
+        if not pivot > 0 or updates > _MOST_UPDATES or entries + len(row) ** 2 > _MOST_ENTRIES:
             return k
+        before = sum(len(rows[j]) for j in row)
         _update(rows, k, pivot)
+        entries += sum(len(rows[j]) for j in row) - before - len(row)
         for j in row:
             if j not in keep:
                 heapq.heappush(queue, (len(rows[j]), j))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from flint import arb, fmpq
 
+from ._cost import longest
 from ._definite import eliminate, is_positive, is_semidefinite
 from ._kind import Proof
 from ._numbers import as_float, decimal, name_of, show
@@ -24,11 +25,12 @@ if TYPE_CHECKING:
 
 Block = list[list[fmpq]]
 _MOST_PER_CLUSTER = 5_000
-_MOST_ENTRIES = 2_000_000  # of all vertices of a cluster
+_MOST_ENTRIES = 1_000_000  # of all vertices
 _MOST_PRUNED = 200
-_MOST_PRUNING = 1e7  # exact operations to find implied vertices
+_MOST_PRUNING = 1e6  # exact operations to find implied vertices
+_LONG = 400  # bits of numbers that are too long for them
 _MOST_TOGETHER = 20_000
-_MOST_WORK = 3e8  # joint vertices times (lumps of modules)³
+_MOST_WORK = 1e8  # joint vertices times (lumps of modules)³
 _PIECES = 8
 
 
@@ -37,20 +39,32 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     system = problem.system
     groups = clusters(system)
     ports = sorted(lump for group in groups for lump in group.lumps)
+    points = [_points(problem, k) for k in range(len(system.modules))]
+    many = _too_many(problem, groups, points, len(ports))
+    if many:
+        return Proof(False, f"method energy: {many}")
     rows = [{j: arb(value) for j, value in row.items()} for row in _network(problem, rate)]
     failed = eliminate(rows, set(ports))
     if failed is not None:
         return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven even without the "
                             f"modules, at lump {name_of(system.lumps[failed])}")
-    points = [_points(problem, k) for k in range(len(system.modules))]
-    for group in groups:
-        total = count(system, group, problem.region, points)
-        if total > _MOST_PER_CLUSTER or total * len(group.lumps) ** 2 > _MOST_ENTRIES:
-            return Proof(False, f"method energy: too many vertices ({total}) of uncertain modules, or of modules that "
-                                "share lumps, to check them one by one")
     choices = [_undominated(group, list(vertices(system, problem.region, group, points))) for group in groups]
     rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
     return _check(problem, rate, rest, ports, groups, choices)
+
+
+def _too_many(problem: Contraction, groups: list[Cluster], points: list[list[Point]], ports: int) -> str:
+    """Return why the modules are too many, counted before any vertex is made; empty where they are not."""
+    if ports**3 > _MOST_WORK:
+        return f"modules at {ports} lumps are too many to check together"
+    entries = 0
+    for group in groups:
+        total = count(problem.system, group, problem.region, points)
+        entries += total * (len(group.lumps) ** 2 + 10)
+        if total > _MOST_PER_CLUSTER or entries > _MOST_ENTRIES:
+            return (f"too many vertices of uncertain modules, or of modules that share lumps, to check them one by one "
+                    f"({min(total, _MOST_PER_CLUSTER + 1)} or more of one group, at most {_MOST_PER_CLUSTER})")
+    return ""
 
 
 def _network(problem: Contraction, rate: fmpq) -> list[dict[int, fmpq]]:
@@ -92,6 +106,8 @@ def _undominated(group: Cluster, found: list[Vertex]) -> list[tuple[Block, Verte
     pairs = [(_block(group, vertex), vertex) for vertex in found]
     if len(pairs) > _MOST_PRUNED or len(pairs) ** 2 * len(group.lumps) ** 3 > _MOST_PRUNING:
         return pairs
+    if longest(entry for block, _ in pairs for row in block for entry in row) > _LONG:
+        return pairs
     kept: list[tuple[Block, Vertex]] = []
     for pair in pairs:
         if any(_below(pair[0], other) for other, _ in kept):
@@ -109,8 +125,6 @@ def _below(lower: Block, upper: Block) -> bool:
 def _check(problem: Contraction, rate: fmpq, rest: list[list[arb]], ports: list[int], groups: list[Cluster],
            choices: list[list[tuple[Block, Vertex]]]) -> Proof:
     total = math.prod(len(choice) for choice in choices)
-    if len(ports) ** 3 > _MOST_WORK:
-        return Proof(False, f"method energy: modules at {len(ports)} lumps are too many to check together")
     if total > _MOST_TOGETHER or total * len(ports) ** 3 > _MOST_WORK:
         return _check_common_bound(rate, rest, ports, groups, choices)
     balls = [[([[arb(entry) for entry in row] for row in block], vertex) for block, vertex in choice]

@@ -21,7 +21,7 @@ from flint import arb, arb_mat, fmpq
 from ._between import Sampled, sample
 from ._corners import Part, first_failure, is_positive
 from ._fields import Interval
-from ._growth import Growth
+from ._growth import Growth, too_many_cases
 from ._law import fixed_slopes, free_slopes, unfit
 from ._lyapunov import MOST_WORK, Described, link_slopes
 from ._numbers import name_of, show
@@ -76,14 +76,15 @@ class Layout:
 def flow_growth(problem: Loop, Q: arb_mat) -> Growth | str:
     """Prove what does not depend on the contraction; return K'SK at all corners, lazily, or what fails."""
     system, region = problem.system, problem.region
+    base, bent, missing = link_slopes(system, region)
+    missing = missing or too_many_cases(region, problem.pieces, bent, Q.nrows())
+    if missing:
+        return missing
     for module, current in zip(system.modules, region.current, strict=True):
         if broken := unfit(module, region.temperature[module.hot], region.temperature[module.cold], current):
             return broken
     if len(system.lumps) > _LARGEST:
         return f"{len(system.lumps)} lumps: too many, at most {_LARGEST}"
-    base, bent, missing = link_slopes(system, region)
-    if missing:
-        return missing
     sampled = sample(system, base, problem.sample_time) if problem.sensors is not None else None
     if isinstance(sampled, str):
         return sampled

@@ -16,6 +16,7 @@ from robthermal.errors import InputError
 
 from . import _weighted
 from ._contraction import Contraction
+from ._cost import too_many_corners
 from ._fields import Interval, get, intervals, kelvin_interval, mapping, no_other, not_negative, numbers
 from ._hash import short_hash
 from ._kind import Kind, Proof, working_precision
@@ -25,7 +26,7 @@ from ._system import Link, Region, ThermalSystem, read_region, read_system, say_
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 _SOURCES = ("ambients", "heat")
-_MOST_WORK = 10_000_000  # disturbances times links, modules and lumps
+_MOST_WORK = 2_000_000  # disturbances times links, modules and lumps
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,9 @@ def claim(problem: Gain, machine: str) -> str:
 
 def prove(problem: Gain) -> Proof:
     """Decide |J| d + b <= -rate E d for every disturbance and lump, exactly."""
+    many = too_many_corners(problem.system, problem.region, 16 * len(problem.channels))
+    if many:
+        return Proof(False, many)
     with working_precision():
         least: fmpq | None = None
         for channel in problem.channels:

@@ -84,9 +84,11 @@ def shares(network: HeldNetwork, method: str, pieces: int) -> tuple[Entries, Gro
     if any(len(group) << len(_held(group, grips)) > 4 * _MOST for group in bent + others):
         return {}, [], "too many combinations of modules that share lumps with cold faces to check them one by one"
     groups = [_passed_on(network, group, grips) for group in bent + others]
-    for c, k in network.holder.items():
-        slopes = {j: value for (i, j), value in fixed.items() if i == c}
-        groups.append(_holding(network, k, grips[c], slopes))
+    rows: dict[int, dict[int, fmpq]] = {c: {} for c in network.holder}
+    for (i, j), value in fixed.items():
+        if i in rows:
+            rows[i][j] = value
+    groups += [_holding(network, k, grips[c], rows[c]) for c, k in network.holder.items()]
     base = {place: value for place, value in fixed.items() if place[0] not in network.holder}
     return base, [group for group in groups if any(item.entries for item in group)], missing
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from flint import fmpq
 
+from ._cost import too_many_corners
 from ._fields import Interval, get, interval, intervals, kelvin_interval, mapping, margin_of
 from ._kind import Kind, Proof, working_precision
 from ._numbers import name_of, round_down, show
@@ -74,6 +75,9 @@ def claim(problem: Invariance, machine: str) -> str:
 
 def prove(problem: Invariance) -> Proof:
     """Bound the heat flow on both faces of every lump."""
+    many = too_many_corners(problem.system, problem.region, 4 * (_PIECES + 2))  # 2 lumps, 2 faces
+    if many:
+        return Proof(False, many)
     with working_precision():
         lump, face, flow = _worst(problem)
     words = (f"heat flow {'out of' if face == 'upper' else 'into'} lump {name_of(problem.system.lumps[lump])} at its "

@@ -21,7 +21,7 @@ from ._flow import flow_growth
 from ._growth import Growth
 from ._kind import Kind, Proof, working_precision
 from ._loop_growth import growth
-from ._lyapunov import asymmetry
+from ._lyapunov import MOST_ROWS, asymmetry
 from ._numbers import decimal, exact, name_of, round_down, show
 from ._observer import Sensor, read_sensors, say_sensors
 from ._system import Region, ThermalSystem, read_region, read_system, say_region
@@ -184,6 +184,8 @@ def _growth(problem: Loop) -> Growth | str:
     broken = [asymmetry(matrix) for matrix in (problem.matrix, *problem.start)]
     if any(broken):
         return next(filter(None, broken))
+    if len(problem.matrix) > MOST_ROWS:
+        return f"a matrix with {len(problem.matrix)} rows is too large to check, at most {MOST_ROWS}"
     P = arb_mat([[arb(entry) for entry in row] for row in problem.matrix])
     if not is_positive_preconditioned(P, approximate(P)):
         return "P > 0 fails or cannot be proven"

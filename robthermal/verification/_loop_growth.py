@@ -17,7 +17,7 @@ from flint import arb, arb_mat, fmpq
 from ._between import Bounds, Deviation, Sampled, deviation, diagonal, sample
 from ._definite import approximate, is_positive_preconditioned
 from ._fields import Interval
-from ._growth import Growth
+from ._growth import Growth, too_many_cases
 from ._law import fixed_slopes, free_slopes, unfit, variation
 from ._lyapunov import MOST_WORK, link_slopes
 from ._numbers import name_of, show
@@ -47,15 +47,16 @@ class Share:
 def growth(problem: Loop, P: arb_mat) -> Growth | str:
     """Return the cases, lazily, or why there are none."""
     system, region = problem.system, problem.region
+    base, bent, missing = link_slopes(system, region)
+    missing = missing or too_many_cases(region, problem.pieces, bent, P.nrows())
+    if missing:
+        return missing
     faces = [(region.temperature[module.hot], region.temperature[module.cold]) for module in system.modules]
     for module, (hot, cold), current in zip(system.modules, faces, region.current, strict=True):
         if broken := unfit(module, hot, cold, current):
             return broken
     if len(system.lumps) > _LARGEST:
         return f"{len(system.lumps)} lumps: too many, at most {_LARGEST}"
-    base, bent, missing = link_slopes(system, region)
-    if missing:
-        return missing
     sampled = sample(system, base, problem.sample_time)
     if isinstance(sampled, str):
         return sampled

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from flint import arb, arb_mat, fmpq
 
 from ._corners import Part, first_failure, is_positive
+from ._cost import product_up_to
 from ._fields import Interval
 from ._kind import Proof
 from ._numbers import decimal, name_of, show
@@ -88,19 +89,9 @@ def too_much(system: ThermalSystem, region: Region, bent: Sequence[Collection[De
     groups = [*map(len, bent), *map(len, module_slopes(system, region, pieces))]
     most = int(MOST_WORK / (n**3 + 2000))
     if sum(groups) + product_up_to(groups, most) > most:
-        return (f"{pieces} piece{'' if pieces == 1 else 's'} per current make more than {most} vertices of the modules "
-                f"and of the links that are not linear, too many for {n} lumps")
+        return (f"too many vertices of the modules and of the links that are not linear, with pieces per current: "
+                f"{pieces} (at most {most} for {n} lumps)")
     return ""
-
-
-def product_up_to(sizes: Sequence[int], most: int) -> int:
-    """Return a product of sizes, or a number above ``most`` where it is larger."""
-    total = 1
-    for size in sizes:
-        total *= size
-        if total > most:
-            break
-    return total
 
 
 def dense(entries: Entries, n: int) -> arb_mat:

@@ -7,22 +7,24 @@ Jacobian (see ``_held``) over the box; every inequality is convex in J (proof no
 
 from __future__ import annotations
 
-import math
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
-from flint import arb, fmpq
+from flint import arb, arb_mat, fmpq
 
 from robthermal.errors import InputError
 
 from ._contraction import search, shorten
+from ._corners import is_positive as dense_is_positive
+from ._cost import product_up_to, too_many_corners
 from ._definite import eliminate, is_positive
 from ._fields import get, kelvin_interval, mapping, margin_of
 from ._held import Alternative, Groups, HeldNetwork, lost_grip, shares
 from ._kind import Kind, Proof, working_precision
-from ._lyapunov import asymmetry
+from ._lyapunov import MOST_ROWS, asymmetry
 from ._norm import NORMS, read_norm, say_rate
 from ._numbers import decimal, name_of, round_down, show
 from ._system import ThermalSystem, read_region, read_system, say_interval
@@ -31,7 +33,9 @@ from ._vertices import Entries
 
 _PIECES = (1, 4, 16)  # per current, refined in turn
 _MOST_WORK = 3e7  # combinations times (lumps that vary)³
+_MOST_ENTRIES = 3_000_000  # of all blocks, some 500 MB
 Rows = list[dict[int, arb]]
+Sparse = defaultdict[int, dict[int, arb]]
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,10 @@ def _malformed(problem: Regulated) -> str:
     if capacity:
         return f"method lyapunov: {name_of(capacity)} is uncertain, which needs method energy, sum or max"
     broken = asymmetry(problem.matrix)
-    if not broken and not is_positive([[arb(value) for value in row] for row in problem.matrix]):
+    n = len(problem.matrix)
+    if n > MOST_ROWS:
+        broken = f"a dense matrix for {n} lumps is too large to check, at most {MOST_ROWS}"
+    if not broken and not dense_is_positive(arb_mat(n, n, [arb(value) for row in problem.matrix for value in row])):
         broken = "P > 0 fails or cannot be proven"
     return f"method lyapunov: {broken}" if broken else ""
 
@@ -117,6 +124,10 @@ def _prove_rate(problem: Regulated, rate: fmpq) -> Proof:
     """Prove the inequality over the box, cutting the currents finer where it fails."""
     proof = Proof(False, "")
     for pieces in _PIECES:
+        region = problem.network.region
+        many = too_many_corners(problem.network.system, region, 16 * pieces, problem.weights)  # 4 corners, 4 bounds
+        if many:
+            return replace(proof, reason=proof.reason or f"method {problem.method}: {many}")
         base, groups, missing = shares(problem.network, problem.method, pieces)
         if missing:
             return Proof(False, f"method {problem.method}: {missing}")
@@ -170,16 +181,20 @@ def _prove_form(problem: Regulated, rate: fmpq, base: Entries, groups: Groups) -
     """-(P E^-1 J + J'E^-1 P) - 2 rate P > 0 (P = E for method energy), in balls, at every combination."""
     names = problem.network.system.lumps
     words = f"method {problem.method}: V decays at {decimal(rate)} 1/s"
+    touched = {lump for group in groups for item in group for place in item.entries for lump in place}
+    ports = sorted(set(problem.network.free) if problem.matrix else touched)
+    most = int(_MOST_WORK / max(len(ports), 1) ** 3)
+    total = product_up_to(map(len, groups), most)
+    if total > most or sum(map(len, groups)) * len(ports) ** 2 > _MOST_ENTRIES:
+        return Proof(False, f"{words} is not proven: {len(groups)} groups of slopes at {len(ports)} lumps have too "
+                            "many combinations to check one by one")
     P = _own(problem)
-    rows = _form(problem, P, base)
+    rows: Rows = [{} for _ in names]
+    _add_form(rows, problem, P, base)
     for i, row in P.items():
         for j, value in row.items():
             rows[i][j] = rows[i].get(j, arb(0)) - 2 * arb(rate) * value
     forms = [[(_form(problem, P, item.entries), item.where) for item in group] for group in groups]
-    ports = sorted({i for group in forms for form, _ in group for i, row in enumerate(form) if row})
-    total = math.prod(map(len, groups))
-    if total * len(ports) ** 3 > _MOST_WORK:
-        return Proof(False, f"{words} is not proven: {total} combinations are too many to check one by one")
     held = set(problem.network.holder)
     failed = eliminate(rows, set(ports) | held)
     if failed is not None:
@@ -204,19 +219,24 @@ def _own(problem: Regulated) -> dict[int, dict[int, arb]]:
             for i, row in zip(free, problem.matrix, strict=True)}
 
 
-def _form(problem: Regulated, P: Mapping[int, Mapping[int, arb]], entries: Entries) -> Rows:
-    """Return -(P E^-1 J + J'E^-1 P) of some entries of J as sparse rows."""
+def _form(problem: Regulated, P: Mapping[int, Mapping[int, arb]], entries: Entries) -> Sparse:
+    """Return -(P E^-1 J + J'E^-1 P) of some entries of J."""
+    rows: Sparse = defaultdict(dict)
+    _add_form(rows, problem, P, entries)
+    return rows
+
+
+def _add_form(rows: Rows | Sparse, problem: Regulated, P: Mapping[int, Mapping[int, arb]], entries: Entries) -> None:
+    """Add -(P E^-1 J + J'E^-1 P) of some entries of J to sparse rows."""
     capacity = problem.network.system.capacity
-    rows: Rows = [{} for _ in capacity]
     for (j, k), value in entries.items():
         for i, factor in P[j].items():  # P is symmetric
             share = factor * arb(value / capacity[j])
             rows[i][k] = rows[i].get(k, arb(0)) - share
             rows[k][i] = rows[k].get(i, arb(0)) - share
-    return rows
 
 
-def _block(rows: Rows, ports: list[int]) -> list[list[arb]]:
+def _block(rows: Rows | Sparse, ports: list[int]) -> list[list[arb]]:
     return [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
 
 

@@ -14,11 +14,13 @@ from itertools import product
 
 from flint import fmpq
 
+from ._cost import product_up_to
 from ._fields import Interval
 from ._numbers import name_of, show
 from ._system import Module, Region, ThermalSystem
 
 Entries = dict[tuple[int, int], fmpq]
+_MANY = 1_000_000  # more than anything checks one by one
 
 
 @dataclass(frozen=True)
@@ -91,13 +93,10 @@ def hull(interval: Interval, pieces: int) -> list[Point]:
 
 
 def count(system: ThermalSystem, cluster: Cluster, region: Region, points: Sequence[Sequence[Point]]) -> int:
-    """Return the number of vertices of a cluster before listing them."""
-    total = 1
-    for lump in cluster.lumps:
-        total *= len(ends(region.temperature[lump]))
-    for module in cluster.modules:
-        total *= len(points[module]) * len(system.forms(module))
-    return total
+    """Return the number of vertices of a cluster before listing them; a number above a million where it is larger."""
+    lumps = [len(ends(region.temperature[lump])) for lump in cluster.lumps]
+    modules = [len(points[module]) * len(system.forms(module)) for module in cluster.modules]
+    return product_up_to([*lumps, *modules], _MANY)
 
 
 def vertices(system: ThermalSystem, region: Region, cluster: Cluster,

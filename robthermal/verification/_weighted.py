@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from flint import fmpq
 
+from ._cost import too_many_corners
 from ._kind import Proof
 from ._numbers import name_of, round_down, show
 from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
@@ -37,6 +38,9 @@ class _Pair:
 def prove(problem: Contraction) -> Proof:
     """Decide the inequality of every lump exactly, and the stored margin with it."""
     names = problem.system.lumps
+    many = too_many_corners(problem.system, problem.region, 16, problem.weights)  # 2 lumps, 2 ends each, 2 signs
+    if many:
+        return Proof(False, f"method {problem.method}: {many}")
     for name, weight in zip(names, problem.weights, strict=True):
         if weight <= 0:
             return Proof(False, f"weight of lump {name_of(name)} is {show(weight)}, not positive")
