@@ -33,7 +33,7 @@ def coldest_current(system: System, modules: Sequence[str], ambient: Mapping[str
     Parameters
     ----------
     system : System
-        Whose.
+        System that contains the module.
     modules : sequence of str
         Modules that carry the current; the others are off.
     ambient : mapping

@@ -99,7 +99,7 @@ def best_certificate(kind: str, parts: Mapping[str, Any], method: str, box: BoxJ
     parts : mapping
         Sections system and region.
     method : str
-        Norm.
+        Norm in which trajectories approach each other: "energy", "sum", "max" or "lyapunov".
     box : BoxJacobian
         What to find evidence for; with ``hull=True`` for "lyapunov".
     pattern : ndarray of bool, optional

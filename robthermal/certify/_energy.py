@@ -21,7 +21,7 @@ def energy_rate(box: BoxJacobian) -> float:
     Parameters
     ----------
     box : BoxJacobian
-        The network.
+        Jacobian of the network over the box.
 
     Returns
     -------

@@ -49,7 +49,7 @@ class Faces:
     Parameters
     ----------
     system : System
-        Whose.
+        System whose heat flows are bounded.
     ambient : mapping
         {ambient: (lower, upper)} [K], every ambient.
     heat : mapping

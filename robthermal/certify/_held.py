@@ -36,7 +36,7 @@ def held_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian | No
     Parameters
     ----------
     system : System
-        Network.
+        System with its modules and links.
     region : mapping
         With temperature, setpoint, current and parameters.
 

@@ -27,7 +27,7 @@ class Block:
     Parameters
     ----------
     a, b : int
-        Lumps.
+        Indices of the two lumps.
     vertices : ndarray, shape (n_vertices, 2, 2)
         ∂(heat into row lump)/∂(column temperature) [W/K].
     """
@@ -44,9 +44,9 @@ class BoxJacobian:
     Parameters
     ----------
     capacity : ndarray, shape (n,)
-        [J/K].
+        Heat capacity E of every lump [J/K].
     base : csr_array, shape (n, n)
-        Linear links.
+        Conductance matrix of the linear links [W/K].
     blocks : tuple of Block
         Modules (with all of their conductance) and nonlinear links.
     """

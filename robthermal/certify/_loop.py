@@ -54,7 +54,7 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
     temperature : tuple or mapping
         Box of temperatures [K], as in `contraction`.
     sample_time : float
-        [s].
+        Time between two samples [s].
     controller : mapping
         A (q, q), B (q, n_lumps) [W/K or own units], C (n_modules, q), D (n_modules, n_lumps) [W/K], windup
         (q, n_modules); `rt.design.certify_loop` takes them from a controller.

@@ -53,7 +53,7 @@ class Picture:
     F, hold : ndarray, shape (n, n)
         Passive network [1/s] and Γ.
     capacity : ndarray, shape (n,)
-        [J/K].
+        Heat capacity E of every lump [J/K].
     ports : ndarray of int
         Lumps of modules and nonlinear links.
     reach : ndarray, shape (p, 2p + 4m)

@@ -32,7 +32,7 @@ class Candidate:
     Parameters
     ----------
     matrix : ndarray, shape (N, N)
-        P.
+        Matrix P of the quadratic norm.
     weights, sizes : ndarray
         Multipliers, (p,) and (2p + 4m,); empty for a plant with held heat.
     contraction : float
@@ -78,7 +78,7 @@ def search(found: Picture, sample_time: float, scale: Array, pattern: NDArray[np
     found : Picture
         Of the loop.
     sample_time : float
-        [s].
+        Time between two samples [s].
     scale : ndarray, shape (N,)
         Units in which a well-conditioned P is expected.
     pattern : ndarray of bool, shape (N, N)

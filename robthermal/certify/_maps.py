@@ -99,7 +99,7 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     method : {"energy", "sum", "max", "lyapunov"}
         Of the contraction certificates.
     jobs : int
-        Processes.
+        Number of parallel processes.
     progress : callable, optional
         Called with the number of ambients and set-points that are done, and how many there are.
     store : str or path, optional

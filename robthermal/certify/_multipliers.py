@@ -26,7 +26,7 @@ def multiplier_form(base: Array, channels: Sequence[Channel]) -> Array:
     Parameters
     ----------
     base : ndarray, shape (n, n)
-        Common part.
+        Part of M that all vertices share.
     channels : sequence of (B, S, vertices)
         (n, k), (k, n) and (n_vertices, k, k) of every D_j.
     """

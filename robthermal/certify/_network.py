@@ -24,7 +24,7 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max", unce
     Parameters
     ----------
     E : array_like, shape (n,)
-        Capacities [J/K].
+        Heat capacity of every node [J/K].
     A : scipy.sparse array, shape (n, n)
         Metzler (off-diagonals not negative) [W/K]; need not be symmetric.
     method : {"max", "sum"}

@@ -43,7 +43,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     sensors : sequence of str
         Sensors, or lumps, that are read, in the order of the columns of L.
     sample_time : float
-        T_s [s].
+        Time T_s between two samples [s].
     current : mapping
         {module: (lower, upper)} [A], every module.
     temperature : tuple or mapping

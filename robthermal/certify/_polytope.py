@@ -32,7 +32,7 @@ class Polytope:
     Parameters
     ----------
     base : ndarray, shape (n, n)
-        Common part.
+        Part that all vertices share.
     parts : tuple of ndarray, shape (k, n, n)
         What the vertices of every block add.
     """
@@ -94,7 +94,7 @@ def common_form(vertices: Polytope, form: Callable[[Array], Form], pattern: NDAr
     Parameters
     ----------
     vertices : Polytope
-        Matrices M.
+        Polytope of the matrices M.
     form : callable
         M to the linear function of Q that must be positive definite.
     pattern : ndarray of bool, shape (n, n)

@@ -17,7 +17,7 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Parameters
     ----------
     system : System
-        Whose heaters.
+        System with heaters and their declared limits.
     parameters : mapping, optional
         {parameter name: (lower, upper)}; ranges of `inputs.NAME.gain` widen the heat, others change nothing.
 

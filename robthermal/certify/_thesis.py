@@ -27,7 +27,7 @@ class ThesisBounds:
     Parameters
     ----------
     hot, cold : ndarray
-        Face temperatures [K].
+        Temperatures of the modules' hot and cold faces [K].
     lower, upper : dict
         Module to the two roots of V̇₂ = 0 [A]; nan where V̇₂ < 0 for no current.
     decay : dict

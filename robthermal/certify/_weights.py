@@ -30,7 +30,7 @@ def best_weights(box: BoxJacobian, method: str) -> tuple[Array, float] | None:
     Parameters
     ----------
     box : BoxJacobian
-        The network.
+        Jacobian of the network over the box.
     method : {"sum", "max"}
         Column sums with weights c, or row sums with weights d.
 

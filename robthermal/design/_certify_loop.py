@@ -75,7 +75,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     system : System
         The plant, which the law must have been built for: every module driven.
     controller : PID, StateFeedback or LinearController
-        Outer loop.
+        Sampled controller of the outer loop.
     law : FeedbackLinearization
         With current limits, without voltage or slew limits.
     temperature : tuple or mapping, optional

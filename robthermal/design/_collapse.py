@@ -25,11 +25,11 @@ class Collapse:
     Parameters
     ----------
     time : ndarray, shape (n,)
-        [s].
+        Times of the samples after the step [s].
     steps : tuple of float
-        [K].
+        Sizes of the set-point steps [K].
     linearised, plain : ndarray, shape (n_steps, n, n_modules)
-        Normalised responses [-].
+        Normalized responses of the linearized loop and of the constant-gain loop [-].
     after, before : float
         Largest spread between the steps at one time, with the law and without: 0 is a linear loop.
     outcome : Outcome
@@ -74,17 +74,17 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
     Parameters
     ----------
     system : System
-        The plant.
+        System that is the plant of both loops.
     controller : Controller
         Used for both; the constant gain is the tangent of the law at the base, so that small steps agree.
     law : FeedbackLinearization
-        The law.
+        Linearizing feedback law of the first loop.
     base : float
         Temperature of all cold faces before the steps, in steady state [K].
     steps : sequence of float, optional
-        [K].
+        Sizes of the set-point steps [K].
     duration : float, optional
-        [s].
+        Simulated time after the step [s].
     inputs : mapping, optional
         Ambients [K] and heaters [unit].
 

@@ -39,7 +39,7 @@ class ConstantGain:
         v : ndarray
             Heat wanted into the cold lumps [W].
         temperatures : ndarray or mapping
-            Lump temperatures [K].
+            Temperatures of all lumps [K].
         previous : ndarray, optional
             Currents of the sample before [A].
         sample_time : float
@@ -63,11 +63,11 @@ def constant_gain(law: FeedbackLinearization, temperatures: Temperatures,
     Parameters
     ----------
     law : FeedbackLinearization
-        The law.
+        Linearizing feedback law whose tangent is taken.
     temperatures : array_like, shape (n_lumps,), or mapping of lump to temperature
-        Operating point [K].
+        Lump temperatures of the operating point [K].
     current : array_like, mapping or float, optional
-        Currents there [A].
+        Currents at the operating point [A].
 
     Returns
     -------

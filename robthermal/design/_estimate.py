@@ -24,9 +24,9 @@ class Estimate:
     Parameters
     ----------
     model : ObserverModel
-        Whose lumps.
+        Observer model that names the lumps and sensors.
     time : ndarray, shape (n,)
-        [s].
+        Times of the samples [s].
     lumps : ndarray, shape (n, n_lumps)
         Predicted from the samples before [K].
     innovation : ndarray, shape (n, n_sensors)
@@ -78,7 +78,7 @@ class Observer(ABC):
         Parameters
         ----------
         temperatures : ndarray
-            Lump temperatures [K].
+            First guess of all lump temperatures [K].
         """
 
     @abstractmethod
@@ -100,7 +100,7 @@ class Observer(ABC):
         memory : ndarray
             Memory of the observer.
         readings : ndarray
-            Sensor readings [K].
+            Readings of the sensors at this sample [K].
         inputs : mapping
             Heaters, currents and ambients held over the sample, by name [unit, A, K]; off and nominal where not given.
         """

@@ -45,7 +45,7 @@ def named(heat: Heat, row: Row) -> SimpleNamespace:
     Parameters
     ----------
     heat : Heat
-        Kind.
+        Kind of heat, which names the columns.
     row : list of float
         Of its table.
     """
@@ -144,7 +144,7 @@ def tables(eq: Equations) -> dict[str, list[Row]]:
     Parameters
     ----------
     eq : Equations
-        Whose.
+        Equations of the exported system.
     """
     found: dict[str, list[Row]] = {}
     for term in eq.terms:
@@ -165,7 +165,7 @@ def drives(eq: Equations) -> list[Row]:
     Parameters
     ----------
     eq : Equations
-        Whose.
+        Equations of the exported system.
     """
     return [[float(column), d.gain, d.offset, d.cubic, np.inf if d.clip is None else d.clip]
             for column, d in eq.drives.of.items() if d.gain or d.offset or d.cubic or d.clip]

@@ -97,7 +97,7 @@ class DisturbanceObserver(_Around):
     Parameters
     ----------
     plant : ColdSide
-        Its model.
+        Linear model of the cold side.
     controller : Controller
         Works on what is left; needs no integral action.
     A, B, L : ndarray

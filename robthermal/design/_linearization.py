@@ -115,7 +115,7 @@ class FeedbackLinearization:
         v : array_like, shape (..., n_modules), mapping, or one number for all
             Heat from the module into its cold lump [W]; negative cools.
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -162,9 +162,9 @@ class FeedbackLinearization:
         Parameters
         ----------
         current : array_like, shape (..., n_modules), mapping, or one number for all
-            [A].
+            Currents of the modules [A].
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -179,7 +179,7 @@ class FeedbackLinearization:
         Parameters
         ----------
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -193,7 +193,7 @@ class FeedbackLinearization:
         Parameters
         ----------
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -213,9 +213,9 @@ class FeedbackLinearization:
         Parameters
         ----------
         current : array_like, shape (..., n_modules), mapping, or one number for all
-            [A].
+            Currents of the modules [A].
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -232,9 +232,9 @@ class FeedbackLinearization:
         Parameters
         ----------
         voltage : array_like, shape (..., n_modules), mapping, or one number for all
-            [V].
+            Voltages across the modules [V].
         temperatures : array_like, shape (..., n_lumps), or mapping of lump to temperature
-            [K].
+            Temperatures of all lumps [K].
 
         Returns
         -------
@@ -295,7 +295,7 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     current_limits : mapping of module to (lower, upper), or one pair for all, optional
         [A]; default the certificate's, else the ranges of the system file. Within them also where these are given.
     voltage_limits : mapping of module to (lower, upper), or one pair for all, optional
-        [V].
+        Lowest and highest voltage across each module [V].
     slew : float or mapping of module to float, optional
         Largest change of current [A/s].
     certificate : UsableCurrent or Certificate, optional

@@ -34,17 +34,17 @@ class ClosedLoop:
     law : FeedbackLinearization or ConstantGain
         What turned heats into currents.
     time : ndarray, shape (n,)
-        [s].
+        Times of the samples [s].
     reference, cold : ndarray, shape (n, n_modules)
         Set-points and cold faces [K].
     lumps : ndarray, shape (n, n_lumps)
-        True temperatures [K].
+        True temperatures of all lumps [K].
     estimate : ndarray, shape (n, n_lumps)
         What the controller believed: the truth without an observer [K].
     current, voltage, wanted, achieved : ndarray, shape (n, n_modules)
         [A], [V], heats v that were asked for and, in the law's view, achieved [W].
     limit : ndarray of str, shape (n, n_modules)
-        Active limits.
+        Name of the active limit of every module; empty where none is active.
     outcome : Outcome
         "settled", "moving", "limited" or "ran_away".
     """
@@ -98,7 +98,7 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     law : FeedbackLinearization or ConstantGain
         Turns the heats into currents.
     duration : float
-        [s].
+        Simulated time from the start [s].
     inputs : mapping, optional
         Heaters [unit], ambients [K] and currents of modules the law does not drive [A], by name: a number or (n,).
     load : mapping of lump, optional

@@ -28,9 +28,9 @@ class LinearController(Controller):
     A, B, C, D : ndarray
         Discrete-time state space from errors [K] to heats [W].
     L : ndarray
-        Anti-windup gain.
+        Anti-windup gain on achieved minus wanted heat.
     sample_time : float
-        [s].
+        Time between two samples [s].
     """
 
     A: Array
@@ -70,7 +70,7 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
         From the errors r - y of the cold faces [K] to the heats v [W], in the order of the law's modules. A continuous
         one is sampled exactly with held input; a discrete one must have this sample time.
     sample_time : float
-        [s].
+        Time between two samples [s].
 
     Returns
     -------

@@ -27,7 +27,7 @@ class Matrices:
     Parameters
     ----------
     sample_time : float
-        [s].
+        Time between two samples [s].
     modules : int
         Number of modules.
     lumps : tuple of str

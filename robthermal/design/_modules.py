@@ -33,9 +33,9 @@ class ModuleSet:
     Parameters
     ----------
     system : System
-        Whose.
+        System that contains the modules.
     names : tuple of str
-        Modules.
+        Names of the modules, in order.
     """
 
     system: System

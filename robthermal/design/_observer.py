@@ -88,7 +88,7 @@ class GainObserver(Observer):
         current : mapping of module to (lower, upper)
             [A], every module named.
         temperature : (lower, upper) or mapping of lump to (lower, upper)
-            [K].
+            Temperature range of all lumps, or of each [K].
 
         Returns
         -------
@@ -106,7 +106,7 @@ class GainObserver(Observer):
         current : mapping of module to (lower, upper)
             [A], every module named.
         temperature : (lower, upper) or mapping of lump to (lower, upper)
-            [K].
+            Temperature range of all lumps, or of each [K].
 
         Returns
         -------
@@ -125,7 +125,7 @@ class GainObserver(Observer):
         Parameters
         ----------
         temperature : (lower, upper) or mapping of lump to (lower, upper)
-            [K].
+            Temperature range of all lumps, or of each [K].
         direction : {"symmetric", "cooling", "heating"}, optional
             Sign of the currents.
 
@@ -163,11 +163,11 @@ def observer(system: Any, sensors: Sequence[str], *, sample_time: float = 1.0,
     Parameters
     ----------
     system : System
-        Calibrated.
+        System with calibrated parameters.
     sensors : sequence of str
         Names of sensors.
     sample_time : float, optional
-        [s].
+        Time between two samples [s].
     method : {"kalman", "positive", "lmi", "ekf"}, optional
         Steady Kalman gain of the passive network; a gain that keeps the error matrix nonnegative and contracts over a
         box; the gain nearest to the Kalman gain whose error decays in one quadratic norm over a box, by a linear matrix

@@ -22,11 +22,11 @@ class ObserverModel:
     Parameters
     ----------
     system : System
-        Whose.
+        System whose lumps are estimated.
     sensors : tuple of str
         Sensors it reads.
     sample_time : float
-        [s].
+        Time between two samples [s].
     A_d : ndarray, shape (n, n)
         exp(E⁻¹A h) of the passive network, with the modules' conductance at the reference temperature.
     Gamma : ndarray, shape (n, n)
@@ -49,7 +49,7 @@ class ObserverModel:
         Parameters
         ----------
         system : System
-            Whose model.
+            System whose lumps are estimated.
         sensors : sequence of str
             Sensors in use.
         sample_time : float
@@ -99,7 +99,7 @@ class ObserverModel:
         Parameters
         ----------
         x : ndarray
-            Lump temperatures [K].
+            Temperatures of all lumps [K].
         u : ndarray
             Heaters, currents and ambients [unit, A, K].
         """
@@ -112,7 +112,7 @@ class ObserverModel:
         Parameters
         ----------
         x : ndarray
-            Lump temperatures [K].
+            Temperatures of all lumps [K].
         u : ndarray
             Heaters, currents and ambients [unit, A, K].
         """
@@ -125,7 +125,7 @@ class ObserverModel:
         Parameters
         ----------
         x : ndarray
-            Lump temperatures [K].
+            Temperatures of all lumps [K].
         u : ndarray
             Heaters, currents and ambients [unit, A, K].
         """
@@ -137,7 +137,7 @@ class ObserverModel:
         Parameters
         ----------
         readings : ndarray
-            Sensor readings [K].
+            Readings of the observer's sensors [K].
         """
         T_ref = next(iter(self.system.ambients.values())).temperature
         parts = [self.system.sensors[name] for name in self.sensors]
@@ -171,7 +171,7 @@ def unobservable(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     system : System
         Its conduction is symmetric: modes are orthogonal in the capacities.
     sensors : sequence of str
-        Names.
+        Names of the sensors that are read.
 
     Returns
     -------

@@ -23,9 +23,9 @@ class PID(Controller):
     Parameters
     ----------
     proportional : ndarray, shape (n_modules,)
-        Kp [W/K].
+        Proportional gain Kp of every module [W/K].
     integral : ndarray, shape (n_modules,)
-        Ki [W/(K s)].
+        Integral gain Ki of every module [W/(K s)].
     derivative : ndarray, shape (n_modules,)
         Kd [W s/K]; acts on the measurement.
     filter_time : float
@@ -33,7 +33,7 @@ class PID(Controller):
     tracking_time : ndarray, shape (n_modules,)
         Time in which the integrator gives way to an active limit [s].
     sample_time : float
-        [s].
+        Time between two samples [s].
     """
 
     proportional: Array
@@ -76,7 +76,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     plant : ColdSide
         What it controls.
     sample_time : float
-        [s].
+        Time between two samples [s].
     bandwidth : float, optional
         Tune a PI for this crossover frequency [rad/s]: the modulus of Kp G is 1 there, integral action takes over a
         factor four below.

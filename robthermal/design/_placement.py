@@ -33,9 +33,9 @@ class Placement:
     sensors : tuple of str
         Smallest set found whose observer is certified; empty if none is.
     observer : GainObserver or None
-        Its observer.
+        Observer that reads these sensors.
     certificate : Certificate or None
-        Its certificate.
+        Certificate of that observer's decay.
     best : dict
         Number of sensors to (sensors, spectral radius of the frozen error over the box) of the best set of that size.
     outcome : Outcome
@@ -83,11 +83,11 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     current : mapping of module to (lower, upper)
         [A], every module named.
     temperature : (lower, upper) or mapping of lump to (lower, upper)
-        [K].
+        Temperature range of all lumps, or of each [K].
     candidates : sequence of str, optional
         Sensors to choose from; default all that are faster than a sample.
     sample_time : float, optional
-        [s].
+        Time between two samples [s].
     largest : int, optional
         Largest set to look at; all sizes up to it are tabulated for the trade-off.
     method, process_noise

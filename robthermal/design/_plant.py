@@ -28,7 +28,7 @@ class ColdSide:
     law : FeedbackLinearization
         Whose modules drive it.
     lumps : tuple of str
-        States.
+        Lumps of the cold side, the states of the plant.
     around : tuple of str
         What else acts: heaters, ambients, and hot faces that touch the cold side through a link. In this order they
         are the inputs after the modules' heats.
@@ -86,7 +86,7 @@ class ColdSide:
         Parameters
         ----------
         temperatures : ndarray or mapping
-            Lump temperatures [K].
+            Temperatures of all lumps [K].
         exogenous : ndarray
             Heaters, currents and ambients in the order of `System.exogenous_names` [unit, A, K].
         """
@@ -101,7 +101,7 @@ class ColdSide:
         Parameters
         ----------
         reference : ndarray
-            Set-points [K].
+            Set-points of the cold faces [K].
         around : ndarray
             Temperatures of the surroundings [K].
         """
@@ -117,7 +117,7 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     Parameters
     ----------
     law : FeedbackLinearization
-        The law.
+        Linearizing feedback law whose modules drive the plant.
     temperatures : array_like, shape (n_lumps,), optional
         Where natural convection and radiation are linearised [K]; default the initial temperatures. The links of
         modules and conduction are linear: for them it does not matter.

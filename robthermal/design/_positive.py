@@ -23,7 +23,7 @@ class PositiveGain:
     Parameters
     ----------
     gain : ndarray, shape (n, n_sensors)
-        L.
+        Observer gain L from sensors to lumps.
     weights : ndarray, shape (n,)
         c: Σ c_i |e_i| shrinks by `rate` every sample, as computed here in floating point.
     rate : float

@@ -35,9 +35,9 @@ class Norm:
     matrix, storage : ndarray, shapes (n, n) and (n + 2 m, n + 2 m)
         P, and Φ = diag(factor² P, 0) - multipliers of the m modules.
     model : ndarray, shape (n, n + 2 m)
-        [A, B].
+        Error dynamics side by side, [A, B].
     reads : ndarray, shape (n_sensors, n + 2 m)
-        [C, 0].
+        Sensor matrix side by side with zeros, [C, 0].
     """
 
     margin: float

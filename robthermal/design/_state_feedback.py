@@ -30,11 +30,11 @@ class StateFeedback(Controller):
     K, reference_gain : ndarray
         (n_modules, n) [W/K] and (n_modules, n_modules) [W/K].
     integral : ndarray, shape (n_modules, n_modules)
-        [W/(K s)].
+        Integral gain on the control errors [W/(K s)].
     tracking_time : float
         Time in which the integrators give way to an active limit [s].
     sample_time : float
-        [s].
+        Time between two samples [s].
     outcome : Outcome
         What is known about the loop.
     """
@@ -74,7 +74,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     plant : ColdSide
         What it controls; all its lumps are fed back, measured or estimated (`observer`).
     sample_time : float
-        [s].
+        Time between two samples [s].
     bandwidth : float, optional
         LQR tuned like this [rad/s]: the error, and its integral times the bandwidth, are weighed against the heat that
         moves a face by as much at this frequency.

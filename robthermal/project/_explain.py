@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from .. import errors
 from ..diagnosis import Effect, Quantity, effects
 from ..errors import InputError
-from ..verification._kinds import KINDS
+from ..verification import KINDS
 from ._assumptions import ARITHMETIC, kind_assumptions
 from ._codes import GateCode
 from ._outcomes import Said, outcome_codes

@@ -24,7 +24,7 @@ class Claim:
     Parameters
     ----------
     title : str
-        Short name.
+        Short name of the claim.
     sentence : str
         What is claimed, in full.
     holds : bool
@@ -127,7 +127,7 @@ class Section:
     Parameters
     ----------
     title : str
-        Heading.
+        Heading of the section.
     text : str
         Plain paragraphs separated by blank lines.
     figures : sequence of Figure, optional
@@ -170,7 +170,7 @@ class Report:
     label : str
         Banner such as "SIMULATED DATA"; empty for none.
     claims : sequence of Claim
-        First screen.
+        Claims for the first screen.
     sections : sequence of Section
         Below, in order.
     provenance : mapping

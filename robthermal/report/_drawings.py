@@ -73,7 +73,7 @@ def box_ranges(names: Sequence[str], low: ArrayLike, high: ArrayLike, unit: str 
     Parameters
     ----------
     names : sequence of str
-        Lumps.
+        Names of the lumps.
     low, high : array_like
         Ends of the ranges [unit].
     unit : str, optional

@@ -16,7 +16,7 @@ class Evidence:
     Parameters
     ----------
     title : str
-        Short name.
+        Short name of the claim.
     file : str
         Certificate file, relative to the report.
     sha256 : str
@@ -30,7 +30,7 @@ class Evidence:
     valid : bool or None
         What the independent check said; None if there was nothing to check.
     reason : str, optional
-        Why not.
+        Why the check did not confirm it.
     margins : mapping of str to float, optional
         Margins the check found again [unit of each margin].
     seconds : float, optional

@@ -24,7 +24,7 @@ class Figure:
     alt : str
         What a reader who cannot see it needs to know.
     caption : str
-        Printed below.
+        Text printed below the drawing.
 
     Raises
     ------
@@ -57,11 +57,11 @@ class Figure:
         Parameters
         ----------
         figure : matplotlib.figure.Figure
-            Finished drawing.
+            Finished drawing, which is closed.
         alt : str
             What a reader who cannot see it needs to know.
         caption : str
-            Printed below.
+            Text printed below the drawing.
 
         Returns
         -------

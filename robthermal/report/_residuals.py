@@ -20,13 +20,13 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     Parameters
     ----------
     time : array_like
-        Sample times [s].
+        Times of the samples [s].
     before, after : mapping
         {sensor: measured − model} [K], of the same sensors.
     noise : float, optional
         Band of twice this size [K]; none by default.
     title : str, optional
-        Heading.
+        Heading of the drawing.
 
     Returns
     -------
@@ -71,13 +71,13 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
     Parameters
     ----------
     frequency : array_like
-        [Hz].
+        Frequencies of the spectra [Hz].
     before, after : mapping
         {channel: size} of the same channels.
     unit : str
         Of the sizes.
     title : str, optional
-        Heading.
+        Heading of the drawing.
 
     Returns
     -------

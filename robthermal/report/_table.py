@@ -23,9 +23,9 @@ class Printed:
     caption : str
         What it shows.
     header : sequence of str
-        Column titles.
+        Titles of the columns.
     rows : sequence of sequence of str
-        Cells.
+        Text of the cells, row by row.
     numeric : sequence of bool
         Which columns hold numbers, and are set flush right.
     left_out : int, optional

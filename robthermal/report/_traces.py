@@ -25,7 +25,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     Parameters
     ----------
     time : array_like
-        Sample times [s].
+        Times of the samples [s].
     measured : mapping
         {sensor: readings} [K]; NaN leaves a gap.
     model : mapping
@@ -33,7 +33,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     residual : bool, optional
         Whether the residual, measured − modelled, is drawn below.
     title : str, optional
-        Heading.
+        Heading of the drawing.
 
     Returns
     -------

@@ -39,7 +39,7 @@ def design_check(
     u : array_like, shape (n,) or (n, n_u), or list of such, or Excitation
         Inputs in their units; a list (or an `Excitation`) is several experiments of equal length, one estimate.
     sample_time : float
-        [s].
+        Time between two samples [s].
     model : optional
         Nominal machine: a python-control model or any object with `poles()` [rad/s], such as an rt.System. With a
         state space (its inputs the columns of `u`) the response and the mean temperature rise are told too.

@@ -22,7 +22,7 @@ class DesignCheck:
     Parameters
     ----------
     frequencies : ndarray, shape (n_f,)
-        Excited lines [Hz].
+        Excited frequency lines [Hz].
     poles : ndarray, shape (n_p,)
         Poles slower than the samples [rad/s], slowest first, one of each pair.
     pole_errors : ndarray, shape (n_p, n_f)
@@ -38,7 +38,7 @@ class DesignCheck:
     noise : ndarray, shape (n_y,), or None
         Standard deviation of the output noise.
     response : ndarray, shape (n_y, n_u, n_f), or None
-        Nominal response.
+        Frequency response of the nominal model.
     mean_heat : ndarray, shape (n_u,)
         Mean heat per input [W].
     heat_range : ndarray, shape (n_u, 2)
@@ -48,11 +48,11 @@ class DesignCheck:
     mean_rise : ndarray, shape (n_y,), or None
         Rise of each output in the end, by the mean of the inputs, in the unit of the outputs.
     sample_time : float
-        [s].
+        Time between two samples [s].
     n_samples : int
         Of one experiment [samples].
     n_experiments : int
-        [-].
+        Number of experiments [-].
     method : str
         The estimator the numbers hold for.
     """

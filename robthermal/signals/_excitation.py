@@ -52,7 +52,7 @@ def multisines(
     inputs : int
         Number of inputs [-].
     sample_time : float
-        [s].
+        Time between two samples [s].
     seed : int
         Of the random phases.
     arrangement : {"orthogonal", "zippered", "independent"}, optional

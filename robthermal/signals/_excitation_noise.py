@@ -32,9 +32,9 @@ def noise(
     Parameters
     ----------
     n_samples : int
-        Length [samples].
+        Length of the signal [samples].
     sample_time : float
-        [s].
+        Time between two samples [s].
     seed : int
         The same seed gives the same signal.
     rms : float
@@ -110,7 +110,7 @@ def prbs(
     order : int
         Length of the shift register, 2 to 24: one period has 2^order - 1 bits.
     sample_time : float
-        [s].
+        Time between two samples [s].
     hold : float
         Time each bit is held [s], a whole number of samples. Power falls with frequency, to half at 0.44 / hold [Hz].
     low, high : float

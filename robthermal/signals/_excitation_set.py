@@ -24,9 +24,9 @@ class Excitation:
     lines : tuple of ndarray
         Excited lines of each input; line k has the frequency k / (period * sample_time) [Hz].
     period : int
-        [samples].
+        Length of one period [samples].
     sample_time : float
-        [s].
+        Time between two samples [s].
     arrangement : str
         "orthogonal", "zippered" or "independent".
     phases : str

@@ -36,7 +36,7 @@ def multisine(
     period : int
         Length of one period [samples]. Line k has the frequency k / (period * sample_time) [Hz].
     sample_time : float
-        [s].
+        Time between two samples [s].
     seed : int
         Of the random phases: the same seed gives the same signal.
     band : (float, float), optional

@@ -45,7 +45,7 @@ class Record:
     units : mapping of str to str, optional
         Channel name to unit. Temperatures are in kelvin: ``"K"``.
     name : str, optional
-        For reports.
+        Name of the record, as reports show it.
     notes : sequence of str, optional
         What was done to the data on the way, in words.
     imported : Import, optional
@@ -225,7 +225,7 @@ class Record:
         Parameters
         ----------
         outputs : array_like, shape (n_samples, n_outputs)
-            Temperatures in [K].
+            Temperatures of the new outputs [K].
         output_names : sequence of str, optional
             Default: the present ones.
 

@@ -20,7 +20,7 @@ def staircase(levels: ArrayLike, dwell: float, *, sample_time: float) -> NDArray
     dwell : float
         Time each level is held [s], a whole number of samples.
     sample_time : float
-        [s].
+        Time between two samples [s].
 
     Returns
     -------

@@ -46,7 +46,7 @@ def kelvin_to_celsius(temperature: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     temperature : array_like
-        [K].
+        Thermodynamic temperatures to convert [K].
 
     Returns
     -------

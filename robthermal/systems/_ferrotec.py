@@ -48,7 +48,7 @@ def surrogate_module(hot: str, cold: str, current_limits: tuple[float, float] | 
     hot, cold : str
         Lumps of the two faces.
     current_limits : tuple of float, optional
-        [A].
+        Lowest and highest allowed current [A].
 
     Returns
     -------

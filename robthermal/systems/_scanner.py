@@ -84,7 +84,7 @@ class Scanner:
     positions : tuple of float
         Positions of the measurements, in half strokes [-].
     sample_time : float
-        [s].
+        Time between two samples [s].
     names : tuple of str
         Names of the stages.
     """

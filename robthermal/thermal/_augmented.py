@@ -22,9 +22,9 @@ class Augmented:
     Parameters
     ----------
     F : ndarray, shape (n_z, n_z)
-        [1/s].
+        Matrix of the linear dynamics [1/s].
     B : ndarray, shape (n_z, n_w)
-        Held drives.
+        Effect of the drives, constant over a segment, on the states.
     N : ndarray, shape (n_z, n_q)
         Heat of every target [K/J].
     ports : ndarray of int

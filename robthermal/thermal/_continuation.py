@@ -48,7 +48,7 @@ def follow(F: Callable[[Array, float], Array], J: Callable[[Array, float], Array
     inside : callable
         Whether y is still of interest.
     steps : int
-        Longest curve.
+        Largest number of steps along the curve.
 
     Returns
     -------

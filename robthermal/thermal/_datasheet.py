@@ -23,11 +23,11 @@ class ModuleParameters:
     Parameters
     ----------
     seebeck : float
-        S [V/K].
+        Seebeck coefficient S of the module [V/K].
     resistance : float
-        R [Ω].
+        Electrical resistance R of the module [Ω].
     conductance : float
-        K [W/K].
+        Thermal conductance K of the module [W/K].
 
     Examples
     --------
@@ -130,11 +130,11 @@ def module_from_datasheet(*, v_max: float, i_max: float, dt_max: float, t_hot: f
     Parameters
     ----------
     v_max : float
-        [V].
+        Rated voltage at the current of largest temperature difference [V].
     i_max : float
-        [A].
+        Rated current of largest temperature difference [A].
     dt_max : float
-        [K]; a difference.
+        Largest temperature difference between the faces [K], without heat load.
     t_hot : float
         Hot-side temperature at which the sheet holds [K]; vendors use 25, 27 or 50 °C.
     q_max : float, optional

@@ -27,7 +27,7 @@ class Drives:
     Parameters
     ----------
     system : System
-        Whose.
+        System whose heaters and modules are driven.
     """
 
     def __init__(self, system: System):

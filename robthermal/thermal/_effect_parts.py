@@ -18,15 +18,15 @@ class Drive(Part):
     gain : float
         Relative gain error [-].
     offset : float
-        [unit of the column].
+        Value added to the scaled column [unit of the column].
     cubic : float
-        Saturation [1/unit²].
+        Coefficient of the cubic saturation [1/unit²].
     clip : float, optional
-        Largest modulus [unit].
+        Largest modulus of the value [unit of the column].
     delay : float
-        Pure delay [s].
+        Pure time delay of the drive [s].
     time_constant : float
-        First-order lag [s].
+        Time constant of the first-order lag [s].
     """
 
     gain: Finite = 0.0
@@ -45,9 +45,9 @@ class Hysteresis(Part):
     Parameters
     ----------
     heat : float
-        [W].
+        Amplitude of the heat into the cold face [W].
     time_constant : float
-        [s].
+        Time constant of the memory's relaxation [s].
     """
 
     heat: Finite = 0.0
@@ -60,11 +60,11 @@ class Periodic(Part):
     Parameters
     ----------
     heat : float
-        Amplitude [W].
+        Amplitude of the heat [W].
     period : float
-        [s].
+        Duration of one period [s].
     phase : float
-        [rad].
+        Phase of the sine at time zero [rad].
     """
 
     heat: Finite = 0.0
@@ -78,9 +78,9 @@ class Condensation(Part):
     Parameters
     ----------
     conductance : float
-        [W/K].
+        Heat released per kelvin below the dew point [W/K].
     dew_point : float
-        [K].
+        Temperature below which water condenses [K].
     """
 
     conductance: NonNegative = 0.0
@@ -93,9 +93,9 @@ class Feedthrough(Part):
     Parameters
     ----------
     lump : str
-        Which.
+        Name of the lump that receives the share.
     share : float
-        [-].
+        Share of the heater's heat that goes there [-].
     """
 
     lump: Name
@@ -123,13 +123,13 @@ class Lead(Part):
     Parameters
     ----------
     module : str
-        Whose current.
+        Name of the module whose current flows through the lead.
     lump : str
         Where the heat goes.
     resistance : float
-        [Ω].
+        Electrical resistance of lead or contact [Ω].
     name : str
-        Default "module-lump".
+        Name of the lead; default "module-lump".
     """
 
     module: Name

@@ -186,7 +186,7 @@ class Equations:
         Parameters
         ----------
         x : array_like, shape (..., n)
-            Temperatures [K].
+            Temperatures of all lumps [K].
         u : array_like, shape (..., n_u)
             Exogenous values, as in a record [unit, A, K].
 
@@ -209,9 +209,9 @@ class Equations:
         Parameters
         ----------
         x : array_like, shape (n,)
-            Temperatures [K].
+            Temperatures of all lumps [K].
         u : array_like, shape (n_u,)
-            Exogenous values [unit, A, K].
+            Exogenous values: heaters [unit], currents [A], ambients [K].
 
         Returns
         -------

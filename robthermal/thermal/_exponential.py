@@ -55,7 +55,7 @@ class Integrator:
     Parameters
     ----------
     eq : Equations
-        The system.
+        Equations of the system to integrate.
     lengths : tuple of float
         Of the segments; the first is the sample time [s].
     tolerance : float

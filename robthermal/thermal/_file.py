@@ -94,7 +94,7 @@ def write_system(system: System, path: str | Path) -> None:
     system : System
         What to write.
     path : str or Path
-        Where to.
+        File to write, TOML.
 
     Examples
     --------

@@ -55,7 +55,7 @@ class FixedPoint:
         start : ndarray, shape (n_z,)
             State at the start.
         w : ndarray, shape (samples, n_w)
-            Held drives.
+            Drives, constant over every sample.
         """
         heat, n_ports, nodes = self._heat, self._heat.ports.size, self._nodes
         V = np.empty((n_ports + w.shape[1], nodes))

@@ -27,7 +27,7 @@ class Layer:
     name : str
         Its lumps are called name1, name2, …
     thickness : float
-        [m].
+        Thickness of the layer, along the heat flow [m].
     material : str or Material
         Of `materials`, or your own.
     lumps : int
@@ -98,7 +98,7 @@ class Assembly:
         name : str
             For example "room".
         temperature : float
-            [K].
+            Nominal temperature of the surroundings [K].
         """
         self._new(name)
         self._ambients[name] = kelvin(temperature, f"ambient {name!r} temperature")
@@ -111,7 +111,7 @@ class Assembly:
         name : str
             Name of the lump.
         capacity : float
-            [J/K].
+            Heat capacity of the body [J/K].
 
         Returns
         -------
@@ -131,13 +131,13 @@ class Assembly:
         name : str
             The lumps are called name1, name2, …
         length : float
-            [m].
+            Length of the rod, along the heat flow [m].
         area : float
             Of the section [m²].
         material : str or Material
             Of `materials`, or your own.
         lumps : int
-            How many [-].
+            Number of lumps it is cut into [-].
         perimeter : float
             Of the section, where it loses heat [m].
         convection : float
@@ -187,7 +187,7 @@ class Assembly:
         parts : sequence of Layer or Contact
             From one face to the other; without a `Contact` two layers touch perfectly.
         area : float
-            [m²].
+            Cross-section of all layers [m²].
 
         Returns
         -------
@@ -235,7 +235,7 @@ class Assembly:
         area : float, optional
             Of the contact [m²]; default: the smaller end face.
         contact_resistance : float
-            [m² K/W].
+            Thermal resistance of the joint times its area [m² K/W].
         convection : float, optional
             Film coefficient [W/(m² K)], for a face in a fluid.
 
@@ -288,7 +288,7 @@ class Assembly:
         Parameters
         ----------
         name : str
-            For reports.
+            Name of the system, as reports show it.
         links : sequence of Link
             Further heat paths, beside those of the geometry.
         **parts

@@ -96,13 +96,13 @@ def run_implicit(eq: Equations, x0: Array, u: Array, h: float, tolerance: float,
     Parameters
     ----------
     eq : Equations
-        The network.
+        Equations of the network.
     x0 : ndarray, shape (n,)
-        Initial temperatures [K].
+        Initial temperatures of all lumps [K].
     u : ndarray, shape (n_samples, n_u)
-        Held inputs.
+        Exogenous values of every sample, constant until the next.
     h : float
-        Sample time [s].
+        Time between two samples [s].
     tolerance : float
         Accepted error per step [K].
     keep : ndarray of int

@@ -18,7 +18,7 @@ class Layout:
     Parameters
     ----------
     eq : Equations
-        Whose.
+        Equations of the system whose states are laid out.
     """
 
     eq: Equations

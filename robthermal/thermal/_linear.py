@@ -28,7 +28,7 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     Parameters
     ----------
     system : System
-        Whose.
+        System to linearize at an operating point.
     temperatures : array_like or mapping, optional
         Lump temperatures of the operating point [K]; default: initial temperatures. It need not be an equilibrium.
     inputs : mapping, optional

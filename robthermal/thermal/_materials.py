@@ -20,13 +20,13 @@ class Material:
     Parameters
     ----------
     name : str
-        For messages.
+        Name of the material, as messages show it.
     conductivity : float
-        k [W/(m K)].
+        Thermal conductivity k [W/(m K)].
     density : float
-        [kg/m³].
+        Mass per volume [kg/m³].
     specific_heat : float
-        [J/(kg K)].
+        Specific heat capacity at constant pressure [J/(kg K)].
     source : str
         Where the numbers come from.
     conductivity_range : tuple of float, optional

@@ -80,7 +80,7 @@ def system_from_matrices(E: Any, A: Any, B: Any = None, *, ambients: Mapping[str
     sensors : mapping, optional
         As in `System`.
     name : str
-        For reports.
+        Name of the system, as reports show it.
     lump_mass : bool
         Replace a consistent (non-diagonal) mass matrix by its row sums; the heat stored by a uniform temperature stays.
     tolerance : float

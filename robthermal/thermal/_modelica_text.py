@@ -19,7 +19,7 @@ class Text:
     Parameters
     ----------
     title : str
-        Its comment.
+        Comment that describes the model.
     name : str
         Its name, before the characters that Modelica does not allow become underscores.
     """
@@ -93,7 +93,7 @@ class Text:
         key, unit, comment : str
             Wanted name, unit, and what it is.
         value : float
-            Number.
+            Numerical value in that unit.
         """
         name = self._new(key)
         self._declare(f"parameter Real {name}", unit, f" = {float(value)!r}", comment)
@@ -122,7 +122,7 @@ class Text:
         key, unit : str
             As in `column`.
         time_constant, source, start : str
-            Expressions.
+            Modelica expressions of time constant, source and initial value.
         """
         name = self._new(key)
         self._declare(f"Real {name}", unit, "", "")

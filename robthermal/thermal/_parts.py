@@ -36,7 +36,7 @@ class Lump(Part):
     Parameters
     ----------
     capacity : float
-        Heat capacity [J/K].
+        Heat capacity of the lump [J/K].
     disturbance : float
         Unmeasured random heat [W/√Hz].
     initial : float, optional
@@ -46,7 +46,7 @@ class Lump(Part):
     gradient : float
         What its links to ambients see is the ambient plus this [K].
     periodic : Periodic, optional
-        Periodic heat.
+        Periodic heat into the lump.
     condensation : Condensation, optional
         Heat below the dew point.
     """
@@ -66,7 +66,7 @@ class Natural(Part):
     Parameters
     ----------
     gain : float
-        [W/K^(1+exponent)].
+        Heat at a difference of one kelvin, G_n [W/K^(1+exponent)].
     exponent : float
         [-]; 0.25 for laminar flow.
     """
@@ -83,7 +83,7 @@ class Link(Part):
     between : tuple of str
         The two ends.
     conductance : float
-        Linear part [W/K].
+        Thermal conductance of the linear part [W/K].
     natural : Natural, optional
         Natural convection added to it.
     radiation : float, optional
@@ -91,7 +91,7 @@ class Link(Part):
     step : Step, optional
         Sudden change of the linear part.
     name : str
-        Default "a-b".
+        Name of the link; default "a-b".
     """
 
     between: tuple[Name, Name]
@@ -120,7 +120,7 @@ class Input(Part):
     lump : str
         Where its heat goes.
     gain : float
-        [W per unit of the record column].
+        Heat per unit of the record column [W/unit].
     limits : tuple of float, optional
         Range of the record column [unit].
     unit : str, optional
@@ -152,7 +152,7 @@ class Linear(Part):
     value : float
         At the reference temperature.
     slope : float
-        Per kelvin.
+        Change of the property per kelvin [unit of the property/K].
     """
 
     value: Positive
@@ -167,15 +167,15 @@ class Module(Part):
     hot, cold : str
         Lumps of its two faces.
     seebeck : Linear
-        S(T_avg) [V/K, V/K²].
+        Seebeck coefficient S(T_avg) [V/K], slope [V/K²].
     resistance : Linear
-        R(T_avg) [Ω, Ω/K].
+        Electrical resistance R(T_avg) [Ω], slope [Ω/K].
     conductance : Linear
-        K(T_avg) [W/K, W/K²].
+        Thermal conductance K(T_avg) [W/K], slope [W/K²].
     reference_temperature : float
-        [K].
+        Mean temperature at which the three properties have their values [K].
     current_limits : tuple of float, optional
-        [A].
+        Lowest and highest allowed current [A].
     thomson : float
         Thomson coefficient: ½ thomson I (T_hot - T_cold) is taken from both faces [V/K].
     joule_split : float
@@ -227,13 +227,13 @@ class Sensor(Part):
     noise : float
         Standard deviation [K]; 0 means not declared.
     time_constant : float
-        First-order lag [s].
+        Time constant of the first-order lag [s].
     offset : float
-        [K].
+        Constant error added to the reading [K].
     gain : float
-        [-].
+        Factor on the distance from T_ref [-].
     delay : float
-        Pure delay [s].
+        Pure time delay of the reading [s].
     self_heating : float
         Heat of the sensor into its lump [W].
     """

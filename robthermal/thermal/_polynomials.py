@@ -22,11 +22,11 @@ class Polynomials:
     Parameters
     ----------
     seebeck : tuple of float
-        [V/K], [V/K²], …
+        Coefficients of the Seebeck coefficient S [V/K], [V/K²], …
     resistance : tuple of float
-        [Ω], [Ω/K], …
+        Coefficients of the electrical resistance R [Ω], [Ω/K], …
     conductance : tuple of float
-        [W/K], [W/K²], …
+        Coefficients of the thermal conductance K [W/K], [W/K²], …
     couples : int
         Couples of the reference module [-].
     i_max : float
@@ -60,7 +60,7 @@ class Polynomials:
         Parameters
         ----------
         temperature : array_like
-            [K].
+            Mean temperature of the module [K].
         couples : int, optional
             Default: those of the reference module.
         i_max : float, optional
@@ -112,7 +112,7 @@ class PolynomialFit:
         hot, cold : str
             Lumps of the two faces.
         current_limits : tuple of float, optional
-            [A].
+            Lowest and highest allowed current [A].
 
         Returns
         -------
@@ -143,7 +143,7 @@ def module_from_polynomials(polynomials: Polynomials, *, couples: int, i_max: fl
     couples : int
         Couples of the module [-].
     i_max : float
-        Its Imax [A].
+        Rated current Imax of the module [A].
     t_range : tuple of float
         Temperatures the straight lines must serve [K].
 

@@ -22,7 +22,7 @@ class PortHeat:
     Parameters
     ----------
     eq : Equations
-        Whose terms.
+        Equations whose terms are evaluated.
     ports : ndarray of int
         States that the terms need: lumps, lagged drives.
     N : ndarray, shape (n_z, n_q)

@@ -24,7 +24,7 @@ class Reduction:
     model : control.StateSpace
         Reduced model; the full one when no order meets the tolerance.
     order : int
-        Its states.
+        Number of states of the reduced model.
     error : float
         Largest singular value of the error over frequency, computed from the error system (lower bound, exact to 1e-4).
     bound : float

@@ -27,7 +27,7 @@ class LoadCurve:
     Parameters
     ----------
     system : System
-        Whose.
+        System whose equilibria these are.
     setpoint : dict
         Module to temperature of its cold face [K].
     current : ndarray, shape (n, n_modules)
@@ -35,7 +35,7 @@ class LoadCurve:
     load : ndarray, shape (n, n_modules)
         Heat every module takes from its cold face [W].
     temperatures : ndarray, shape (n, n_lumps)
-        [K].
+        Steady temperatures of all lumps [K].
     slowest : ndarray, shape (n,)
         Largest eigenvalue of the regulated machine [1/s]; negative: stable.
     """

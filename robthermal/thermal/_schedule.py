@@ -28,7 +28,7 @@ class Schedule:
     u : ndarray, shape (n_segments, n_u)
         Exogenous values, delayed.
     w : ndarray, shape (n_segments, n_w)
-        Drives.
+        Drives, constant over every segment.
     samples : ndarray of int, shape (n_samples,)
         Segment that starts at every sample; the last one is never left.
     """
@@ -47,7 +47,7 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
     Parameters
     ----------
     eq : Equations
-        Whose drives.
+        Equations whose drives follow from the record.
     u : ndarray, shape (n_samples, n_u)
         Columns of the record.
     h, start : float

@@ -39,7 +39,7 @@ class Sensitivity:
     integrator : Integrator
         Whose steps are differentiated.
     names : sequence of str
-        Parameter names.
+        Names of the parameters of differentiation.
     held : mapping of str to ndarray, shape (n_segments, n_w)
         Derivative of the drives with respect to those parameters that act on them.
     jumps : mapping of str to ndarray, shape (n_segments, n_free)
@@ -83,7 +83,7 @@ class Sensitivity:
         path : Path
             From `Integrator.run`.
         plan : Schedule
-            Its drives.
+            Schedule with the drives of the path.
         start : ndarray, shape (n_z, n_parameters)
             Derivative of the initial state.
 

@@ -36,9 +36,9 @@ class Trajectory:
     system : System
         What was simulated.
     time : ndarray, shape (n,)
-        Samples [s].
+        Times of the samples [s].
     lumps : ndarray, shape (n, n_lumps)
-        Temperatures [K].
+        Temperatures of all lumps [K].
     readings : ndarray, shape (n, n_sensors)
         Noise-free sensor readings [K].
     stored, ambient_heat, heater_heat, electrical_energy : ndarray

@@ -49,7 +49,7 @@ class SteadyState:
     Parameters
     ----------
     system : System
-        Whose.
+        System whose steady states these are.
     equilibria : tuple of Equilibrium
         In order along the curve from rest.
     reached : float
@@ -95,7 +95,7 @@ def steady_state(system: System, inputs: Mapping[str, float] | None = None, *,
     Parameters
     ----------
     system : System
-        Whose.
+        System whose steady states are wanted.
     inputs : mapping, optional
         Heaters [unit], module currents [A] and ambients [K] by name; default off and nominal.
     setpoint : mapping, optional

@@ -29,7 +29,7 @@ class Stepper:
     system : System
         What to simulate.
     sample_time : float
-        [s].
+        Time between two samples [s].
     initial : array_like or mapping of lump to float, optional
         Temperatures at the start [K]; default the system's initial ones.
     loads : iterable of str, optional
@@ -42,7 +42,7 @@ class Stepper:
     state : ndarray
         Lump temperatures [K], then those of lagged sensors [K], then energy meters [J].
     time : float
-        [s].
+        Time reached by the simulation [s].
 
     Raises
     ------

@@ -28,11 +28,11 @@ class System(Part):
     Parameters
     ----------
     name : str
-        For reports.
+        Name of the system, as reports show it.
     ambients, lumps, inputs, modules, sensors : mapping
         Name to part; plain dictionaries are accepted.
     links : sequence of Link
-        Heat paths.
+        Heat paths between lumps, or to ambients.
     leads : sequence of Lead
         Heat of the modules' leads and contacts.
     fit : mapping

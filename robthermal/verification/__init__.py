@@ -6,6 +6,7 @@ Imports the standard library, numpy and python-flint, and no solver: nothing a s
 from __future__ import annotations
 
 from ._certificate import Certificate as Certificate
+from ._kinds import KINDS as KINDS
 from ._machine import machine_hash as machine_hash
 from ._machine import same_system as same_system
 from ._verify import Verdict as Verdict

@@ -31,7 +31,7 @@ class Verdict:
     valid : bool
         Whether the claim was proven from the certificate's data.
     margins : dict
-        Recomputed margins [unit of each margin].
+        Margins that the checker computed [unit of each margin].
     reason : str
         The inequality that fails, or how it was proven; never empty when not valid.
     seconds : float

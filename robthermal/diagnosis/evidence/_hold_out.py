@@ -50,7 +50,7 @@ class ValidationResiduals:
     name : str
         Name of the record.
     time : ndarray, shape (n,)
-        Sample times [s].
+        Times of the samples [s].
     before, after : dict
         {sensor: measured − modelled (n,)} [K], nominal system refitted and with the effects; NaN if the model runs
         away.

@@ -27,7 +27,7 @@ class SlowNoise:
     Parameters
     ----------
     std : ndarray, shape (n_sensors,)
-        Standard deviation [K].
+        Standard deviation of every sensor's slow noise [K].
     pole : float
         Per sample, between 0 and 1.
     """

@@ -42,7 +42,7 @@ def decode(content: bytes, where: str, encoding: str | None = None) -> Decoded:
     where : str
         File, for messages.
     encoding : str, optional
-        As declared.
+        Encoding declared under [record].
 
     Raises
     ------

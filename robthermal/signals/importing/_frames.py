@@ -56,7 +56,7 @@ def frame_table(frame: pd.DataFrame, where: str, first_row: int = 0) -> Table:
     frame : DataFrame
         Columns are headers.
     where : str
-        For messages.
+        Name of the data frame in messages.
     first_row : int
         Number of the first row, for messages.
     """

@@ -33,7 +33,7 @@ def inspect(
     tables : sequence of (record, columns, place), optional
         Tables of a project file.
     **options
-        Keys of [record].
+        Keys of the table [record].
 
     Returns
     -------

@@ -27,7 +27,7 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
     options : ImportOptions
         What is declared.
     max_bytes : float, optional
-        Largest file [bytes].
+        Largest accepted size of the file [bytes].
 
     Raises
     ------

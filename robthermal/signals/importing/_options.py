@@ -205,7 +205,7 @@ def from_text(record: Sequence[str] = (), column: Sequence[str] = ()) -> tuple[d
     Parameters
     ----------
     record, column : sequence of str
-        As typed.
+        Command-line values, each KEY=VALUE or NAME=HEADER.
 
     Returns
     -------

@@ -27,7 +27,7 @@ class Part:
     rows : ndarray of int
         Of the table.
     stamps : ndarray
-        Their times [s].
+        Time stamps of these rows [s].
     sample_time : float
         Of the grid [s].
     samples : int
@@ -89,7 +89,7 @@ def parts_of(
     options : ImportOptions
         gaps, fill_up_to, shortest, jitter.
     names : tuple of (driven headers, read headers)
-        For messages.
+        Column headers that messages name.
 
     Raises
     ------

@@ -57,11 +57,11 @@ def single(table: Table, clock: Clock, rows: Rows, values: Array, options: Impor
     table, clock
         Of the file.
     rows : ndarray of int
-        One run.
+        Indices of the rows of one run.
     values : ndarray, shape (n_rows of the file, channels)
         Changed in place where repeated rows are averaged.
     options : ImportOptions
-        duplicates.
+        Import options, of which `duplicates` is used.
 
     Returns
     -------

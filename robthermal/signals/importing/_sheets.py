@@ -28,7 +28,7 @@ def read_workbook(path: Path, options: ImportOptions) -> Table:
     Parameters
     ----------
     path : Path
-        File.
+        Workbook to read.
     options : ImportOptions
         sheet, header_line, units_line.
 

@@ -23,7 +23,7 @@ class Action:
     n : int
         How many lines, rows, cells or columns.
     text : str
-        One sentence.
+        One sentence that says what was done.
     column : str
         Column it concerns; empty for the whole file.
     lines : list of int

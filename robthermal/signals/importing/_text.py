@@ -41,7 +41,7 @@ def read_text(path: Path, options: ImportOptions) -> Table:
     Parameters
     ----------
     path : Path
-        File.
+        Delimited text file to read.
     options : ImportOptions
         What is declared.
 

@@ -28,7 +28,7 @@ def read_parquet(path: Path, max_bytes: float | None) -> Table:
     Parameters
     ----------
     path : Path
-        File.
+        Parquet file to read.
     max_bytes : float or None
         Largest size unpacked [bytes].
     """
@@ -51,9 +51,9 @@ def read_mat(path: Path, options: ImportOptions, max_bytes: float | None) -> Tab
     Parameters
     ----------
     path : Path
-        File.
+        MATLAB file to read.
     options : ImportOptions
-        variable.
+        Import options, of which `variable` is used.
     max_bytes : float or None
         Largest size unpacked [bytes].
     """
@@ -131,7 +131,7 @@ def read_tdms(path: Path, max_bytes: float | None) -> Table:
     Parameters
     ----------
     path : Path
-        File.
+        TDMS file to read.
     max_bytes : float or None
         Largest size unpacked [bytes].
     """
