@@ -12,11 +12,12 @@ from threadpoolctl import threadpool_limits
 from ..calibration import Fit, calibrate
 from ..errors import InputError
 from ..fitting import as_data, free_run
-from ..signals import Record, read_record
+from ..signals import Record
 from ..thermal import System
 from ._claims import certify_system, claims_hold
 from ._diagnose import Diagnosed, diagnose_records
 from ._gate import gate_reasons
+from ._import import read_files
 from ._job_result import Comparison, JobResult
 from ._misfit import Misfit, misfit, noise_of_readings
 from ._parameter_ranges import claim_ranges, doubted
@@ -60,7 +61,8 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
     True
     """
     progress("reading records")
-    train, validation = ([read_record(path, project.system, median_filter=project.median_filter) for path in paths]
+    train, validation = ([part for path in paths for part in read_files(
+        [path], project.system, tables=project.reading.get(path, ()), median_filter=project.median_filter)]
                          for paths in (project.train, project.validation))
     fit, system = None, project.system
     if train:

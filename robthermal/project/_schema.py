@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
 from ..errors import InputError
-from ..signals import celsius_to_kelvin
+from ..signals import celsius_to_kelvin, declared
 from ..thermal import FitRange, System, fit_in_kelvin, read_system
+from ._import import ReadTable
 from ._toml import Number, Table, read_toml, refusal
 
 _REMEDY = "See the documentation, \"Project file\", or start from the demo's."
@@ -31,13 +32,21 @@ STRUCTURES: tuple[Structure, ...] = ("full", "block")
 DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
 
 
+class RecordEntry(Table):
+    """One entry of `train` or `validation` that says how its file is read."""
+
+    file: str
+    record: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
+
+
 class ProjectTable(Table):
     """[project]: files are relative to the project file."""
 
     name: str
     system: str
-    train: list[str] = []
-    validation: list[str] = []
+    train: list[str | RecordEntry] = []
+    validation: list[str | RecordEntry] = []
     label: str = ""
     median_filter: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
@@ -89,6 +98,8 @@ class _File(Table):
     diagnose: DiagnoseTable | None = None
     calibrate: CalibrateTable = CalibrateTable()
     certify: CertifyTable = CertifyTable()
+    record: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -189,6 +200,8 @@ class Project:
         Whether to look for what the model lacks.
     session_gain : bool
         Whether the diagnosis lets every record have its own gains.
+    reading : mapping
+        Record file to tables [record] and [columns] that say how it is read, besides the system's own.
     """
 
     name: str
@@ -204,6 +217,7 @@ class Project:
     gate: Gate = Gate()
     diagnose: bool = False
     session_gain: bool = False
+    reading: Mapping[Path, tuple[ReadTable, ...]] = field(default_factory=dict)
 
 
 def read_project(path: str | Path) -> Project:
@@ -234,12 +248,25 @@ def read_project(path: str | Path) -> Project:
     folder, head = path.parent, data.project
     system_file = _beside(folder, head.system, path)
     system = _with_fit(read_system(system_file), data.calibrate.parameters, path)
-    train, validation = (tuple(_beside(folder, name, path) for name in names)
-                         for names in (head.train, head.validation))
+    reading: dict[Path, tuple[ReadTable, ...]] = {}
+    train, validation = (tuple(_record_file(entry, folder, path, data, reading) for entry in entries)
+                         for entries in (head.train, head.validation))
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
                    data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
                    (path, system_file, *train, *validation), _gate(system, data.gate, path),
-                   data.diagnose is not None, data.diagnose is not None and data.diagnose.session_gain)
+                   data.diagnose is not None, data.diagnose is not None and data.diagnose.session_gain, reading)
+
+
+def _record_file(entry: str | RecordEntry, folder: Path, project: Path, data: _File,
+                 reading: dict[Path, tuple[ReadTable, ...]]) -> Path:
+    """File of an entry; how it is read is kept: [record] and [columns] of the project, then those of the entry."""
+    own = RecordEntry(file=entry) if isinstance(entry, str) else entry
+    file = _beside(folder, own.file, project)
+    tables: tuple[ReadTable, ...] = ((data.record, data.columns, str(project)),
+                                     (own.record, own.columns, f"{project} [project] {own.file}"))
+    declared(*tables)  # refuses unknown keys before any record is read
+    reading[file] = tuple(table for table in tables if table[0] or table[1])
+    return file
 
 
 def _beside(folder: Path, name: str, project: Path) -> Path:

@@ -18,6 +18,8 @@ def summary_tables(result: JobResult) -> dict[str, Any]:
         From `run_job`.
     """
     tables: dict[str, Any] = {"residuals": _residuals(result), "certify": certify_table(result.certification)}
+    reports = {one.record.imported.file: one.record.imported for one in result.comparisons if one.record.imported}
+    tables["imports"] = [report.to_dict() for report in reports.values()]
     if result.fit is not None:
         tables["calibrate"] = {"parameters": _parameters(result), "outcome": result.fit.outcome.code}
     return tables

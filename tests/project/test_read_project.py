@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 
 import robthermal as rt
@@ -86,9 +87,11 @@ def test_every_key_is_documented() -> None:
     page = PAGE.read_text(encoding="utf-8")
     tables = rt.project._schema._File.model_fields
     kinds = [next(iter(get_args(table.annotation)), table.annotation) for table in tables.values()]
-    keys = [key for kind in kinds for key in kind.model_fields]
+    keys = [key for kind in kinds for key in getattr(kind, "model_fields", ())]
+    keys += list(rt.signals.ImportOptions.model_fields)  # [record]; [columns] has the user's own names
     assert len(keys) > 10
-    assert not [key for key in keys if not re.search(rf"^(?:{key} = |\[\w+\.{key}\])", page, re.M)]
+    page += (PAGE.parent / "measured_files.md").read_text(encoding="utf-8")
+    assert not [key for key in keys if not re.search(rf"\b{key} = |^\[\w+\.{key}\]", page, re.M)]
 
 
 def test_defaults(folder: Path) -> None:
@@ -175,3 +178,29 @@ def test_boxes_of_a_system_in_kelvin(folder: Path) -> None:
     assert boxes.temperature == (280.0, 350.0) and boxes.setpoint == {"m1": 281.0}
     with pytest.raises(rt.InputError, match=r"--temperature.*5 K.*Celsius"):
         rt.project.boxes_from_text(system, temperature=(5.0, 85.0))
+
+
+def test_how_records_are_read_is_said_in_the_project_or_beside_one_of_them(tmp_path: Path) -> None:
+    rt.project.new_project(tmp_path / "mine")
+    folder = tmp_path / "mine"
+    text = (folder / "train.csv").read_text()
+    header, _, rows = text.partition("\n")
+    names = header.split(",")
+    foreign = ";".join({"T_stage": "NTC 1 [°C]", "m1": "I [mA]"}.get(name, name) for name in names)
+    k = names.index("m1")
+    lines = [row.split(",") for row in rows.splitlines()]
+    scaled = [[str(1000 * float(cell)) if j == k else cell for j, cell in enumerate(line)] for line in lines]
+    body = "\n".join(map(";".join, scaled))
+    (folder / "foreign.txt").write_bytes(f"A logger\n{foreign}\n{body}\n".encode("cp1252"))
+    project = folder / "project.toml"
+    said = '[{ file = "foreign.txt", columns = { T_stage = "NTC 1", m1 = "I" } }]'
+    project.write_text(project.read_text().replace('["train.csv"]', said) + '\n[record]\ngaps = "refuse"\n')
+    job = rt.project.read_project(project)
+    tables = job.reading[job.train[0]]
+    mine, = rt.project.read_files(job.train, job.system, tables=tables)
+    plain, = rt.project.read_files([folder / "train.csv"], job.system)
+    np.testing.assert_allclose(mine.outputs, plain.outputs, rtol=1e-13)
+    np.testing.assert_allclose(mine.inputs, plain.inputs, rtol=1e-13)
+    project.write_text(project.read_text().replace("gaps =", "gap ="))
+    with pytest.raises(rt.InputError, match="unknown key 'gap'"):
+        rt.project.read_project(project)
