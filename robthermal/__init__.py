@@ -1,7 +1,7 @@
 """From measured data to verified certificates for thermal systems with thermoelectric modules.
 
-The names below load their room on first use (PEP 562), so that ``import robthermal`` stays fast: pandas, matplotlib,
-python-control and the solvers are imported by the rooms that need them, not here.
+The names below load their package on first use (PEP 562), so that ``import robthermal`` stays fast: pandas, matplotlib,
+python-control and the solvers are imported by the packages that need them, not here.
 
 Examples
 --------
@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import diagnosis as diagnosis
     from . import errors as errors
     from . import identify as identify
+    from . import jobs as jobs
     from . import project as project
     from . import report as report
     from . import signals as signals
@@ -46,10 +47,11 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import Verdict as Verdict
     from .verification import verify as verify
 
-_ROOMS = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "project", "report",
-          "signals", "systems", "thermal", "verification")
+_PACKAGES = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "jobs", "report",
+             "signals", "systems", "thermal", "verification")
+_FORMER = ("project",)  # names of the version before: `rt.project` is `rt.jobs`
 
-_HOME = {  # public name: the room it lives in
+_HOME = {  # public name: the package it lives in
     "Certificate": "verification",
     "FleetRun": "_fleet",
     "Record": "signals",
@@ -64,13 +66,13 @@ _HOME = {  # public name: the room it lives in
     "verify": "verification",
 }
 
-__all__ = ["Diverged", "InputError", "Outcome", "__version__", *_HOME, *_ROOMS]
+__all__ = ["Diverged", "InputError", "Outcome", "__version__", *_HOME, *_PACKAGES, *_FORMER]
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         value = getattr(import_module(f".{_HOME[name]}", __name__), name)
-    elif name in _ROOMS:
+    elif name in (*_PACKAGES, *_FORMER):
         value = import_module(f".{name}", __name__)
     elif name == "__version__":
         value = _version()

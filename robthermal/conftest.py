@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 
-# Loaded as Python loads them: pytest, which imports file by file, would set the submodules `effects` and `diagnose` in
-# the place of the functions of the same name.
+# Loaded as Python loads them: pytest, which imports file by file, would set the submodules `effects`, `diagnose`,
+# `explain` and `app` in the place of what is called so.
+import robthermal.cli
 import robthermal.diagnosis
+import robthermal.jobs
 import robthermal.thermal  # noqa: F401
 
 os.environ["MPLBACKEND"] = "Agg"  # read when matplotlib is first imported

@@ -21,7 +21,7 @@ from rich.console import Console
 
 import robthermal as rt
 from robthermal import cli
-from robthermal._terminal import progress, progress_bar
+from robthermal.cli.terminal import progress, progress_bar
 
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
@@ -228,7 +228,7 @@ def test_demo_replaces_an_earlier_result_and_nothing_else(run: Cli, tmp_path: Pa
     def never(*args: object) -> None:
         pytest.fail("the job was run although its folder was refused")
 
-    monkeypatch.setattr("robthermal.project.run_job", never)
+    monkeypatch.setattr("robthermal.jobs.run_job", never)
     mine = tmp_path / "mine"
     mine.mkdir()
     precious = write(mine / "thesis.tex", "years of work")
@@ -263,7 +263,7 @@ def test_interrupt_while_writing_leaves_nothing(run: Cli, system: Path, tmp_path
         seen.append(everything(tmp_path))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robthermal.project._evidence.write_html", interrupt)
+    monkeypatch.setattr("robthermal.jobs.evidence.write_html", interrupt)
     before = everything(tmp_path)
     done = run("certify", system, "--current", "m1=0:1", "--out", tmp_path / "out")
     assert done.status == 130 and "interrupted" in done.err

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 DT = 0.01
 P1, P2 = control.tf([0.01], [1, -0.99], DT), control.tf([0.02], [1, -0.98], DT)
 FREQUENCIES = np.arange(0.5, 50.0, 0.5)  # Hz
-Done = tuple[Path, rt.project.Coupling]
+Done = tuple[Path, rt.jobs.couple.Coupling]
 KEYS = {"format", "name", "sample_time", "verdict", "filters", "sections", "norms", "performance", "remarks"}
 SPEC = """
 [coupling]
@@ -82,8 +82,8 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.fixture(scope="module")
 def robust(tmp_path_factory: pytest.TempPathFactory) -> Done:
     folder = tmp_path_factory.mktemp("couple")
-    result = rt.project.couple_subsystems(rt.project.read_coupling(write(folder)))
-    rt.project.write_coupling(result, folder / "out")
+    result = rt.jobs.couple_subsystems(rt.jobs.read_coupling(write(folder)))
+    rt.jobs.write_coupling(result, folder / "out")
     return folder / "out", result
 
 
@@ -164,7 +164,7 @@ class TestYes:
         loop = "plant = { num = [1.0], den = [1.0, 1.0] }\ncontroller = 9.0\n"
         text = (f'[coupling]\nname = "slow"\nsample_time = 0\n[subsystems.1]\n{loop}[subsystems.2]\n{loop}'
                 "[design]\nX_hat = -0.5\ncutoff = 100.0\n")
-        result = rt.project.couple_subsystems(rt.project.read_coupling(write(tmp_path, text)))
+        result = rt.jobs.couple_subsystems(rt.jobs.read_coupling(write(tmp_path, text)))
         result.filters.save(tmp_path / "coupling.json")
         found = json.loads((tmp_path / "coupling.json").read_text(encoding="utf-8"))
         assert result.holds and result.simulation is None
@@ -177,7 +177,7 @@ class TestYes:
         lines = [["frequency", *columns], *((10.0 * k, *values[:, k]) for k in (1, 2))]
         (tmp_path / "p.csv").write_text("\n".join(",".join(map(str, line)) for line in lines), encoding="utf-8")
         text = re.sub(r"frf_1 .*\nfrf_2 .*\n", 'frf = ["p.csv"]\n', SPEC)
-        frf = rt.project.read_coupling(write(tmp_path, text)).measured[0]
+        frf = rt.jobs.read_coupling(write(tmp_path, text)).measured[0]
         assert frf.frequencies == pytest.approx(np.array([10.0, 20.0]))
         assert frf.response[0, 1, 0] == 102 + 103j and frf.response[1, 0, 1] == 204 + 205j
 
@@ -283,7 +283,7 @@ def test_the_example_files_are_read(tmp_path: Path) -> None:
     names: dict[str, Any] = {"__name__": "make_files"}
     exec(compile(source, "make_files.py", "exec"), names)
     names["main"](tmp_path)
-    job, machine = rt.project.read_coupling(tmp_path / "SPEC.toml"), rt.systems.scanner()
+    job, machine = rt.jobs.read_coupling(tmp_path / "SPEC.toml"), rt.systems.scanner()
     assert job.names == machine.names and len(job.measured) == len(machine.frf)
     assert np.array_equal(np.asarray(job.plants[1].A), machine.P2.A)
     assert 2 * np.pi * job.measured[4].frequencies == pytest.approx(machine.frf[4].omega)

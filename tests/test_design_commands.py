@@ -20,8 +20,8 @@ import pytest
 import robthermal as rt
 from robthermal import cli
 from robthermal.errors import InputError
-from robthermal.project._design_file import design_numbers
-from robthermal.project._design_limits import check_given, contain, worst_runaway
+from robthermal.jobs.design._file import design_numbers
+from robthermal.jobs.design._limits import check_given, contain, worst_runaway
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -129,13 +129,13 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def bent() -> rt.project.ControllerDesign:
+def bent() -> rt.jobs.design.ControllerDesign:
     """With natural convection, heater, offset and gain of a sensor: everything that design.json can hold."""
     text = BENCH.replace('between = ["stage", "part"]',
                          'between = ["stage", "part"]\nnatural = { gain = 0.01, exponent = 0.25 }\nradiation = 1e-10')
     system = rt.thermal.parse_system(text, "bent.toml")
-    return rt.project.design_system(system, rt.project.design_from_text(system, setpoint=["m1=12"], bandwidth=0.05,
-                                                                       sample_time=2.0))
+    return rt.jobs.design_system(system, rt.jobs.design.design_from_text(system, setpoint=["m1=12"], bandwidth=0.05,
+                                                                         sample_time=2.0))
 
 
 FAST = ("--setpoint", "m1=12", "--bandwidth", "0.05", "--sample-time", "2")
@@ -161,11 +161,11 @@ def fold() -> rt.thermal.LoadCurve:
 
 
 @pytest.fixture(scope="module")
-def two() -> rt.project.ControllerDesign:
+def two() -> rt.jobs.design.ControllerDesign:
     """The two-module set-up, read by the sensors of the thesis."""
     system = rt.systems.two_module()
-    request = rt.project.design_from_text(system, setpoint=["m1=8", "m2=10"], sensors="T6,T7,T15,T16")
-    return rt.project.design_system(system, request)
+    request = rt.jobs.design.design_from_text(system, setpoint=["m1=8", "m2=10"], sensors="T6,T7,T15,T16")
+    return rt.jobs.design_system(system, request)
 
 
 def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Cli) -> None:
@@ -269,7 +269,7 @@ def closed_loop(numbers: dict[str, Any], system: rt.System, inputs: list[float],
 
 @pytest.mark.parametrize("which", ["bench", "two"])
 def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
-        which: str, bench: rt.System, two: rt.project.ControllerDesign, request: pytest.FixtureRequest) -> None:
+        which: str, bench: rt.System, two: rt.jobs.design.ControllerDesign, request: pytest.FixtureRequest) -> None:
     done = two if which == "two" else request.getfixturevalue("bent")
     numbers = json.loads(json.dumps(design_numbers(done)))
     system = done.certification.system
@@ -282,7 +282,7 @@ def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
     assert np.abs(found).max() > 0.05
 
 
-def test_limits_are_below_the_fold_and_the_box_is_never_left(two: rt.project.ControllerDesign) -> None:
+def test_limits_are_below_the_fold_and_the_box_is_never_left(two: rt.jobs.design.ControllerDesign) -> None:
     fold = two.certification.runaway
     assert two.holds and fold is not None
     for name, high in zip(two.law.names, two.law.current_high, strict=True):
@@ -293,7 +293,7 @@ def test_limits_are_below_the_fold_and_the_box_is_never_left(two: rt.project.Con
     assert two.collapse is not None and two.collapse.outcome and two.collapse.ratio > 20
 
 
-def test_limits_beyond_the_certified_ones_are_refused_with_these(two: rt.project.ControllerDesign) -> None:
+def test_limits_beyond_the_certified_ones_are_refused_with_these(two: rt.jobs.design.ControllerDesign) -> None:
     asked = replace(two.request, current={"m1": (-3.3, 0.5)})
     done = two.certification
     assert done.runaway is not None
@@ -302,7 +302,7 @@ def test_limits_beyond_the_certified_ones_are_refused_with_these(two: rt.project
 
 
 def test_the_worst_ambient_counts(bench: rt.System) -> None:
-    request = rt.project.design_from_text(bench, setpoint=["m1=12"], ambient=["room=15:35"])
+    request = rt.jobs.design.design_from_text(bench, setpoint=["m1=12"], ambient=["room=15:35"])
     worst = worst_runaway(bench, request).current["m1"]
     assert worst == pytest.approx(rt.thermal.fold(bench, {"m1": 285.15}, ambient={"room": 308.15}).current[-1, 0])
     ambient = contain(bench, request, {"m1": (0.0, 1.0)}).invariance.region["ambient"]["room"]
@@ -311,19 +311,19 @@ def test_the_worst_ambient_counts(bench: rt.System) -> None:
 
 def test_a_set_point_that_needs_more_than_the_usable_current_is_not_certified(bench: rt.System, tmp_path: Path) -> None:
     """60 °C needs more heating than the box that is never left allows: the design is written, its claim fails."""
-    request = rt.project.design_from_text(bench, setpoint=["m1=60"], bandwidth=0.05, sample_time=2.0)
-    done = rt.project.design_system(bench, request)
+    request = rt.jobs.design.design_from_text(bench, setpoint=["m1=60"], bandwidth=0.05, sample_time=2.0)
+    done = rt.jobs.design_system(bench, request)
     assert not done.holds and done.loop.current.min() < -0.3 and not done.certification.safe.holds
-    report = rt.project.write_design(done, (), tmp_path / "out")
+    report = rt.jobs.write_design(done, (), tmp_path / "out")
     assert not report.holds
     assert "No box that is never left" in [section.title for section in report.sections]
     assert "box" in [Path(claim.file).stem for claim in report.claims]  # a claim that fails is never left out
 
 
 def test_currents_beyond_the_usable_one_are_refused_with_it(bench: rt.System) -> None:
-    request = rt.project.design_from_text(bench, setpoint=["m1=12"], current=["m1=-3:0.1"])
+    request = rt.jobs.design.design_from_text(bench, setpoint=["m1=12"], current=["m1=-3:0.1"])
     with pytest.raises(InputError, match=r"m1=-3:0.1: .*(never to be left.*usable current|not certified)"):
-        rt.project.design_system(bench, request)
+        rt.jobs.design_system(bench, request)
 
 
 def test_not_certified_is_an_answer(run: Cli, tmp_path: Path) -> None:
@@ -429,4 +429,4 @@ def test_map_refuses(run: Cli, file: Path, tmp_path: Path, options: list[str], w
 
 def test_request_refuses_a_module_without_set_point() -> None:
     with pytest.raises(InputError, match="'m2' has no set-point"):
-        rt.project.design_from_text(rt.systems.two_module(), setpoint=["m1=5"])
+        rt.jobs.design.design_from_text(rt.systems.two_module(), setpoint=["m1=5"])

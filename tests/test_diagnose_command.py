@@ -131,10 +131,10 @@ def free_run(system: Path, record: Path) -> np.ndarray:
 def out(files: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     system, train, unseen = files(across)
     found = rt.read_system(system)
-    result = rt.project.diagnose_records(found, (system, train, unseen), [rt.read_record(train, found)],
-                                         [rt.read_record(unseen, found)])
+    result = rt.jobs.diagnose_records(found, (system, train, unseen), [rt.read_record(train, found)],
+                                      [rt.read_record(unseen, found)])
     folder = tmp_path_factory.mktemp("named") / "out"
-    rt.project.write_diagnosis(result, folder)
+    rt.jobs.write_diagnosis(result, folder)
     return folder
 
 

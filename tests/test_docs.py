@@ -35,7 +35,7 @@ def test_every_public_name_is_on_a_page(built: Path) -> None:
     on_a_page = {name for kind, entries in inventory.data.items() if kind.startswith("py:") for name in entries}
     public = {
         f"robthermal.{room}.{name}"
-        for room in rt._ROOMS
+        for room in rt._PACKAGES
         for name in getattr(import_module(f"robthermal.{room}"), "__all__", ["InputError", "Diverged", "Outcome"])
     }
     assert not public - on_a_page

@@ -55,7 +55,7 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = (folder / "bar.toml").read_text(encoding="utf-8").replace("capacity = 40.0", "capacity = 55.0")
     (folder / "start.toml").write_text(text + '\n[fit]\n"lumps.bar.capacity" = { lower = 10.0, upper = 100.0 }\n',
                                        encoding="utf-8")
-    rt.project.estimate_response([folder / "run.csv"], system=system, method="lrmp", band=(0.002, 0.2)).save(
+    rt.jobs.measured.estimate_response([folder / "run.csv"], system=system, method="lrmp", band=(0.002, 0.2)).save(
         folder / "G.json")
     (folder / "G.csv").write_text("frequency,real,imag\n0.1,1,0\n0.2,1,0\n", encoding="utf-8")
     (folder / "huge.json").write_text(json.dumps({"format": [0.5] * 100_000}), encoding="utf-8")
@@ -77,7 +77,7 @@ def test_to_diagnose(bar: Path, tmp_path: Path, kind: str) -> None:
     """Responses and records are told apart by their content, in any order."""
     rt.identify.read_response(bar / "G.json").save(tmp_path / f"G.{kind}")
     (tmp_path / f"G.{kind}").rename(tmp_path / "G.measured")
-    found = rt.project.read_measured([bar / "run.csv", tmp_path / "G.measured"], rt.read_system(bar / "bar.toml"))
+    found = rt.jobs.measured.read_measured([bar / "run.csv", tmp_path / "G.measured"], rt.read_system(bar / "bar.toml"))
     assert [type(one) for one in found] == [rt.Record, rt.identify.FrequencyResponse]
     assert found[1].has_covariance
 
@@ -129,8 +129,8 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pair")
     for name, pole, gain, seed in (("one", 0.99, 0.011, 1), ("two", 0.98, 0.018, 2)):
         loop_record(pole, gain, seed).save(folder / f"{name}.csv")
-        rt.project.estimate_response([folder / f"{name}.csv"], inputs=["u"], outputs=["y"], band=(0.5, 50.0)).save(
-            folder / f"{name}.json")
+        G = rt.jobs.measured.estimate_response([folder / f"{name}.csv"], inputs=["u"], outputs=["y"], band=(0.5, 50.0))
+        G.save(folder / f"{name}.json")
     return folder
 
 
@@ -141,7 +141,7 @@ def test_to_couple_with_its_covariance(pair: Path, tmp_path: Path, kind: str) ->
     for name, G in zip(("one", "two"), measured, strict=True):
         G.save(tmp_path / f"G.{kind}")
         (tmp_path / f"G.{kind}").rename(tmp_path / name)
-    plant, = rt.project.read_coupling(tmp_path / "SPEC.toml").measured
+    plant, = rt.jobs.read_coupling(tmp_path / "SPEC.toml").measured
     for k, G in enumerate(measured):
         np.testing.assert_allclose(plant.response[k, k], G.response[0, 0], rtol=1e-15)
         assert (plant.confidence_radius()[k, k] >= G.confidence_radius()[0, 0] * (1 - 1e-12)).all()

@@ -13,7 +13,7 @@ import robthermal as rt
 SURFACE = {
     "robthermal": """
         Certificate Diverged FleetRun InputError Outcome Record System Verdict __version__ calibrate calibration
-        certify coupling design diagnose diagnosis errors fleet identify project read_record read_records
+        certify coupling design diagnose diagnosis errors fleet identify jobs project read_record read_records
         read_system report
         signals systems thermal verification verify
     """,
@@ -52,6 +52,11 @@ SURFACE = {
     """,
     "identify": """
         FrequencyResponse bla closed_loop etfe is_response lpm lrm lrmp read_response spectral
+    """,
+    "jobs": """
+        Boxes DesignRequest MapRequest certify_system couple_subsystems demo_project design_system diagnose_records
+        explain explainable map_system new_project read_coupling read_project rebuild_report run_job verify_files
+        write_certify write_coupling write_design write_diagnosis write_job write_map
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
@@ -102,7 +107,23 @@ def test_public_names_are_the_listed_ones(room: str) -> None:
 
 
 def test_every_room_is_listed() -> None:
-    assert set(SURFACE) == {"robthermal", *rt._ROOMS}
+    assert set(SURFACE) == {"robthermal", *rt._PACKAGES, *rt._FORMER}
+
+
+def test_former_name_of_the_jobs_has_the_same_objects() -> None:
+    inside = [getattr(rt.jobs, name) for name in ("certify", "claims", "couple", "design", "diagnose", "folder", "map",
+                                                  "measured", "request", "run", "verify")]
+    explained = sys.modules["robthermal.jobs.explain"]  # rt.jobs.explain is the function
+    for name in rt.project.__all__:
+        homes = [module for module in (rt.jobs, explained, *inside) if hasattr(module, name)]
+        assert homes, name
+        assert all(getattr(module, name) is getattr(rt.project, name) for module in homes), name
+
+
+def test_former_name_of_the_jobs_is_imported_as_before() -> None:
+    code = "import robthermal.project as p, robthermal as rt; from robthermal.project import run_job; " \
+           "assert rt.project is p and run_job is rt.jobs.run_job"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def public_names(room: str) -> list[str]:

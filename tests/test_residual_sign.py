@@ -94,7 +94,7 @@ def test_figure_of_measured_against_model() -> None:
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory: pytest.TempPathFactory) -> rt.project.JobResult:
+def job(tmp_path_factory: pytest.TempPathFactory) -> rt.jobs.run.JobResult:
     folder = tmp_path_factory.mktemp("warm")
     for name, seed in (("train", 1), ("validation", 2)):
         one = record(seed, np.linspace(0.0, 2.0, 300)[:, None])  # warms up: a mean residual near +1 K
@@ -102,10 +102,10 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> rt.project.JobResult:
         (folder / f"{name}.csv").write_text("\n".join(["time,Q,T", *rows]))
     (folder / "bar.toml").write_text(SYSTEM)
     (folder / "project.toml").write_text(PROJECT)
-    return rt.project.run_job(rt.project.read_project(folder / "project.toml"))
+    return rt.jobs.run_job(rt.jobs.read_project(folder / "project.toml"))
 
 
-def test_main_job_shows_what_the_calibration_computed(job: rt.project.JobResult) -> None:
+def test_main_job_shows_what_the_calibration_computed(job: rt.jobs.run.JobResult) -> None:
     train, validation = job.comparisons
     assert job.fit is not None
     for shown, computed, score in ((train, job.fit.residuals[0], job.fit.train[0]),
@@ -124,19 +124,19 @@ def test_free_start_is_shown_as_computed_too() -> None:
 
 
 @pytest.fixture(scope="module")
-def warm() -> rt.project.Diagnosed:
+def warm() -> rt.jobs.diagnose.Diagnosed:
     """Train and validation drift away from the model upwards, which no effect of the catalogue that is allowed does."""
     drift = np.linspace(0.0, 2.0, 300)[:, None]
     return diagnosed([record(1, drift)], [record(2, drift)])
 
 
-def diagnosed(train: list[rt.Record], validation: list[rt.Record], **options: Any) -> rt.project.Diagnosed:
+def diagnosed(train: list[rt.Record], validation: list[rt.Record], **options: Any) -> rt.jobs.diagnose.Diagnosed:
     nominal = fixed_start().model_copy(update={"fit": {"links.bar-room.conductance": rt.thermal.FitRange(
         lower=0.4999, upper=0.5001)}})
-    return rt.project.diagnose_records(nominal, (), train, validation, **options)
+    return rt.jobs.diagnose_records(nominal, (), train, validation, **options)
 
 
-def test_diagnosis_of_a_machine_that_is_warmer(warm: rt.project.Diagnosed) -> None:
+def test_diagnosis_of_a_machine_that_is_warmer(warm: rt.jobs.diagnose.Diagnosed) -> None:
     train, validation = warm.residuals
     assert (train.kind, validation.kind) == ("train", "validation")
     assert train.before["T"].mean() > 0.2

@@ -17,8 +17,8 @@ import pytest
 
 import robthermal as rt
 from robthermal import cli
-from robthermal.project._assumptions import KIND_ASSUMPTIONS
-from robthermal.project._outcomes import outcome_codes
+from robthermal.jobs.claims._assumptions import KIND_ASSUMPTIONS
+from robthermal.jobs.explain._outcomes import outcome_codes
 from robthermal.verification._kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -54,14 +54,14 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.fixture(scope="module")
 def starter(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return rt.project.new_project(tmp_path_factory.mktemp("new") / "bench")
+    return rt.jobs.new_project(tmp_path_factory.mktemp("new") / "bench")
 
 
 @pytest.fixture(scope="module")
 def done(starter: Path) -> Path:
     """Results of the starter project, as `run` writes them."""
     out = starter.parent / "results"
-    rt.project.write_job(rt.project.run_job(rt.project.read_project(starter)), out)
+    rt.jobs.write_job(rt.jobs.run_job(rt.jobs.read_project(starter)), out)
     return out
 
 
@@ -143,8 +143,8 @@ def test_a_claim_without_a_certificate_in_the_folder_is_not_verified(run: Cli, r
 def test_an_honest_no_stays_no(run: Cli, tmp_path: Path) -> None:
     """Nothing that a certificate says later turns a claim that was never proven into a proof."""
     system = rt.systems.two_module()
-    boxes = rt.project.Boxes(current={"m1": (-20.0, 20.0), "m2": (0.0, 1.0)})
-    rt.project.write_certify(rt.project.certify_system(system, boxes), (), tmp_path / "out")
+    boxes = rt.jobs.Boxes(current={"m1": (-20.0, 20.0), "m2": (0.0, 1.0)})
+    rt.jobs.write_certify(rt.jobs.certify_system(system, boxes), (), tmp_path / "out")
     before = undated(tmp_path / "out")
     assert run("report", tmp_path / "out").status == 1
     assert undated(tmp_path / "out") == before
@@ -219,7 +219,7 @@ def test_new_writes_a_project_that_reads_at_once(run: Cli, tmp_path: Path) -> No
     assert made.status == 0 and {Path(file).name for file in answer["files"]} == {
         "project.toml", "setup.toml", "train.csv", "validation.csv"}
     assert run("check", tmp_path / "bench" / "setup.toml", tmp_path / "bench" / "train.csv").status == 0
-    assert rt.project.read_project(answer["project"]).system.fit
+    assert rt.jobs.read_project(answer["project"]).system.fit
     for name in ("project.toml", "setup.toml"):
         lines = (tmp_path / "bench" / name).read_text(encoding="utf-8").splitlines()
         assert sum("#" in line for line in lines) > 0.4 * len([line for line in lines if line.strip()]), "comments"
@@ -241,22 +241,22 @@ def test_new_overwrites_nothing(run: Cli, starter: Path, results: Path, tmp_path
 
 
 def test_every_effect_kind_and_code_is_explained(run: Cli) -> None:
-    known = rt.project.explainable()
+    known = rt.jobs.explainable()
     assert set(known["effect"]) == set(rt.thermal.effects()) and len(known["effect"]) == 28
     assert set(known["certificate"]) == set(KINDS) == set(KIND_ASSUMPTIONS)
-    assert set(known["reason"]) == {code.code for code in rt.project.GateCode}
+    assert set(known["reason"]) == {code.code for code in rt.jobs.claims.GateCode}
     assert {"named", "ambiguous", "consistent", "unexplained", "not_certified", "converged"} <= set(known["outcome"])
     listed = run("explain").out
     for names in known.values():
         for name in names:
             assert name in listed
-            for one in rt.project.explain(name):
+            for one in rt.jobs.explain(name):
                 assert one.name == name and all(one.meaning) and str(one)
 
 
 def test_every_page_that_is_named_exists_and_names_the_effect_or_kind() -> None:
-    known = rt.project.explainable()
-    for one in (one for names in known.values() for name in names for one in rt.project.explain(name)):
+    known = rt.jobs.explainable()
+    for one in (one for names in known.values() for name in names for one in rt.jobs.explain(name)):
         pages = [(ROOT / page).read_text(encoding="utf-8") for page in one.page.split()]
         assert pages and (one.what in ("error", "outcome") or one.name in pages[0]), one.name
 
@@ -331,7 +331,7 @@ def test_a_diagnosis_says_its_stages() -> None:
     run = rt.thermal.simulate(bar.with_parameters({"sensors.T.time_constant": 30.0}), drive)
     noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
     said: list[str] = []
-    rt.project.diagnose_records(bar, (), [noisy], progress=said.append)
+    rt.jobs.diagnose_records(bar, (), [noisy], progress=said.append)
     order = ["refitting the nominal system", "trying every effect of the catalogue at every place",
              "refitting the best candidates", "testing whether anything is left", "running both models freely"]
     assert [said.index(stage) for stage in order] == sorted(said.index(stage) for stage in order)

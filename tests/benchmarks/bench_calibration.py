@@ -28,7 +28,7 @@ def example(name: str) -> ModuleType:
 
 def coverage(pole: float) -> tuple[float, float, float]:
     """Part of repetitions with all nine true values inside their 95 % ranges: ellipsoid, box; median half-width [-]."""
-    project = rt.project.read_project(rt.project.demo_project())
+    project = rt.jobs.read_project(rt.jobs.demo_project())
     system = project.system
     truth = {name: system.parameter(name) for name in system.fit}
     clean = rt.thermal.simulate(system, rt.read_record(project.train[0], system)[:N_SAMPLES])

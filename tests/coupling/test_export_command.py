@@ -23,8 +23,8 @@ def written(folder: Path, head: str, dt: str = "0.01") -> Path:
 
 
 def test_files_hold_the_filters(tmp_path: Path) -> None:
-    done = rt.project.couple_subsystems(rt.project.read_coupling(written(tmp_path, 'export = ["mat", "c", "mat"]\n')))
-    rt.project.write_coupling(done, tmp_path / "out")
+    done = rt.jobs.couple_subsystems(rt.jobs.read_coupling(written(tmp_path, 'export = ["mat", "c", "mat"]\n')))
+    rt.jobs.write_coupling(done, tmp_path / "out")
     assert {path.name for path in (tmp_path / "out").glob("coupling.*")} == {"coupling.json", "coupling.mat",
                                                                              "coupling.c"}
     done.filters.export(tmp_path / "own.c", "pair")
@@ -35,8 +35,8 @@ def test_files_hold_the_filters(tmp_path: Path) -> None:
 
 
 def test_nothing_more_is_written_unless_asked(tmp_path: Path) -> None:
-    done = rt.project.couple_subsystems(rt.project.read_coupling(written(tmp_path, "")))
-    rt.project.write_coupling(done, tmp_path / "out")
+    done = rt.jobs.couple_subsystems(rt.jobs.read_coupling(written(tmp_path, "")))
+    rt.jobs.write_coupling(done, tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").glob("coupling.*")] == ["coupling.json"]
 
 
@@ -45,4 +45,4 @@ def test_nothing_more_is_written_unless_asked(tmp_path: Path) -> None:
     ('export = ["c"]\n', "0", r"\[coupling\] export.*no C source")])
 def test_refused_before_the_design(head: str, dt: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(rt.InputError, match=message):
-        rt.project.read_coupling(written(tmp_path, head, dt).rename(tmp_path / "S.toml"))
+        rt.jobs.read_coupling(written(tmp_path, head, dt).rename(tmp_path / "S.toml"))

@@ -12,9 +12,9 @@ import robthermal as rt
 from robthermal.diagnosis.evidence import negative_log_predictive_density, validation_data
 from robthermal.diagnosis.fit import extended
 from robthermal.diagnosis.search import resolve_alternatives
-from robthermal.project._diagnose import Diagnosed
-from robthermal.project._diagnose_claims import diagnosis_claims
-from robthermal.project._diagnose_ranking import ranking
+from robthermal.jobs.diagnose._claims import diagnosis_claims
+from robthermal.jobs.diagnose._diagnose import Diagnosed
+from robthermal.jobs.diagnose._ranking import ranking
 
 LATE = ["input_delay", "input_lag", "sensor_offset"]
 DELAY, LAG = ("input_delay", ("heater",)), ("input_lag", ("heater",))

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import recheck
 import robthermal as rt
 from robthermal.cli import app
-from robthermal.project import _second
+from robthermal.jobs.verify import _second
 from robthermal.verification import Certificate, establish
 
 ROD = {"lumps": {"rod": {"capacity": 10.0}}, "ambients": ["room"], "modules": {},
@@ -71,18 +71,18 @@ def test_where_the_second_checker_rejects_the_file_is_not_verified(files, monkey
 
 def test_without_the_second_checker_one_message_says_how_to_get_it(files, monkeypatch):
     monkeypatch.setattr(_second, "_checker", lambda: None)
-    assert rt.project.second_verdicts([files["good"]])[0].status == "absent"
+    assert rt.jobs.verify.second_verdicts([files["good"]])[0].status == "absent"
     with pytest.raises(rt.errors.InputError, match="pip install ./recheck"):
-        rt.project.verify_files([files["good"]], second=True)
+        rt.jobs.verify_files([files["good"]], second=True)
 
 
 def test_certificates_in_memory_and_files_are_judged_alike(files):
     certificate = Certificate.load(files["good"])
-    by_file, in_memory = rt.project.second_verdicts([files["good"], certificate])
+    by_file, in_memory = rt.jobs.verify.second_verdicts([files["good"], certificate])
     assert by_file and in_memory and by_file == in_memory
-    assert not rt.project.second_verdicts([files["bad"]])[0]
+    assert not rt.jobs.verify.second_verdicts([files["bad"]])[0]
 
 
 def test_robthermal_does_not_import_it():
-    code = "import sys, robthermal, robthermal.project, robthermal.verification; sys.exit('recheck' in sys.modules)"
+    code = "import sys, robthermal, robthermal.jobs, robthermal.verification; sys.exit('recheck' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

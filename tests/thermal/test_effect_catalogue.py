@@ -68,7 +68,7 @@ def test_one_file_is_a_new_effect(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert added.parameters == {"heat": "lumps.bar.heat"} and added.system.parameter("lumps.bar.heat") == -1.0
         with pytest.raises(rt.InputError, match="already"):
             rt.thermal.add_effect(added.system, "toy_draught", ["bar"])
-        (explained,) = rt.project.explain("toy_draught")
+        (explained,) = rt.jobs.explain("toy_draught")
         assert explained.meaning == ("A draught cools a lump by a constant heat.",)
         assert [c.label for c in rt.diagnosis.candidates(bar(), ["toy_draught"])] == ["toy_draught(bar)"]
         assert rt.diagnose(bar(), record(), effects=["toy_draught", "sensor_lag"]).effects[0].label == (
@@ -96,7 +96,7 @@ def test_an_effect_of_a_user_is_added_without_knowing_its_numbers() -> None:
     try:
         added = rt.thermal.add_effect(bar(), "glued", ["T"], {"offset": 0.5})
         assert added.system.parameter("sensors.T.offset") == 0.5 and added.parameters == {}
-        assert rt.project.explain("glued")[0].meaning == ("An effect of your own.",)
+        assert rt.jobs.explain("glued")[0].meaning == ("An effect of your own.",)
     finally:
         rt.diagnosis.forget_effect("glued")
     assert list(rt.thermal.effects()) == ORDER

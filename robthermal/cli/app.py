@@ -1,0 +1,336 @@
+"""Command line: argument parsing only."""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import robthermal as rt  # the whole package, so that every command loads only the parts it needs
+
+from ..errors import Diverged, InputError
+from . import frequency, learn, results
+from .terminal import (
+    AmbientRange,
+    Box,
+    ColumnMap,
+    Json,
+    Out,
+    ReadOption,
+    SystemFile,
+    answer,
+    exit_unless,
+    place,
+    progress,
+    progress_bar,
+    reading,
+    say,
+    show_report,
+)
+
+app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False,
+                  context_settings={"help_option_names": ["-h", "--help"]},
+                  rich_markup_mode=None)  # markup would swallow units in brackets
+
+# A wrong command line. It has no public name that all versions share: newer ones of typer bring their own click.
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+_INTERRUPTED = 130
+
+OperatingPoint = Annotated[list[str] | None, typer.Option(
+    help="Of frequency responses: mean of an input [unit, A] or ambient [unit of the file], may repeat.",
+    metavar="NAME=VALUE")]
+MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"robthermal {rt.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def robthermal(show_version: Annotated[bool, typer.Option(
+        "--version", callback=_print_version, is_eager=True, help="Print the version and exit.")] = False) -> None:
+    """From measured data to verified certificates for thermal systems with thermoelectric modules."""
+
+
+@app.command()
+def demo(out: Out = Path("robthermal-demo"), as_json: Json = False) -> None:
+    """Run the main job on the embedded two-module system (simulated records).
+
+    Example: robthermal demo --out demo
+    """
+    _run(rt.jobs.demo_project(), out, as_json)
+
+
+@app.command()
+def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="PROJECT.toml")],
+        out: Out = Path("robthermal-out"), as_json: Json = False) -> None:
+    """Run the main job on your system and records: data, calibrated model, certificates, report.
+
+    Example: robthermal run project.toml --out results
+    """
+    _run(project, out, as_json)
+
+
+def _run(project: Path, out: Path, as_json: bool) -> None:
+    job = rt.jobs.read_project(project)
+    rt.jobs.folder.check_free(out)
+    with progress() as stage:
+        result = rt.jobs.run_job(job, stage)
+        stage("writing the report")
+        report = rt.jobs.write_job(result, out)
+    show_report(report, out, as_json)
+
+
+@app.command()
+def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml) and measured files, or these alone.",
+                                                      metavar="[SYSTEM.toml] [FILE]...")],
+          column: ColumnMap = None, record: ReadOption = None, as_json: Json = False) -> None:
+    """Say whether a system file and its records are sound, and how each measured file is understood.
+
+    Example: robthermal check setup.toml run1.csv run2.csv
+    """
+    system = files[0] if files[0].suffix.lower() == ".toml" else None
+    found = rt.read_system(system) if system else None
+    tables = reading(record, column)
+    measured = files[1:] if system else files
+    reports = rt.jobs.measured.import_reports(measured, found, tables=tables)
+    summary: dict[str, Any] = {"records": [{"file": str(file), "import": report.to_dict()}
+                           for file, report in zip(measured, reports, strict=True)]}
+    if found is not None:
+        constants = rt.thermal.time_constants(found)["time constant [s]"] if len(found.lumps) <= 2000 else None
+        summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links),
+                   "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
+                   "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
+                   **summary}
+    answer(summary, as_json, lambda: say(*([f"{found.name}: sound."] if found else []), *map(str, reports)))
+
+
+@app.command()
+def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.")],
+             out: Annotated[Path, typer.Option("--out", callback=place,
+                                               help="Record to write (.csv, .parquet, .mat).")],
+             column: ColumnMap = None, read: ReadOption = None, as_json: Json = False) -> None:
+    """Simulate a system with the inputs of a record.
+
+    Example: robthermal simulate setup.toml inputs.csv --out simulated.csv
+    """
+    found = rt.read_system(system)
+    parts = rt.jobs.measured.read_files([record], found, tables=reading(read, column))
+    with progress() as stage:
+        stage("simulating")
+        results = [rt.thermal.simulate(found, part) for part in parts]
+    temperatures = [*results[0].output_names, *(n for n in results[0].input_names if n in found.ambients)]
+    rt.signals.save_records(results, out, temperature_unit=found.temperature_unit, temperatures=temperatures)
+    n, outputs = sum(map(len, results)), list(results[0].output_names)
+    summary = {"out": str(out), "samples": n, "parts": len(results), "outputs": outputs}
+    answer(summary, as_json, lambda: say(f"{n} samples of {len(outputs)} outputs: {out}"))
+
+
+@app.command()
+def calibrate(system: SystemFile,
+              records: Annotated[list[Path], typer.Argument(
+                  help="Training records, or one frequency response from `robthermal frf`.")],
+              validation: Annotated[list[Path] | None, typer.Option("--validation", help="Held-out record.")] = None,
+              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
+                  "calibrated.toml"),
+              median_filter: MedianFilter = None,
+              operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
+              as_json: Json = False) -> None:
+    """Fit the parameters in the [fit] table of a system to records, or to a frequency response.
+
+    Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
+    """
+    found = rt.read_system(system)
+    point = rt.jobs.request.point_from_text(found, operating_point or [])
+    with progress() as stage:
+        stage("calibrating")
+        fit = rt.jobs.measured.calibrate_files(found, records, validation or [], median_filter=median_filter,
+                                               operating_point=point, tables=reading(record, column))
+    rt.thermal.write_system(fit.system, out)
+    answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
+    exit_unless(bool(fit.outcome))
+
+
+@app.command()
+def diagnose(system: SystemFile,
+             records: Annotated[list[Path], typer.Argument(
+                 help="Training records, or frequency responses from `robthermal frf`.",
+                 metavar="TRAIN.csv...")],
+             validation: Annotated[list[Path] | None, typer.Option(
+                 "--validation", help="Record or response that no fit sees, may repeat.")] = None,
+             session_gain: Annotated[bool, typer.Option(
+                 "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
+             operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
+             out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
+    """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
+
+    Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
+    """
+    found = rt.read_system(system)
+    tables = reading(record, column)
+    train, held_out = (rt.jobs.measured.read_measured(paths, found, tables=tables)
+                       for paths in (records, validation or []))
+    point = rt.jobs.request.point_from_text(found, operating_point or [])
+    rt.jobs.folder.check_free(out)
+    with progress() as stage:
+        result = rt.jobs.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage,
+                                          operating_point=point, session_gain=session_gain)
+        stage("writing the report")
+        rt.jobs.write_diagnosis(result, out)
+    summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),
+               "report": str(out / "report.html")}
+    answer(summary, as_json, lambda: say(str(result.diagnosis), f"augmented system: {out / 'augmented.toml'}",
+                                         f"report: {out / 'report.html'}"))
+    exit_unless(result.holds)
+
+
+app.command()(frequency.frf)
+app.command()(frequency.excitation)
+
+
+@app.command()
+def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
+            temperature: Box = None,
+            current: Annotated[list[str] | None, typer.Option(
+                help="Range of one module [A]; default its declared limits.", metavar="NAME=LO:HI")] = None,
+            ambient: AmbientRange = None,
+            setpoint: Annotated[list[str] | None, typer.Option(
+                help="Regulated cold face, in the unit of the file.", metavar="NAME=VALUE")] = None,
+            method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+            structure: Annotated[str, typer.Option(help="With lyapunov: full or block P.")] = "full",
+            large: Annotated[bool, typer.Option(help="With lyapunov: more than 40 lumps too, slowly.")] = False,
+            as_json: Json = False) -> None:
+    """Certify a system: contraction in a box, a box that is never left, current limits, runaway limit.
+
+    Example: robthermal certify setup.toml --current m1=0:1.5 --current m2=0:1.5 --out certified
+    """
+    found = rt.read_system(system)
+    boxes = rt.jobs.request.boxes_from_text(found, temperature=temperature, current=current or [],
+                                            ambient=ambient or [], setpoint=setpoint or [], method=method,
+                                            structure=structure, large=large)
+    rt.jobs.folder.check_free(out)
+    with progress() as stage:
+        result = rt.jobs.certify_system(found, boxes, stage)
+        stage("writing the report")
+        report = rt.jobs.write_certify(result, (system,), out)
+    show_report(report, out, as_json)
+
+
+@app.command()
+def design(system: SystemFile, out: Out = Path("robthermal-design"),
+           setpoint: Annotated[list[str] | None, typer.Option(
+               help="Cold face to hold, in the unit of the file; default the lower end of --temperature.",
+               metavar="NAME=VALUE")] = None,
+           current: Annotated[list[str] | None, typer.Option(
+               help="Limits of one module [A]; default the largest that are certified.", metavar="NAME=LO:HI")] = None,
+           ambient: AmbientRange = None, temperature: Box = None,
+           bandwidth: Annotated[float, typer.Option(help="Crossover of the loops [rad/s].")] = 0.02,
+           sample_time: Annotated[float, typer.Option(help="[s].")] = 1.0,
+           sensors: Annotated[str | None, typer.Option(
+               help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
+           method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+           as_json: Json = False) -> None:
+    """Design a controller: certified current limits, linearising law, PI, observer, certificates, report.
+
+    Example: robthermal design setup.toml --setpoint m1=5 --setpoint m2=5 --bandwidth 0.02 --out design
+    """
+    found = rt.read_system(system)
+    wanted = rt.jobs.design.design_from_text(
+        found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
+        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method)
+    rt.jobs.folder.check_free(out)
+    with progress() as stage:
+        result = rt.jobs.design_system(found, wanted, stage)
+        stage("writing the report")
+        report = rt.jobs.write_design(result, (system,), out)
+    show_report(report, out, as_json, controller=str(out / "design.json"))
+
+
+@app.command("map")
+def limit_map(system: SystemFile, out: Out = Path("robthermal-map"),
+              ambient: Annotated[str | None, typer.Option(
+                  help="Of all ambients, in the unit of the file; default 10 K around nominal, 5 values.",
+                  metavar="LO,HI,N")] = None,
+              load: Annotated[str | None, typer.Option(
+                  help="Heat into every cold face [W]; default up to the runaway load, 6 values.",
+                  metavar="LO,HI,N")] = None,
+              setpoint: Annotated[str | None, typer.Option(
+                  help="Of all cold faces, in the unit of the file; default the lower end of --temperature to nominal "
+                  "ambient, 3 values.", metavar="LO,HI,N")] = None,
+              temperature: Box = None,
+              method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+              as_json: Json = False) -> None:
+    """Map the allowed current over ambient temperature, heat load and set-point.
+
+    Example: robthermal map setup.toml --ambient 15,35,5 --load 0,5,6 --setpoint 5,15,3 --out map
+    """
+    found = rt.read_system(system)
+    wanted = rt.jobs.map.map_from_text(found, ambient=ambient, load=load, setpoint=setpoint, temperature=temperature,
+                                       method=method)
+    rt.jobs.folder.check_free(out)
+    with progress_bar("conditions") as done:
+        result = rt.jobs.map_system(found, wanted, done)
+    report = rt.jobs.write_map(result, found, (system,), out)
+    show_report(report, out, as_json, data=str(out / "map.csv"))
+
+
+@app.command()
+def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their design.", metavar="SPEC.toml")],
+           out: Out = Path("robthermal-coupling"), as_json: Json = False) -> None:
+    """Couple two controlled subsystems: filters, robust stability against measured plants, certificates, report.
+
+    Example: robthermal couple SPEC.toml --out coupled
+    """
+    job = rt.jobs.read_coupling(spec)
+    rt.jobs.folder.check_free(out)
+    with progress() as stage:
+        result = rt.jobs.couple_subsystems(job, stage)
+        stage("writing the report")
+        report = rt.jobs.write_coupling(result, out)
+    show_report(report, out, as_json, job.remarks, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
+
+
+for _command in (results.report, results.verify, learn.new, learn.explain):
+    app.command()(_command)
+
+
+def main() -> None:
+    """Entry point: one clear message on standard error and exit status 2 for bad input; with --json also as JSON."""
+    warnings.simplefilter("always", UserWarning)
+    warnings.showwarning = lambda message, *rest, **kwargs: typer.echo(f"note: {message}", err=True)
+    try:
+        status = app(prog_name="robthermal", standalone_mode=False)  # the exit status, or None where all went well
+    except _UsageError as error:
+        _stop(_usage(error), 2)
+    except InputError as error:
+        _stop(str(error), 2, what=error.what, where=error.where, expected=error.expected, remedy=error.remedy)
+    except Diverged as error:
+        _stop(str(error), 1, time=error.time)
+    except OSError as error:  # a full disk, a folder without permission
+        _stop(f"{error.filename or 'a file'}: {error.strerror or error}", 2)
+    except (KeyboardInterrupt, typer.Abort):
+        status = _INTERRUPTED
+    if status == _INTERRUPTED:  # typer turns Ctrl-C into an abort or into this status, depending on its version
+        _stop("interrupted; nothing was written", _INTERRUPTED)
+    sys.exit(status)
+
+
+def _usage(error: Any) -> str:
+    """What is wrong with the command line, and where to look; the help itself where nothing was asked."""
+    said = error.format_message().rstrip(".")
+    command = error.ctx.command_path if error.ctx else "robthermal"
+    return f"{said}. See {command} --help." if said and "\n" not in said else f"no command\n{said}"
+
+
+def _stop(message: str, status: int, **details: object) -> None:
+    typer.echo(f"robthermal: {message}", err=True)
+    if "--json" in sys.argv:  # a script that asked for JSON gets it, whatever happened
+        error = {"message": message, "status": status, **details}
+        typer.echo(json.dumps({"error": error}, indent=1, default=str))
+    sys.exit(status)

@@ -1,0 +1,127 @@
+"""What the command line says, and where: tables, JSON, progress; options that several commands share."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+import robthermal as rt
+
+from ..errors import Outcome
+
+_PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
+Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+ColumnMap = Annotated[list[str] | None, typer.Option(
+    "--column", help="Which column of the file a name is, for example 'T1=NTC 1'; may repeat.", metavar="NAME=HEADER")]
+ReadOption = Annotated[list[str] | None, typer.Option(
+    "--record", help="How files are read: a key of [record], for example gaps=fill; may repeat.", metavar="KEY=VALUE")]
+SystemFile = Annotated[Path, typer.Argument(help="System file (TOML).", metavar="SYSTEM.toml")]
+Box = Annotated[tuple[float, float] | None, typer.Option(
+    "--temperature", help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")]
+AmbientRange = Annotated[list[str] | None, typer.Option(
+    "--ambient", help="Range of one ambient, in the unit of the file.", metavar="NAME=LO:HI")]
+
+
+def reading(record: list[str] | None, column: list[str] | None) -> tuple[Any, ...]:
+    """How measured files are read, from the options --record and --column."""
+    return rt.jobs.measured.reading_from_text(record or [], column or [])
+
+
+def place(file: Path | None) -> Path | None:
+    """An output file whose folder exists: said before the work, not after it."""
+    if file is not None and not file.parent.is_dir():
+        raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
+    return file
+
+
+def drawing(file: Path | None) -> Path | None:
+    """An output file that matplotlib can write."""
+    if file is not None and file.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise typer.BadParameter(f"the file name ends in {file.suffix!r}, not in .svg, .png or .pdf")
+    return place(file)
+
+
+def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome] = (), **more: Any) -> None:
+    """Verdict, reasons and claims of a report, for people or as JSON; exit status 1 where the verdict is FAIL."""
+    def show() -> None:
+        table = Table("claim", "answer", "box", "margin")
+        for claim in report.claims:
+            said = Text(_word(claim), style="green" if claim.good else "bold red")
+            table.add_row(Text(claim.name), said, Text(claim.box), Text(claim.margin))  # [1/s] is a unit, no markup
+        console = Console()
+        if not console.is_terminal:
+            console.width = max(console.width, _PIPE_WIDTH)
+        console.print(table)
+        say(f"verdict: {report.verdict}", *(f"  {one.level}: {one}" for one in report.reasons))
+        say(*(f"usable current, {row.direction}{' (parameter ranges)' * (row.parameters == 'ranges')}: {row.range}"
+              for row in report.usable))
+        say(*(f"{name}: {value}" for name, value in more.items()), *(f"remark: {remark.text}" for remark in remarks),
+            f"report: {out / 'report.html'}")
+
+    summary = {"verdict": report.verdict, "holds": report.holds,
+               "reasons": [one.to_dict() for one in report.reasons], "out": str(out),
+               "report": str(out / "report.html"), **more,
+               "claims": [{"title": c.name, "holds": c.holds, "verified": c.verified, "reason": c.reason}
+                          for c in report.claims],
+               "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
+    answer(summary, as_json, show)
+    exit_unless(report.holds)
+
+
+def _word(claim: Any) -> str:
+    if claim.tested:
+        return "passed" if claim.good else f"NOT PASSED: {claim.why}"
+    return "certified, verified" if claim.good else f"NOT CERTIFIED: {claim.why}"
+
+
+def answer(summary: Any, as_json: bool, show: Callable[[], None]) -> None:
+    """Print a result for scripts or for people."""
+    if as_json:
+        typer.echo(json.dumps(summary, indent=1, allow_nan=False, default=str))
+    else:
+        show()
+
+
+def say(*lines: str) -> None:
+    """Print lines."""
+    for line in lines:
+        typer.echo(line)
+
+
+def exit_unless(good: bool) -> None:
+    """Exit status 1 where the honest answer is no."""
+    if not good:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """A spinner with the stage on a terminal; nothing in a pipe."""
+    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
+        yield lambda stage: None
+        return
+    with Console(stderr=True).status("starting") as status:
+        yield lambda stage: status.update(stage)
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar of what is done on a terminal; nothing in a pipe."""
+    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
+        yield lambda done, total: None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -1,0 +1,45 @@
+"""Reasons that a certification gives by itself, beside those of its claims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...report import Reason
+from ..claims import Certification, GateCode
+from ._currents import CODES, box_stays_inside, current_reasons, within_usable
+
+CERTIFY_GATES = tuple(code.code for code in (*CODES.values(), GateCode.NOMINAL_ONLY))
+
+
+def certification_reasons(result: Certification, measured: Mapping[str, tuple[float, float]] | None = None
+                          ) -> tuple[Reason, ...]:
+    """Reasons that a certification gives by itself.
+
+    Parameters
+    ----------
+    result : Certification
+        From `certify_system`.
+    measured : mapping, optional
+        Range of the currents in the records, by module [A].
+    """
+    found = [*current_reasons(result.current, measured or {}, result.usable, box_inside(result))]
+    if result.parameters is None:
+        found.append(remark(GateCode.NOMINAL_ONLY, "certify", "parameters", GateCode.NOMINAL_ONLY.meaning))
+    return tuple(found)
+
+
+def box_inside(result: Certification) -> bool:
+    """Whether the boxes that are never left are certified, for all parameters asked for, and inside the stated one."""
+    good = {one.file: one.certificate for one in result.checked if one.good}
+    needed = [one.file for one in result.checked if one.required and one.certificate.kind == "invariance"]
+    return box_stays_inside(good, needed, result.boxes.temperature_lower == "held")
+
+
+def stays_usable(result: Certification) -> bool:
+    """Whether all currents of the claims are inside the usable ranges: only then is "no thermal runaway" said."""
+    return within_usable(result.current, result.usable, box_inside(result))
+
+
+def remark(code: GateCode, stage: str, about: str, text: str, value: float | None = None,
+            limit: float | None = None) -> Reason:
+    return Reason("remark", code.code, stage, about, text, code.remedy, value, limit)

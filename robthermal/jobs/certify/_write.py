@@ -1,0 +1,50 @@
+"""Write a certification without data: report, certificates, JUnit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...report import Report
+from ..claims import Certification, machine_assumptions, required_claims
+from ..evidence import write_certification
+from ..folder import output_folder
+from ..now import now
+from ..provenance import provenance, subtitle
+from ._reasons import CERTIFY_GATES, certification_reasons, stays_usable
+from ._sections import certification_sections
+from ._table import certify_table
+
+
+def write_certify(result: Certification, files: tuple[Path, ...], out: str | Path) -> Report:
+    """Write a certification without data; as `write_job`.
+
+    Parameters
+    ----------
+    result : Certification
+        From `certify_system`.
+    files : tuple of Path
+        Input files, for their hashes.
+    out : str or Path
+        Output folder.
+
+    Returns
+    -------
+    Report
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> done = rt.jobs.certify_system(rt.systems.tclab(), rt.jobs.Boxes())
+    >>> rt.jobs.write_certify(done, (), "certified").holds
+    True
+    """
+    report = Report(title=result.system.name, subtitle=subtitle(result.system), label="",
+                    claims=required_claims(result.checked, stays_usable(result)),
+                    sections=tuple(certification_sections(result)), provenance=provenance(files),
+                    generated=now(),
+                    assumptions=machine_assumptions(result.system, result.parameters is not None),
+                    gate=certification_reasons(result), gates=CERTIFY_GATES, usable=result.usable,
+                    data={"certify": certify_table(result)})
+    with output_folder(out) as folder:
+        report = write_certification(result.checked, report, folder)
+    return report

@@ -1,0 +1,13 @@
+"""What a report says of certificates: checked claims, their words, codes of reasons, assumptions."""
+
+from ._assumptions import ARITHMETIC as ARITHMETIC
+from ._assumptions import kind_assumptions as kind_assumptions
+from ._assumptions import machine_assumptions as machine_assumptions
+from ._checked import Certification as Certification
+from ._checked import Checked as Checked
+from ._codes import GateCode as GateCode
+from ._required import required_claims as required_claims
+from ._words import claim_of as claim_of
+
+__all__ = ["ARITHMETIC", "Certification", "Checked", "GateCode", "claim_of", "kind_assumptions", "machine_assumptions",
+           "required_claims"]

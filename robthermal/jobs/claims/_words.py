@@ -1,0 +1,155 @@
+"""A claim of the report in words, made from its certificate alone: title, sentence, box, margin, proof."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from math import log
+from typing import Any
+
+from ...report import Claim, Parameters
+from ...verification import Certificate, Verdict
+
+_ZERO = 273.15
+_ENDING = "_ranges"
+_LISTED = 3  # parameters named in the box of a claim; the exact claim names all
+_TITLES = {  # by key; the first is the one of a job
+    "contraction": ("Contraction in the stated box", "Contraction at the current limits"),
+    "box": ("The box is never left",), "box_contraction": ("Contraction in the box that is never left",),
+    "observer": ("The observer's error shrinks",),
+}
+_SENTENCES = {  # the exact sentences, with all numbers, are in the appendix, "Exact claims"
+    "contraction": "For every lump temperature and module current in the box, however the currents change, any two "
+                   "temperature histories approach each other. That the temperatures stay in this box is not part of "
+                   "this claim.",
+    "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the currents, heats and "
+           "ambients do within theirs.",
+    "box_contraction": "Inside those ranges any two temperature histories approach each other too.",
+    "observer": "For every temperature, estimate and current in the box the error of the observer shrinks from sample "
+                "to sample, however the currents change.",
+}
+_WITHOUT_MODULES = {
+    "contraction": "For every lump temperature in the box any two temperature histories under the same heats approach "
+                   "each other. That the temperatures stay in this box is not part of this claim.",
+    "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the heats and ambients do "
+           "within theirs.",
+}
+NO_RUNAWAY = " Together with the claim that the box is never left: no thermal runaway from there."
+_HOW = {
+    "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
+    "invariance": "On every face of the box the heat flows inwards (Nagumo); re-derived in ball arithmetic.",
+    "observer": "One norm in which the sampled error shrinks everywhere in the box; re-derived in ball arithmetic.",
+}
+
+
+def claim_of(file: str, certificate: Certificate, verdict: Verdict | None, *, title: str = "", breaks: str = "",
+             usable: bool = False, seconds: float | None = None) -> Claim:
+    """What a report says of a certificate; nothing of it comes from anywhere else.
+
+    Parameters
+    ----------
+    file : str
+        Place of the certificate in the results folder; its name says which claim of a report it is.
+    certificate : Certificate
+        What is claimed.
+    verdict : Verdict or None
+        What the check said.
+    title : str, optional
+        Title that is wanted, if it is one of those this claim may have.
+    breaks : str, optional
+        What makes it fail for the parameter ranges.
+    usable : bool, optional
+        Whether the box is never left for the same currents, all of them inside the usable range: only then is
+        "no thermal runaway" said.
+    seconds : float, optional
+        Duration of the check, if another than that of `verdict` is to be shown [s].
+    """
+    stem = file.rpartition("/")[2].removesuffix(".json")
+    ranges = stem.endswith(_ENDING)
+    key = stem.removesuffix(_ENDING)
+    titles = _TITLES.get(key, (key.replace("_", " ").capitalize(),))
+    good = certificate.holds and verdict is not None and verdict.valid
+    reason = certificate.reason if not certificate.holds else "" if good else verdict.reason if verdict else (
+        "not verified")
+    if breaks and not certificate.holds:
+        reason = f"{breaks}; {reason}"
+    parameters: Parameters = "ranges" if ranges else "nominal" if key in _JOB else ""
+    return Claim(title=title if title in titles else titles[0], sentence=_sentence(key, certificate, usable and good),
+                 holds=certificate.holds, verified=good, box=box_of(certificate),
+                 margin=_margin(certificate, verdict) if good and verdict else "none",
+                 how=_HOW.get(certificate.kind, "re-derived in ball arithmetic"), reason=reason, file=file,
+                 kind=certificate.kind, parameters=parameters,
+                 seconds=seconds if seconds is not None else verdict.seconds if verdict else 0.0)
+
+
+_JOB = ("contraction", "box", "box_contraction")
+
+
+def _sentence(key: str, certificate: Certificate, usable: bool) -> str:
+    modules = certificate.system.get("modules") or certificate.region.get("current")
+    found = (_SENTENCES if modules else _SENTENCES | _WITHOUT_MODULES).get(key)
+    if found is None:
+        return certificate.claim
+    return found + NO_RUNAWAY if key == "box_contraction" and usable else found
+
+
+def box_of(certificate: Certificate) -> str:
+    """Ranges of a claim, separated by semicolons: never wider than they are, of a box that is kept never narrower.
+    """
+    region = certificate.region
+    parts = [f"{name}: {inward(*pair)} A" for name, pair in _pairs(region, "current")]
+    box = region.get("temperature")
+    if isinstance(box, Mapping):
+        ends = [float(value) - _ZERO for pair in box.values() for value in pair]
+        overall = outward if certificate.kind == "invariance" else inward
+        parts.append(f"every lump in its own range, overall {overall(min(ends), max(ends), 3)} °C")
+    elif isinstance(box, (list, tuple)):
+        parts.append(f"all lumps {_celsius(box)} °C")
+    parts += [f"{name}: {_celsius(pair)} °C" for name, pair in _pairs(region, "ambient")]
+    parts += [f"heat into {name}: {inward(*pair)} W" for name, pair in _pairs(region, "heat")]
+    uncertain = [f"{name} {inward(*pair)}" for name, pair in _pairs(region, "parameters")]
+    if uncertain:
+        listed = f": {', '.join(uncertain)}" if len(uncertain) <= _LISTED else ", as the file states them"
+        parts.append(f"{len(uncertain)} parameter{'s' * (len(uncertain) > 1)} in their ranges{listed}")
+    return "; ".join(parts)
+
+
+def inward(low: Any, high: Any, digits: int = 6) -> str:
+    """A range in words that is not wider than the range."""
+    return f"{_rounded(low, digits, ROUND_CEILING)} to {_rounded(high, digits, ROUND_FLOOR)}"
+
+
+def outward(low: Any, high: Any, digits: int = 6) -> str:
+    """A range in words that is not narrower than the range."""
+    return f"{_rounded(low, digits, ROUND_FLOOR)} to {_rounded(high, digits, ROUND_CEILING)}"
+
+
+def _celsius(pair: Any) -> str:
+    low, high = (float(end) - _ZERO for end in pair)
+    return inward(low, high)
+
+
+def _rounded(value: Any, digits: int, direction: str) -> str:
+    number = Decimal(f"{float(value):.12g}")  # the digits after these are of the conversion from kelvin
+    found = Context(prec=digits, rounding=direction).create_decimal(number).normalize()
+    return f"{found:f}" if abs(found) < 10**6 and (not found or abs(found) >= Decimal("1e-4")) else str(found)
+
+
+def _pairs(region: Mapping[str, Any], key: str) -> list[tuple[str, Any]]:
+    found = region.get(key)
+    return list(found.items()) if isinstance(found, Mapping) else []
+
+
+def _margin(certificate: Certificate, verdict: Verdict) -> str:
+    if certificate.kind == "observer":
+        factor = float(certificate.evidence["contraction"])
+        tau = -float(certificate.region["sample_time"]) / log(factor)
+        return (f"errors die out with a time constant of at most {_rounded(tau, 4, ROUND_CEILING)} s (factor "
+                f"{_rounded(factor, 6, ROUND_CEILING)} per sample)")
+    if certificate.kind == "contraction":
+        rate = float(certificate.evidence["rate"])
+        if rate > 0.0:
+            return (f"differences die out with a time constant of at most {_rounded(1 / rate, 4, ROUND_CEILING)} s "
+                    f"(rate {_rounded(rate, 4, ROUND_FLOOR)} 1/s)")
+    return ", ".join(f"at least {_rounded(value, 3, ROUND_FLOOR)} W flow inwards on every face" if key == "heat"
+                     else f"{key} {value:.3g}" for key, value in verdict.margins.items())

@@ -1,0 +1,9 @@
+"""Design a controller within certified currents, and write it."""
+
+from ._design import ControllerDesign as ControllerDesign
+from ._design import design_system as design_system
+from ._report import write_design as write_design
+from ._request import DesignRequest as DesignRequest
+from ._request import design_from_text as design_from_text
+
+__all__ = ["ControllerDesign", "DesignRequest", "design_from_text", "design_system", "write_design"]

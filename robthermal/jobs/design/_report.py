@@ -1,0 +1,179 @@
+"""Report and files of a controller design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...design import ClosedLoop, GainObserver
+from ...report import Figure, Reason, Report, Section, Table, house_style
+from ...thermal import System
+from ..certify import certification_sections
+from ..claims import GateCode, machine_assumptions, required_claims
+from ..evidence import write_certification
+from ..folder import output_folder
+from ..now import now
+from ..provenance import provenance, subtitle
+from ._design import ControllerDesign
+from ._file import write_design_file
+from ._limits import BELOW_FOLD
+
+_ZERO = 273.15
+_LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
+
+
+def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | Path) -> Report:
+    """Write a design into a folder, which appears only when complete.
+
+    Parameters
+    ----------
+    result : ControllerDesign
+        From `design_system`.
+    files : tuple of Path
+        Input files, for their hashes.
+    out : str or Path
+        Output folder: design.json with every number of the controller, report.html, junit.xml, summary.json,
+        ``certificates/*.json``.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds something else.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> system = rt.System(
+    ...     ambients={"room": {"temperature": 295.15}},
+    ...     lumps={"sink": {"capacity": 120.0}, "stage": {"capacity": 35.0}},
+    ...     links=[{"between": ("sink", "room"), "conductance": 0.9},
+    ...            {"between": ("stage", "room"), "conductance": 0.05}],
+    ...     modules={"m1": rt.systems.surrogate_module("sink", "stage")})
+    >>> done = rt.jobs.design_system(system, rt.jobs.DesignRequest(setpoint={"m1": 288.15}))
+    >>> rt.jobs.write_design(done, (), "design").holds
+    True
+    >>> sorted(path.name for path in Path("design").iterdir())
+    ['certificates', 'design.json', 'junit.xml', 'report.html', 'report.json', 'summary.json']
+    """
+    system = result.certification.system
+    report = Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
+                    claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
+                    provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
+                    generated=now(), gate=tuple(_reasons(result)), gates=_GATES)
+    with output_folder(out) as folder:
+        report = write_certification(result.certification.checked, report, folder)
+        write_design_file(result, folder / "design.json")
+    return report
+
+
+_ASSUMPTIONS = (
+    "The closed loop of law, controller and observer is simulated, not proven: the certificates cover every current "
+    "inside the limits, whatever the controller does, and the observer by itself.",
+    "The runaway limit I* and the reachable set-points are computed, not proven.",
+)
+
+
+_GATES = tuple(code.code for code in (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.CURRENT_BEYOND_INVARIANCE,
+                                      GateCode.NOMINAL_ONLY))
+
+
+def _reasons(result: ControllerDesign) -> Iterator[Reason]:
+    """What the verdict knows beside the claims."""
+    box = result.certification.safe.temperature
+    if box and not result.contained:
+        lump, (_, high) = max(box.items(), key=lambda item: item[1][1])
+        top = result.request.temperature[1]
+        yield Reason("fail", GateCode.CURRENT_BEYOND_INVARIANCE.code, "design", lump, "With these current limits "
+                     f"{lump} may reach {high - _ZERO:.1f} °C, beyond the {top - _ZERO:.1f} °C of the stated box.",
+                     "The set-points need more than the usable current: cool the hot side better, move the "
+                     "set-points, or narrow ambients and heats.", high, top)
+    yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
+                 "robthermal run with [calibrate] and [certify] makes the claims for the calibrated ranges.")
+
+
+def _sections(result: ControllerDesign) -> Iterator[Section]:
+    yield _controller_section(result)
+    yield _step_section(result)
+    if result.collapse is not None:
+        yield _linearity_section(result)
+    yield _observer_section(result.certification.system, result.observer, result.loop)
+    if not (result.certification.safe.holds and result.contained):
+        yield Section("No box that is never left", f"{result.certification.safe.outcome.text}\n\n"
+                      "The set-points need more current than is usable. Inside the temperature box the machine "
+                      "contracts at these currents, but that it stays inside is not proven: this design is not "
+                      "certified. Cool the hot side better, move the set-points, or narrow the room's range.",
+                      anchor="no-box")
+    yield from certification_sections(result.certification)
+
+
+def _controller_section(result: ControllerDesign) -> Section:
+    c, law, fold = result.controller, result.law, result.certification.runaway
+    rows = [{"module": name, "set-point [°C]": result.request.setpoint[name] - _ZERO,
+             "lower limit [A]": law.current_low[i], "upper limit [A]": law.current_high[i],
+             "needed [A]": result.reach.current[name], "I* [A]": fold.current[name] if fold else float("nan"),
+             "Kp [W/K]": c.proportional[i], "Ki [W/(K s)]": c.integral[i]}
+            for i, name in enumerate(law.names)]
+    own = " The limits are those that were asked for." if result.request.current else (
+        f" The upper limits are the usable ones: the smallest of {BELOW_FOLD:g} I*, the contraction limit, the file's "
+        "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
+        "lower ones are the largest with which that box is still never left.")
+    text = ("A linearising law turns the heat that the PI asks for into a current, within the limits; the PI works on "
+            f"a linear cold side, every {c.sample_time:g} s, with a crossover of {result.request.bandwidth:g} rad/s. "
+            f"{own}\n\ndesign.json has every number with its unit, and the equations to program.")
+    table = Table(pd.DataFrame(rows), "Limits and gains.")
+    return Section("The controller", text, tables=(table,), anchor="controller")
+
+
+def _step_section(result: ControllerDesign) -> Section:
+    with house_style():
+        axes = result.loop.plot()
+        axes[0].set_title("")
+        for limit in {*result.law.current_low, *result.law.current_high}:
+            axes[1].axhline(limit, color="#888888", linestyle=":", linewidth=0.8)
+        figure = Figure.draw(axes[0].figure, alt="Cold faces and currents over time after a step to the set-points.",
+                             caption="Above: cold faces (lines) and set-points (dashed). Below: currents and their "
+                             "limits (dotted).")
+    seen = "estimated from noisy readings" if result.observer else "taken as measured: the file has no sensors"
+    text = (f"Simulated from rest at ambient temperature on the nonlinear model; the temperatures are {seen}. "
+            f"{result.loop.outcome.text}")
+    return Section("Step to the set-points", text, figures=(figure,), anchor="step")
+
+
+def _linearity_section(result: ControllerDesign) -> Section:
+    found: Any = result.collapse
+    with house_style():
+        axes = found.plot()
+        figure = Figure.draw(axes[0].figure, alt="Normalised step responses, one curve per step size.",
+                             caption="Steps of several sizes, each divided by its size. Left: the same controller with "
+                             "a constant gain. Right: with the law.")
+    ratio = f", {found.ratio:.3g} times less" if found.outcome and np.isfinite(found.ratio) else ""
+    text = (f"A linear loop answers steps of every size alike. The largest spread between the normalised responses is "
+            f"{found.before:.2g} with a constant gain and {found.after:.2g} with the law{ratio}. {found.outcome.text}")
+    return Section("How linear the loop is", text, figures=(figure,), anchor="linearity")
+
+
+def _observer_section(system: System, observer: GainObserver | None, loop: ClosedLoop) -> Section:
+    if observer is None:
+        return Section("Observer", "The file has no sensors for one: the law needs the temperatures of both faces of "
+                       "every module. Add sensors, or measure the faces.", anchor="observer")
+    tail = slice(len(loop.time) // 2, None)
+    rms = np.sqrt(np.mean((loop.estimate - loop.lumps)[tail] ** 2, axis=0))
+    columns = dict(zip(observer.sensors, observer.gain.T, strict=True))
+    shown = columns if len(columns) <= _LARGEST_GAIN else {}
+    frame = pd.DataFrame({"lump": system.lump_names, "error, rms [K]": rms, **shown})
+    gain = {"kalman": "steady Kalman gain of the passive network",
+            "positive": "gain that keeps the error matrix nonnegative"}[observer.method]
+    text = (f"All lumps are reconstructed from {', '.join(observer.sensors)}: {gain}. The errors are those of the "
+            "simulated step, second half, with the sensors' noise. "
+            + ("L [K/K] has one column per sensor." if shown else "The gain is in design.json."))
+    table = Table(frame, f"Error of the observer{' and its gain' if shown else ''}.", digits=3)
+    return Section("Observer", text, tables=(table,), anchor="observer")

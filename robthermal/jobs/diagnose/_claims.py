@@ -1,0 +1,79 @@
+"""What a diagnosis says on the first screen of its report: tests on data, never proofs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...diagnosis import Diagnosis
+from ...report import Claim
+from ._diagnose import Diagnosed
+
+_SENTENCE = {
+    "named": "One set of effects explains the records: {names}.",
+    "ambiguous": "Effects explain the records, but other ones do as well: {names}.",
+    "consistent": "The system as it is explains the records; nothing is missing that they could show.",
+    "unexplained": "None of the known effects explains the records.",
+}
+
+
+def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
+    """Verdict, whiteness of what is left, prediction of unseen records.
+
+    Parameters
+    ----------
+    result : Diagnosed
+        From `diagnose_records`.
+    """
+    found = result.diagnosis
+    names = ", ".join(effect.label for effect in found.effects)
+    ruled_out = ", ".join(candidate.label for candidate in found.ruled_out)
+    yield _claim(f"Verdict: {found.verdict}", _SENTENCE[found.verdict].format(names=names), found.outcome.ok,
+                 found.outcome.text, _records(result, "train"), _margin(found),
+                 "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "
+                 "within ΔBIC 10 of it are alternatives"
+                 + (f", but {ruled_out}: more than 10 behind with the density of the unseen records added." if ruled_out
+                    else "."))
+    yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
+                 "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),
+                 f"p = {found.adequacy.p_value:.2g}, must be above 0.001",
+                 "Portmanteau tests of the innovations, and a spline of heat into every lump.")
+    if found.hold_out is not None:
+        outcome = found.hold_out.outcome
+        yield _claim("Unseen records are predicted", "Records that no fit has seen are predicted as well as the "
+                     "training records are fitted, give or take the uncertainty of the parameters.", outcome.ok,
+                     outcome.text, _records(result, "validation"),
+                     f"p = {found.hold_out.p_value:.2g}, must be above 0.0001",
+                     "F test of the whitened prediction errors against those of the training records."
+                     + (f" The same records ruled out {ruled_out}; p is not corrected for that." if ruled_out else ""))
+
+
+def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
+    """What the claims rest on.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    """
+    yield "A name is the best explanation among the effects of the catalogue; a cause outside it has no name here."
+    yield "Nothing is proven: all numbers are estimates, and all answers are tests on these records."
+    yield ("Noise of the sensors and random heats are white and Gaussian, with levels near the declared ones: "
+           + ", ".join(f"{name} {level:.3g} K" for name, level in found.noise_floor.noise.items()) + ".")
+    yield "Inputs and ambients are held between samples; sensors are read at the samples."
+    if found.hold_out is None:
+        yield "No validation record was given: that unseen records are predicted was not tested."
+
+
+def _claim(title: str, sentence: str, holds: bool, reason: str, box: str, margin: str, how: str) -> Claim:
+    return Claim(title, sentence, bool(holds), None, box, margin, how, "" if holds else reason, kind="diagnosis",
+                 tested=True)
+
+
+def _records(result: Diagnosed, kind: str) -> str:
+    said = [f"{kind}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind]
+    said += [f"{kind}: {one.name}, {one.frequency.size} bins" for one in result.responses if kind == "train"]
+    return "; ".join(said)
+
+
+def _margin(found: Diagnosis) -> str:
+    return "; ".join(f"{effect.label}: ΔBIC {effect.delta_bic:.0f}" for effect in found.effects) or "no effect accepted"

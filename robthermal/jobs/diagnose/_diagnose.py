@@ -1,0 +1,187 @@
+"""The diagnosis job: records read, effects searched, residuals before and after for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from ...diagnosis import Diagnosis, LinearizedRecord, diagnose
+from ...diagnosis.path import LinearizedResponse
+from ...errors import InputError
+from ...identify import FrequencyResponse
+from ...signals import Record
+from ...thermal import System
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Free-run residuals of one record.
+
+    Parameters
+    ----------
+    kind : str
+        "train" or "validation".
+    name : str
+        Of the record.
+    time : ndarray, shape (n,)
+        Sample times [s].
+    before, after : dict
+        {sensor: measured − model (n,)} [K], nominal system refitted and with the effects; nan if the model runs away.
+    """
+
+    kind: str
+    name: str
+    time: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+
+    @property
+    def frequency(self) -> Array:
+        """Frequencies of `spectra` [Hz]."""
+        return np.asarray(self._welch(np.zeros_like(self.time))[0])
+
+    def spectra(self) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Amplitude spectral densities [K/√Hz] of the residuals before and after, by Welch's method."""
+        before, after = ({name: np.sqrt(self._welch(values)[1]) for name, values in residuals.items()}
+                         for residuals in (self.before, self.after))
+        return before, after
+
+    def _welch(self, values: Array) -> tuple[Array, Array]:
+        n = values.size
+        f, power = welch(values, fs=1.0 / float(self.time[1] - self.time[0]), nperseg=max(min(n, 8), n // 4))
+        return f[1:], power[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseResiduals:
+    """What two models leave of one frequency response.
+
+    Parameters
+    ----------
+    name : str
+        Of the response.
+    frequency : ndarray, shape (n,)
+        Of its bins [Hz].
+    before, after : dict
+        {"output/input": size of measured - model (n,)} [output unit / input unit].
+    """
+
+    name: str
+    frequency: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A diagnosis with what its report draws.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+    residuals : tuple of Residuals
+        One per record.
+    responses : tuple of ResponseResiduals
+        One per frequency response fitted.
+    files : tuple of Path
+        System file and records.
+    """
+
+    diagnosis: Diagnosis
+    residuals: tuple[Residuals, ...]
+    responses: tuple[ResponseResiduals, ...]
+    files: tuple[Path, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether one set of effects, or none, explains the records."""
+        return self.diagnosis.outcome.ok
+
+
+def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Record | FrequencyResponse],
+                     validation: Sequence[Record | FrequencyResponse] = (),
+                     progress: Callable[[str], None] = lambda stage: None, *,
+                     operating_point: Mapping[str, float] | None = None, session_gain: bool = False) -> Diagnosed:
+    """Diagnose a system on records and frequency responses.
+
+    Parameters
+    ----------
+    system : System
+        Nominal.
+    files : tuple of Path
+        Input files, for their hashes.
+    train, validation : sequence of Record or FrequencyResponse
+        Fitted, and not seen by any fit.
+    progress : callable, optional
+        Called with a sentence before every stage.
+    operating_point, session_gain
+        As in `rt.diagnose`.
+
+    Returns
+    -------
+    Diagnosed
+
+    Raises
+    ------
+    InputError
+        As `rt.diagnose`.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
+    ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
+    >>> drive = rt.Record(sample_time=10.0, inputs=np.repeat([4.0, 0.0, 6.0, 2.0], 50), outputs=np.zeros((200, 0)),
+    ...                   input_names=["heater"], output_names=[])
+    >>> run = rt.thermal.simulate(bar.with_parameters({"sensors.T.time_constant": 30.0}), drive)
+    >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
+    >>> found = rt.jobs.diagnose_records(bar, (), [noisy])
+    >>> found.holds, found.diagnosis.effects[0].label, found.residuals[0].kind
+    (True, 'sensor_lag(T)', 'train')
+    """
+    try:
+        found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
+                         operating_point=operating_point or None, session_gain=session_gain)
+    except InputError as error:
+        where = error.where.replace("argument records", "training records")
+        where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
+        raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
+    progress("running both models freely")
+    return Diagnosed(found, (*_trained(found), *_unseen(found)), tuple(_responses(found)), files)
+
+
+def _trained(found: Diagnosis) -> Iterator[Residuals]:
+    for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
+        if isinstance(path, LinearizedRecord):
+            names = path.one.sensors
+            yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
+
+
+def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
+    """Real parts stand above imaginary parts."""
+    for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
+        if isinstance(path, LinearizedResponse):
+            n = path.one.frequencies.size
+            sizes = (np.hypot(r[:n], r[n:]) for r in (before, after))
+            yield ResponseResiduals(path.one.label, path.one.frequencies,
+                                    *(_by_name(path.one.sensors, size) for size in sizes))
+
+
+def _unseen(found: Diagnosis) -> Iterator[Residuals]:
+    """The free runs of the hold-out test: initial temperatures from the first tenth, the session's own gains."""
+    for one in () if found.hold_out is None else found.hold_out.residuals:
+        yield Residuals("validation", one.name, one.time, one.before, one.after)
+
+
+def _by_name(names: Sequence[str], residuals: Array) -> dict[str, Array]:
+    return {name: residuals[:, i] for i, name in enumerate(names)}

@@ -1,0 +1,150 @@
+"""What a name means: an effect, a kind of certificate, the code of an outcome, an error."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from ... import errors
+from ...diagnosis import Effect, Quantity, effects
+from ...errors import InputError
+from ...verification import KINDS
+from ..claims import ARITHMETIC, GateCode, kind_assumptions
+from ._outcomes import Said, outcome_codes
+
+_PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency"), "linear_certificates")}
+_ERRORS = {cls.__name__: cls for cls in (errors.InputError, errors.Diverged)}
+_REASONS = {code.code: code for code in GateCode}
+_ANSWER = {True: "the answer is yes", False: "the answer is no", None: "the answer depends"}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What one name means.
+
+    Parameters
+    ----------
+    name : str
+        As it stands in files, tables and messages.
+    what : str
+        "effect", "certificate", "outcome", "reason" or "error".
+    meaning : tuple of str
+        Paragraphs.
+    details : dict of str to tuple of str
+        By heading: assumptions, confusable partners, what separates them.
+    page : str
+        Page of the documentation.
+    """
+
+    name: str
+    what: str
+    meaning: tuple[str, ...]
+    details: dict[str, tuple[str, ...]]
+    page: str
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: {self.what}", *self.meaning]
+        for heading, texts in self.details.items():
+            lines += [f"{heading}:", *(f"  - {text}" for text in texts)]
+        return "\n".join([*lines, f"Documentation: {self.page}"])
+
+
+def explainable() -> dict[str, tuple[str, ...]]:
+    """Every name that `explain` knows, by what it is.
+
+    Returns
+    -------
+    dict of str to tuple of str
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> "sensor_lag" in rt.jobs.explainable()["effect"]
+    True
+    """
+    return {"effect": tuple(effects()), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
+            "reason": tuple(_REASONS), "error": tuple(_ERRORS)}
+
+
+def explain(name: str) -> tuple[Explanation, ...]:
+    """Explain a name that stands in a report, a message, a certificate or a diagnosis.
+
+    Parameters
+    ----------
+    name : str
+        Of an effect, a kind of certificate, the code of an outcome, the reason of a verdict, or an error.
+
+    Returns
+    -------
+    tuple of Explanation
+        More than one where a name has several meanings.
+
+    Raises
+    ------
+    InputError
+        Nothing has this name; the nearest are listed.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.jobs.explain("radiation")[0].details["Confused with"]
+    ('natural_convection', 'missing_ambient_link')
+    """
+    found = tuple(_all(name))
+    if not found:
+        known = [one for names in explainable().values() for one in names]
+        near = get_close_matches(name, known, n=4, cutoff=0.5)
+        raise InputError(f"nothing is called {name!r}", where="explain",
+                         expected=f"one of {', '.join(near)}" if near else "",
+                         remedy="`robthermal explain` without a name lists all.")
+    return found
+
+
+def _all(name: str) -> Iterator[Explanation]:
+    if name in effects():
+        yield _effect(effects()[name])
+    if name in KINDS:
+        yield _certificate(name)
+    if name in outcome_codes():
+        yield _outcome(name, outcome_codes()[name])
+    if name in _REASONS:
+        yield Explanation(name, "reason", (_REASONS[name].meaning,), {"What to do": (_REASONS[name].remedy,)},
+                          "docs/explanations/report.md")
+    if name in _ERRORS:
+        text = inspect.getdoc(_ERRORS[name]) or ""
+        yield Explanation(name, "error", (text.split("\n\n")[0],), {}, "docs/api/errors.md")
+
+
+def _effect(effect: Effect) -> Explanation:
+    details = {"Acts on": effect.where, "Quantities": tuple(map(_quantity, effect.quantities)),
+               "Confused with": tuple(f"{name}, at another place" if name == effect.name else name
+                                      for name in effect.confused_with),
+               "Told apart by": (effect.separated_by,) if effect.separated_by else ()}
+    return Explanation(effect.name, "effect", (effect.meaning,),
+                       {heading: texts for heading, texts in details.items() if texts},
+                       "docs/explanations/effects.md")
+
+
+def _quantity(quantity: Quantity) -> str:
+    limits = (f"known, {quantity.lower:g}" if quantity.lower == quantity.upper else
+              f"{quantity.lower:g} to {quantity.upper:g}")
+    return f"{quantity.name} [{quantity.unit}], {limits}"
+
+
+def _certificate(name: str) -> Explanation:
+    text = inspect.cleandoc(sys.modules[KINDS[name].claim.__module__].__doc__ or "")
+    paragraphs = [" ".join(part.split()) for part in text.split("\n\n")]
+    first = paragraphs[0].removeprefix(f'Kind "{name}": ')
+    return Explanation(name, "certificate", (first[0].upper() + first[1:], *paragraphs[1:]),
+                       {"Assumed, not proven": (*kind_assumptions(name), ARITHMETIC)},
+                       f"docs/explanations/{_PAGES.get(name, 'certificates')}.md")
+
+
+def _outcome(name: str, places: tuple[Said, ...]) -> Explanation:
+    told = tuple(f"{said.room}, {_ANSWER[said.ok]}" + (f": {said.text}" if said.text else ".") for said in places)
+    rooms = list(dict.fromkeys("errors" if said.room.startswith("_") else said.room for said in places))
+    return Explanation(name, "outcome", ("How a computation ended; … is what only the result knows.",),
+                       {"Said by": told}, " ".join(f"docs/api/{room}.md" for room in rooms))

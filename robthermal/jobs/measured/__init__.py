@@ -1,0 +1,14 @@
+"""Measured files for the commands: records read as asked, frequency responses, excitation."""
+
+from ._frequency import calibrate_files as calibrate_files
+from ._frequency import design_excitation as design_excitation
+from ._frequency import estimate_response as estimate_response
+from ._frequency import read_measured as read_measured
+from ._frequency import write_excitation as write_excitation
+from ._import import ReadTable as ReadTable
+from ._import import import_reports as import_reports
+from ._import import read_files as read_files
+from ._import import reading_from_text as reading_from_text
+
+__all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_reports", "read_files",
+           "read_measured", "reading_from_text", "write_excitation"]

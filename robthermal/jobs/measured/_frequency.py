@@ -1,0 +1,283 @@
+"""Frequency responses and excitation signals for the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...calibration import Fit, ResponseFit, calibrate
+from ...errors import InputError
+from ...identify import FrequencyResponse, etfe, is_response, lpm, lrm, lrmp, read_response, spectral
+from ...signals import Excitation, Record, multisines
+from ...thermal import System
+from ._import import ReadTable, read_files
+
+_METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
+
+
+def estimate_response(paths: Sequence[Path], *, system: System | None = None, inputs: Sequence[str] = (),
+                      outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
+                      poles: Sequence[float] = (), band: tuple[float, float] | None = None,
+                      tables: Sequence[ReadTable] = ()) -> FrequencyResponse:
+    """Estimate a frequency response from record files.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Records of one machine, each with its own transient.
+    system : System, optional
+        Gives the columns, and the prescribed poles of "lrmp" when `poles` is empty.
+    inputs, outputs : sequence of str
+        Columns, instead of or to select from those of the system.
+    method : str
+        "etfe", "spectral", "lpm", "lrm" or "lrmp".
+    half_width : int
+        Window is 2 half_width + 1 bins (local methods).
+    degree : int
+        Of the local polynomials ("lpm", "lrm").
+    poles : sequence of float
+        Prescribed poles [rad/s] for "lrmp"; empty: those of the system, else chosen from the data.
+    band : tuple of float, optional
+        Frequencies to keep [Hz].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
+
+    Returns
+    -------
+    FrequencyResponse
+        Inputs that never change are left out, which a note says.
+
+    Raises
+    ------
+    InputError
+        Unknown method, missing columns, and everything the estimators refuse.
+
+    Examples
+    --------
+    >>> import numpy as np, robthermal as rt
+    >>> from pathlib import Path
+    >>> u = rt.signals.multisine(400, sample_time=1.0, seed=0, band=(0.0, 0.4), rms=1.0, periods=2)
+    >>> rt.Record(sample_time=1.0, inputs=u, outputs=300 + np.cumsum(u) * 0.01, input_names=["q"],
+    ...           output_names=["T"]).save("run.csv")
+    >>> rt.jobs.measured.estimate_response([Path("run.csv")], inputs=["q"], outputs=["T"]).response.shape[:2]
+    (1, 1)
+    """
+    if method not in _METHODS:
+        raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
+    parts = [part for path in paths for part in _channels(path, system, inputs, outputs, tables)]
+    records, constant = _changing(parts, inputs)
+    given: Any = list(poles) if poles else system if system is not None else "auto"
+    G = {"etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
+         "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
+         "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
+         "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
+    if constant:
+        G = replace(G, notes=(*G.notes, f"left out because they never change: {', '.join(constant)} (constant_input)"))
+    return G.between(*band) if band else G
+
+
+def _changing(records: list[Record], asked: Sequence[str]) -> tuple[list[Record], list[str]]:
+    """Records without the inputs that are constant in all of them, unless they were asked for by name."""
+    names = records[0].input_names if records else ()
+    constant = [name for name in names if name not in asked and all(np.ptp(record[name]) == 0.0 for record in records)]
+    if not constant:
+        return records, []
+    left = [name for name in names if name not in constant]
+    if not left:
+        raise InputError(f"no input changes: {', '.join(constant)}", where=records[0].name,
+                         expected="at least one input that excites the machine", remedy="Record a step or a multisine.")
+    return [record.select(inputs=left) for record in records], constant
+
+
+def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str],
+              tables: Sequence[ReadTable]) -> list[Record]:
+    if system is None:
+        if not inputs or not outputs:
+            raise InputError("the columns are not known", where=str(path),
+                             remedy="Give --system, or --input and --output for each column.")
+        return read_files([path], inputs=list(inputs), outputs=list(outputs), tables=tables)
+    records = read_files([path], system, tables=tables)
+    if not records[0].output_names:
+        raise InputError("has no sensor column", where=str(path), expected="one of " + ", ".join(system.sensor_names))
+    return [record.select(inputs=list(inputs or record.input_names), outputs=list(outputs or record.output_names))
+            for record in records]
+
+
+def design_excitation(names: Sequence[str], *, period: int, sample_time: float, band: tuple[float, float],
+                      amplitude: float, periods: int = 1, nonnegative: bool = False, arrangement: str = "orthogonal",
+                      seed: int = 0) -> Excitation:
+    """Design multisines for some inputs.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Input columns.
+    period, periods : int
+        Samples in a period, and how many periods.
+    sample_time : float
+        [s].
+    band : tuple of float
+        Excited frequencies [Hz].
+    amplitude : float
+        Largest deviation from the mean [unit of the inputs].
+    nonnegative : bool
+        Shift the mean so that no value is negative (heaters).
+    arrangement : str
+        "orthogonal", "zippered" or "independent".
+    seed : int
+        Of the random phases.
+
+    Returns
+    -------
+    Excitation
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> u = rt.jobs.measured.design_excitation(["m1", "m2"], period=2000, sample_time=1.0, band=(0.001, 0.1),
+    ...                                        amplitude=0.5)
+    >>> len(u.experiments)
+    2
+    """
+    return multisines(period, inputs=len(names), sample_time=sample_time, seed=seed, band=band, amplitude=amplitude,
+                      offset="nonnegative" if nonnegative else 0.0, periods=periods, phases="low_crest",
+                      arrangement=arrangement)  # type: ignore[arg-type]  # checked by multisines
+
+
+def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Path]:
+    """Write every experiment as a record file; several get a number in their name.
+
+    Parameters
+    ----------
+    u : Excitation
+        From `design_excitation`.
+    names : sequence of str
+        Input columns.
+    path : Path
+        File to write (.csv, .parquet, .mat).
+
+    Returns
+    -------
+    list of Path
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> u = rt.jobs.measured.design_excitation(["q"], period=500, sample_time=1.0, band=(0.01, 0.1), amplitude=1.0)
+    >>> [p.name for p in rt.jobs.measured.write_excitation(u, ["q"], Path("u.csv"))]
+    ['u.csv']
+    """
+    several = len(u.experiments) > 1
+    written = []
+    for number, signals in enumerate(u.experiments, start=1):
+        file = path.with_stem(f"{path.stem}_{number}") if several else path
+        Record(sample_time=u.sample_time, inputs=signals, outputs=np.zeros((len(signals), 0)), input_names=list(names),
+               output_names=[]).save(file)
+        written.append(file)
+    return written
+
+
+def read_measured(paths: Sequence[Path], system: System, *, median_filter: float | None = None,
+                  tables: Sequence[ReadTable] = ()) -> list[Record | FrequencyResponse]:
+    """Read what a calibration or a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Records and responses in any order; the content tells which is which.
+    system : System
+        Gives the columns of records.
+    median_filter : float, optional
+        Length of a median filter over the sensors of records [s].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
+
+    Returns
+    -------
+    list of Record or FrequencyResponse
+
+    Raises
+    ------
+    InputError
+        As the readers; also for a response without covariance, whose misfit cannot be weighed.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.jobs.measured.read_measured([], rt.systems.two_module())
+    []
+    """
+    found: list[Record | FrequencyResponse] = []
+    for path in paths:
+        found += [_response(path)] if is_response(path) else read_files([path], system, tables=tables,
+                                                                        median_filter=median_filter)
+    return found
+
+
+def _response(path: Path) -> FrequencyResponse:
+    found = read_response(path)
+    if not found.has_covariance:
+        raise InputError("is a frequency response without covariance and without names of channels", where=str(path),
+                         expected="the .json, .npz or .mat file that robthermal frf writes",
+                         remedy="Without a covariance no misfit can be called large.")
+    return found
+
+
+def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
+                    median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
+                    tables: Sequence[ReadTable] = ()) -> Fit | ResponseFit:
+    """Calibrate a system with record files, or with one file of a frequency response.
+
+    Parameters
+    ----------
+    system : System
+        With starting values and a [fit] table.
+    records : sequence of Path
+        Training records, or one frequency response.
+    validation : sequence of Path
+        Records that the fit does not see; not for a frequency response.
+    median_filter : float, optional
+        Length of a median filter over the sensors of records [s].
+    operating_point : mapping, optional
+        Of a frequency response: means of heaters [unit], module currents [A] and ambients [K].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
+
+    Returns
+    -------
+    Fit or ResponseFit
+
+    Raises
+    ------
+    InputError
+        As the readers and `rt.calibrate`; for a response beside other files, or an operating point of records.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.jobs.measured.calibrate_files(rt.systems.two_module(), [])
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: records: no file is given. Expected records, or one frequency response.
+    """
+    train, held_out = (read_measured(paths, system, median_filter=median_filter, tables=tables)
+                       for paths in (records, validation))
+    expected = "records, or one frequency response"
+    if not train:
+        raise InputError("no file is given", where="records", expected=expected)
+    runs = [one for one in train if isinstance(one, Record)]
+    seen = [one for one in held_out if isinstance(one, Record)]
+    if len(runs) == len(train) and len(seen) == len(held_out):
+        if operating_point:
+            raise InputError("an operating point is given with records", where="--operating-point",
+                             remedy="Leave it out: a record brings its own inputs.")
+        return calibrate(system, runs, validation=seen or None)
+    if len(train) > 1 or held_out or isinstance(train[0], Record):
+        raise InputError("a frequency response stands beside other files", where="records", expected=expected,
+                         remedy="Give all records of one machine to robthermal frf, and its result here, alone.")
+    return calibrate(system, train[0], operating_point=operating_point or None)

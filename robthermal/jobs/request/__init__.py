@@ -1,0 +1,18 @@
+"""What is asked of a job: project files and values of the command line."""
+
+from ._arguments import boxes_from_text as boxes_from_text
+from ._arguments import point_from_text as point_from_text
+from ._schema import Boxes as Boxes
+from ._schema import Gate as Gate
+from ._schema import Method as Method
+from ._schema import Project as Project
+from ._schema import in_kelvin as in_kelvin
+from ._schema import read_project as read_project
+from ._toml import Number as Number
+from ._toml import Table as Table
+from ._toml import read_text as read_text
+from ._toml import read_toml as read_toml
+from ._toml import refusal as refusal
+
+__all__ = ["Boxes", "Gate", "Method", "Number", "Project", "Table", "boxes_from_text", "in_kelvin", "point_from_text",
+           "read_project", "read_text", "read_toml", "refusal"]

@@ -1,0 +1,83 @@
+"""TOML files read into checked tables: unknown keys, wrong types and files that cannot be read are refused."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ...errors import InputError
+
+_MAX_BYTES = 10_000_000
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+T = TypeVar("T", bound=BaseModel)
+
+
+class Table(BaseModel):
+    """A table whose keys are all known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def read_text(path: Path, kind: str, largest: int = _MAX_BYTES) -> str:
+    """Text of a file; one message where it cannot be read, or is too large.
+
+    Parameters
+    ----------
+    path : Path
+        File, UTF-8 with or without a byte-order mark.
+    kind : str
+        What it should be, for the message.
+    largest : int
+        Bytes.
+    """
+    try:
+        if path.stat().st_size > largest:
+            raise InputError(f"is larger than {largest / 1e6:g} MB", where=str(path), remedy="Is this the right file?")
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"is not valid {kind}: {error}", where=str(path), remedy="Is this the right file?") from None
+
+
+def read_toml(path: Path, schema: type[T], remedy: str) -> T:
+    """A TOML file as a checked table.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    schema : type
+        What it must look like.
+    remedy : str
+        Where the user finds the keys.
+    """
+    try:
+        return schema(**tomllib.loads(read_text(path, "TOML")))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
+    except ValidationError as error:
+        raise refusal(error, path, remedy) from None
+
+
+def refusal(error: ValidationError, path: Path, remedy: str) -> InputError:
+    """One clear message for a table that does not fit; unknown keys come first.
+
+    Parameters
+    ----------
+    error : ValidationError
+        From pydantic.
+    path : Path
+        File.
+    remedy : str
+        Where the user finds the keys.
+    """
+    faults: list[Any] = error.errors(include_url=False)
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    place = ".".join(str(word) for word in fault["loc"])
+    what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
+        fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
+    return InputError(what, where=str(path), remedy=remedy)

@@ -1,0 +1,129 @@
+"""The main job: data → calibrated model → certificates → verified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from ...calibration import Fit, calibrate
+from ...errors import InputError
+from ...fitting import as_data, free_run
+from ...signals import Record
+from ...thermal import System
+from ..certify import certify_system, claim_ranges, claims_hold, doubted
+from ..diagnose import Diagnosed, diagnose_records
+from ..measured import read_files
+from ..request import Gate, Project
+from ._gate import gate_reasons
+from ._misfit import Misfit, misfit, noise_of_readings
+from ._result import Comparison, JobResult
+
+Progress = Callable[[str], None]
+Array = NDArray[np.float64]
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
+def run_job(project: Project, progress: Progress = lambda stage: None) -> JobResult:
+    """Run the main job of a project.
+
+    Parameters
+    ----------
+    project : Project
+        From `read_project`.
+    progress : callable, optional
+        Called with a sentence before every stage.
+
+    Returns
+    -------
+    JobResult
+
+    Raises
+    ------
+    InputError
+        Anything wrong with records, parameters or boxes.
+
+    Examples
+    --------
+    The demo's project without its records, for a bar in a room:
+
+    >>> from dataclasses import replace
+    >>> import robthermal as rt
+    >>> demo = rt.jobs.read_project(rt.jobs.demo_project())
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}])
+    >>> result = rt.jobs.run_job(replace(demo, system=bar, train=(), validation=(), boxes=rt.jobs.Boxes()))
+    >>> result.holds
+    True
+    """
+    progress("reading records")
+    train, validation = ([part for path in paths for part in read_files(
+        [path], project.system, tables=project.reading.get(path, ()), median_filter=project.median_filter)]
+                         for paths in (project.train, project.validation))
+    fit, system = None, project.system
+    if train:
+        progress(f"calibrating {len(project.system.fit)} parameters on {sum(r.n_samples for r in train)} samples")
+        fit = calibrate(project.system, train, validation=validation or None, initial=project.initial,
+                        loss=project.loss)
+        system = fit.system
+    progress("comparing model and data")
+    comparisons = _comparisons(project, fit, train, validation)
+    ranges = claim_ranges(project.boxes, fit)
+    certification = certify_system(system, project.boxes, progress, parameters=ranges)
+    found = JobResult(project, fit, system, comparisons, certification, _misfits(comparisons, system, project.gate),
+                      _diagnosis(project, train, validation, progress), _doubted(project, fit, progress), ranges)
+    return replace(found, reasons=gate_reasons(found))
+
+
+def _misfits(comparisons: Sequence[Comparison], system: System, gate: Gate) -> tuple[Misfit, ...]:
+    found = []
+    for one in comparisons:
+        for name, e in one.residuals(one.calibrated).items():
+            noise = system.sensors[name].noise or noise_of_readings(one.record[name])
+            found.append(misfit(one.kind, one.record.name or "record", name, e, noise, gate.of(name, noise)))
+    return tuple(found)
+
+
+def _diagnosis(project: Project, train: Sequence[Record], validation: Sequence[Record], progress: Progress
+               ) -> Diagnosed | None:
+    if not (project.diagnose and train):
+        return None
+    return diagnose_records(project.system, project.files, train, validation, progress,
+                            session_gain=project.session_gain)
+
+
+def _doubted(project: Project, fit: Fit | None, progress: Progress) -> tuple[tuple[str, str, bool], ...]:
+    """Parameters that the records leave open or that ended at a bound, and whether the claims hold on all of [fit]."""
+    if fit is None:
+        return ()
+    found = []
+    for what, name, whole in doubted(fit):
+        progress(f"certifying for the whole range of {name}")
+        try:
+            holds = claims_hold(fit.system, project.boxes, whole)
+        except InputError:  # a parameter that no certificate covers, or a range that is none
+            holds = False
+        found.append((what, name, holds))
+    return tuple(found)
+
+
+def _comparisons(project: Project, fit: Fit | None, train: Sequence[Record], validation: Sequence[Record]
+                 ) -> tuple[Comparison, ...]:
+    """What the calibration computed, beside free runs of the nominal model."""
+    noise = fit.noise if fit else {name: sensor.noise for name, sensor in project.system.sensors.items()}
+    found = (*fit.residuals, *fit.validation_residuals) if fit else ()
+    out = []
+    for i, record in enumerate([*train, *validation]):
+        nominal = free_run(project.system, as_data(project.system, record, "records")[0], project.initial, noise)
+        before = _modelled(record, nominal.by_sensor)
+        after = _modelled(record, found[i]) if found else before
+        out.append(Comparison("train" if i < len(train) else "validation", record, before, after))
+    return tuple(out)
+
+
+def _modelled(record: Record, residuals: Mapping[str, Array]) -> Record:
+    """A record with what the model reads, from its residuals."""
+    return record.with_outputs(np.column_stack([record[name] - e for name, e in residuals.items()]), list(residuals))

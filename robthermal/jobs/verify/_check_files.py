@@ -1,0 +1,146 @@
+"""Certificate files checked one by one, for people and for pipelines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ...errors import InputError
+from ...report import Claim, Report, versions, write_junit
+from ...verification import Certificate, verify
+from ..now import now
+from ._second import INSTALL, SecondVerdict, second_verdicts
+
+
+@dataclass(frozen=True)
+class FileCheck:
+    """What the independent check said about one file.
+
+    Parameters
+    ----------
+    file : Path
+        Certificate.
+    valid : bool or None
+        None: the file cannot be read.
+    reason : str
+        How it was proven, the inequality that fails, or what is wrong with the file.
+    claim, kind : str
+        Of the certificate; empty if it cannot be read.
+    margins : dict of str to float
+        Found by the check.
+    seconds : float
+        Duration [s].
+    second : SecondVerdict or None
+        What the second checker said; None where it was not asked.
+    """
+
+    file: Path
+    valid: bool | None
+    reason: str
+    claim: str
+    kind: str
+    margins: dict[str, float]
+    seconds: float
+    second: SecondVerdict | None = None
+
+    @property
+    def status(self) -> int:
+        """Exit status: 0 valid, 1 not valid (for either checker), 2 unreadable."""
+        if self.valid is None:
+            return 2
+        return 0 if self.valid and (self.second is None or self.second.status != "not valid") else 1
+
+
+def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = lambda done, total: None, *,
+                 second: bool = False) -> tuple[FileCheck, ...]:
+    """Derive every certificate again from its file alone.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Certificates.
+    progress : callable, optional
+        Called with how many are done, and how many there are.
+    second : bool
+        Whether the second checker derives them too.
+
+    Returns
+    -------
+    tuple of FileCheck
+        One per file; a file that cannot be read is a result too.
+
+    Raises
+    ------
+    InputError
+        The second checker is asked for and not installed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> rt.jobs.verify_files([Path("none.json")])[0].status
+    2
+    """
+    checks = []
+    for i, file in enumerate(files):
+        progress(i, len(files))
+        one = _checked(file)
+        if second and one.valid is not None:
+            one = replace(one, second=_second(file))
+        checks.append(one)
+    return tuple(checks)
+
+
+def _second(file: Path) -> SecondVerdict:
+    verdict = second_verdicts([file])[0]
+    if verdict.status == "absent":
+        raise InputError("the second checker is not installed", where="--second", remedy=INSTALL)
+    return verdict
+
+
+def _checked(file: Path) -> FileCheck:
+    try:
+        certificate = Certificate.load(file)
+        verdict = verify(certificate)
+    except InputError as error:
+        return FileCheck(file, None, str(error), "", "", {}, 0.0)
+    return FileCheck(file, verdict.valid, verdict.reason, certificate.claim, certificate.kind, verdict.margins,
+                     verdict.seconds)
+
+
+def write_checks(checks: Sequence[FileCheck], path: str | Path) -> Path:
+    """Write the checks as JUnit XML, one test case per file.
+
+    Parameters
+    ----------
+    checks : sequence of FileCheck
+        From `verify_files`. What is not valid, or cannot be read, is a failure.
+    path : str or Path
+        File to write.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> file = rt.jobs.verify.write_checks(rt.jobs.verify_files([Path("none.json")]), "junit.xml")
+    >>> 'failures="1"' in file.read_text()
+    True
+    """
+    claims = [Claim(str(one.file), one.claim, one.valid is not None, one.valid, "as in the file", _margin(one),
+                    "re-derived in ball arithmetic", "" if one.valid else one.reason, str(one.file), one.kind,
+                    one.seconds) for one in checks]
+    return write_junit(Report("robthermal verify", "", "", claims, (), versions(), (), now()), path)
+
+
+def _margin(one: FileCheck) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, value in one.margins.items()) or "none"
