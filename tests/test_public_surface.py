@@ -33,12 +33,12 @@ SURFACE = {
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """
-        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain DisturbanceObserver Estimate
-        ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
-        MatrixController ObserverModel PID Placement Polarity Reach Reachable Seen StateFeedback certify_loop
-        check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DisturbanceObserver
+        Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
+        MatrixController ObserverModel PID Placement Polarity Reach Reachable Seen StateFeedback StepResponseLinearity
+        certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
         feedback_linearization linear_controller load_controller loop_poles observer pid place_sensors reachable
-        simulate_loop state_feedback unobservable
+        simulate_loop state_feedback step_response_linearity unobservable
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis Effect EffectSet Entry Found Gap HoldOut JointCheck JointSelection

@@ -2,11 +2,9 @@
 
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
-from ._collapse import Collapse as Collapse
-from ._collapse import collapse as collapse
 from ._constant_gain import ConstantGain as ConstantGain
 from ._constant_gain import constant_gain as constant_gain
-from ._controller import Seen as Seen
+from ._controller import ControllerInput as ControllerInput
 from ._estimate import Estimate as Estimate
 from ._extended import ExtendedKalmanFilter as ExtendedKalmanFilter
 from ._feed_forward import DisturbanceObserver as DisturbanceObserver
@@ -43,11 +41,19 @@ from ._robust_feedback import corner_plants as corner_plants
 from ._sampling import loop_poles as loop_poles
 from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
+from ._step_response_linearity import StepResponseLinearity as StepResponseLinearity
+from ._step_response_linearity import step_response_linearity as step_response_linearity
+
+# Former names, kept for one version.
+Collapse = StepResponseLinearity
+Seen = ControllerInput
+collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization",
-           "GainObserver", "LinearController", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
-           "Polarity", "Reach", "Reachable", "Seen", "StateFeedback", "certify_loop", "check_polarity", "cold_side",
-           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "feed_forward",
-           "feedback_linearization", "linear_controller", "load_controller", "loop_poles", "observer", "pid",
-           "place_sensors", "reachable", "simulate_loop", "state_feedback", "unobservable"]
+           "ControllerInput", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward",
+           "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController", "ObserverModel",
+           "PID", "Placement", "Polarity", "Reach", "Reachable", "Seen", "StateFeedback", "StepResponseLinearity",
+           "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain", "corner_plants",
+           "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller", "load_controller",
+           "loop_poles", "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback",
+           "step_response_linearity", "unobservable"]

@@ -6,50 +6,50 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 
 from ..errors import InputError
+from ._controller_input import ControllerInput as ControllerInput
 from ._export_controller import export
 from ._modules import Array
-from ._seen import Seen as Seen
 
 
 class Controller(ABC):
-    """An outer loop: heats v from what is seen; its state is one vector, advanced with the heat *achieved*."""
+    """An outer loop: heats v from its inputs; its state is one vector, advanced with the heat *achieved*."""
 
     sample_time: float  # [s]
 
     @abstractmethod
-    def start(self, seen: Seen, heat: Array) -> Array:
+    def start(self, given: ControllerInput, heat: Array) -> Array:
         """State from which the output stays at `heat` while the reference is the temperature.
 
         Parameters
         ----------
-        seen : Seen
-            What the controller sees at this sample.
+        given : ControllerInput
+            Set-points and measured or estimated temperatures of this sample.
         heat : ndarray
             Heat in force at the start [W].
         """
 
     @abstractmethod
-    def heat(self, state: Array, seen: Seen) -> Array:
+    def heat(self, state: Array, given: ControllerInput) -> Array:
         """Wanted heats v [W].
 
         Parameters
         ----------
         state : ndarray
             Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
+        given : ControllerInput
+            Set-points and measured or estimated temperatures of this sample.
         """
 
     @abstractmethod
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
         """State at the next sample; wanted and achieved heats differ while a limit is active.
 
         Parameters
         ----------
         state : ndarray
             Memory of the controller.
-        seen : Seen
-            What the controller sees at this sample.
+        given : ControllerInput
+            Set-points and measured or estimated temperatures of this sample.
         wanted : ndarray
             Heat that was asked for [W].
         achieved : ndarray
@@ -59,7 +59,7 @@ class Controller(ABC):
     def export(self, path: str | Path, name: str = "controller") -> None:
         """Write the controller for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
 
-        All hold the same three matrices: start, heat and advance are linear in the memory and in what is seen. C gets
+        All hold the same three matrices: start, heat and advance are linear in the memory and in its inputs. C gets
         a state struct and three functions in double, with a test vector; JSON is read back by `load_controller`.
 
         Parameters

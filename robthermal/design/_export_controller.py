@@ -92,7 +92,7 @@ def _program(M: Matrices, kind: str, name: str) -> Program:
 
 
 def _members(M: Matrices) -> str:
-    """Comment on what is seen."""
+    """Comment on the inputs."""
     lines = ["reference, cold: set-points and temperatures of the cold faces [K]"]
     if M.lumps:
         lines.append("temperatures: of the lumps " + ", ".join(M.lumps) + " [K]")
@@ -111,7 +111,7 @@ def _sums(target: str, matrix: Array, names: list[str]) -> str:
 
 
 def _test_call(p: str, M: Matrices) -> str:
-    """Inputs: what is seen, what the limits take away; outputs: wanted heats and the memory after the step."""
+    """Inputs: of the controller, what the limits take away; outputs: wanted heats and the memory after the step."""
     ends = list(accumulate(M.sizes.values()))
     fill = [f"        for (int k = 0; k < {size}; k++) seen.{part}[k] = in[{end - size} + k];"
             for (part, size), end in zip(M.sizes.items(), ends, strict=True) if size]

@@ -152,7 +152,7 @@ def tables(eq: Equations) -> dict[str, list[Row]]:
         if kind == "StepTerm":  # has not happened
             continue
         values: dict[str, Any] = {key: getattr(term, key) for key in HEATS[kind].columns}
-        columns = [np.broadcast_to(np.asarray(values[key], float), len(term.owners)) for key in HEATS[kind].columns]
+        columns = [np.broadcast_to(np.asarray(values[key], float), len(term.components)) for key in HEATS[kind].columns]
         found[kind] = np.column_stack(columns).tolist()
     sticky = [[float(eq.index[module.cold]), float(eq.drives.column[name]), module.hysteresis.heat]
               for name, module in eq.system.modules.items() if module.hysteresis]

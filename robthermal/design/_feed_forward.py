@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from ..errors import InputError
-from ._controller import Controller, Seen, expect_controller
+from ._controller import Controller, ControllerInput, expect_controller
 from ._modules import Array
 from ._numbers import expect, positive
 from ._plant import ColdSide
@@ -40,18 +40,18 @@ class FeedForward(_Around):
         Works on what is left.
     """
 
-    def _share(self, seen: Seen) -> Array:
-        return self.plant.holding_heat(seen.reference, seen.around)
+    def _share(self, given: ControllerInput) -> Array:
+        return self.plant.holding_heat(given.reference, given.around)
 
-    def start(self, seen: Seen, heat: Array) -> Array:
-        return self.controller.start(seen, heat - self.plant.holding_heat(seen.cold, seen.around))
+    def start(self, given: ControllerInput, heat: Array) -> Array:
+        return self.controller.start(given, heat - self.plant.holding_heat(given.cold, given.around))
 
-    def heat(self, state: Array, seen: Seen) -> Array:
-        return self.controller.heat(state, seen) + self._share(seen)
+    def heat(self, state: Array, given: ControllerInput) -> Array:
+        return self.controller.heat(state, given) + self._share(given)
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        share = self._share(seen)
-        return self.controller.advance(state, seen, wanted - share, achieved - share)
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
+        share = self._share(given)
+        return self.controller.advance(state, given, wanted - share, achieved - share)
 
 
 def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
@@ -122,21 +122,21 @@ class DisturbanceObserver(_Around):
         """
         return self._split(state)[0][len(self.plant.lumps):]
 
-    def start(self, seen: Seen, heat: Array) -> Array:
-        # estimates at what is seen, no disturbance
-        own = np.concatenate([seen.temperatures[self.plant.indices], np.zeros(len(seen.cold))])
-        return np.concatenate([own, self.controller.start(seen, heat)])
+    def start(self, given: ControllerInput, heat: Array) -> Array:
+        # estimates at the measured temperatures, no disturbance
+        own = np.concatenate([given.temperatures[self.plant.indices], np.zeros(len(given.cold))])
+        return np.concatenate([own, self.controller.start(given, heat)])
 
-    def heat(self, state: Array, seen: Seen) -> Array:
+    def heat(self, state: Array, given: ControllerInput) -> Array:
         own, inner = self._split(state)
-        return self.controller.heat(inner, seen) - own[len(self.plant.lumps):]
+        return self.controller.heat(inner, given) - own[len(self.plant.lumps):]
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
         own, inner = self._split(state)
-        error = seen.cold - self.plant.C @ own[:len(self.plant.lumps)]
-        estimate = self.A @ own + self.B @ np.concatenate([achieved, seen.around]) + self.L @ error
+        error = given.cold - self.plant.C @ own[:len(self.plant.lumps)]
+        estimate = self.A @ own + self.B @ np.concatenate([achieved, given.around]) + self.L @ error
         share = self.disturbance(state)
-        return np.concatenate([estimate, self.controller.advance(inner, seen, wanted + share, achieved + share)])
+        return np.concatenate([estimate, self.controller.advance(inner, given, wanted + share, achieved + share)])
 
 
 def disturbance_observer(plant: ColdSide, controller: Controller, *, time_constant: float) -> DisturbanceObserver:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import Stepper, System
 from ._constant_gain import ConstantGain
-from ._controller import Controller, Seen, expect_controller
+from ._controller import Controller, ControllerInput, expect_controller
 from ._estimate import Observer
 from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
@@ -205,13 +205,13 @@ class _Run:
             for k in range(self.n):
                 true, named = self.plant.lumps, {name: float(values[k]) for name, values in self.inputs.items()}
                 believed = true if self.observer is None else self.observer.estimate(memory)
-                seen = Seen(wanted_cold[k], believed[self.base.modules.cold], believed,
+                given = ControllerInput(wanted_cold[k], believed[self.base.modules.cold], believed,
                             self.linear.surroundings(believed, named))
                 if state is None:
-                    state = self.controller.start(seen, self._heat_of(current, believed))
-                heat = self.controller.heat(state, seen)
+                    state = self.controller.start(given, self._heat_of(current, believed))
+                heat = self.controller.heat(state, given)
                 command = self.law.command(heat, believed, previous=current, sample_time=self.h)
-                state = self.controller.advance(state, seen, heat, command.heat)
+                state = self.controller.advance(state, given, heat, command.heat)
                 rows.append((true, believed, command, heat))
                 if self.observer is not None:
                     u = {**named, **dict(zip(self.base.names, command.current.tolist(), strict=True))}

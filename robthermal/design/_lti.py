@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from ..errors import InputError
-from ._controller import Controller, Seen, expect_modules
+from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
 from ._numbers import expect, positive
 from ._plant import ColdSide
@@ -45,18 +45,18 @@ class LinearController(Controller):
         """Number of modules."""
         return len(self.C)
 
-    def start(self, seen: Seen, heat: Array) -> Array:
+    def start(self, given: ControllerInput, heat: Array) -> Array:
         expect_modules(len(self.C), heat)
         # as constant as possible, and zero error gives the heat
         n = len(self.A)
         stack, wanted = np.vstack([self.C, np.eye(n) - self.A]), np.concatenate([heat, np.zeros(n)])
         return np.linalg.lstsq(stack, wanted, rcond=None)[0]
 
-    def heat(self, state: Array, seen: Seen) -> Array:
-        return self.C @ state + self.D @ (seen.reference - seen.cold)
+    def heat(self, state: Array, given: ControllerInput) -> Array:
+        return self.C @ state + self.D @ (given.reference - given.cold)
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        return self.A @ state + self.B @ (seen.reference - seen.cold) + self.L @ (achieved - wanted)
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
+        return self.A @ state + self.B @ (given.reference - given.cold) + self.L @ (achieved - wanted)
 
 
 def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> LinearController:

@@ -1,4 +1,4 @@
-"""A controller as three matrices: start, heat and advance are linear in the memory and in what is seen."""
+"""A controller as three matrices: start, heat and advance are linear in the memory and the inputs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ._controller_input import ControllerInput
 from ._modules import Array
-from ._seen import Seen
 
 if TYPE_CHECKING:
     from ._controller import Controller
@@ -20,9 +20,9 @@ _LINEAR = 1e-9  # relative: a controller whose matrices miss it by more is not l
 
 @dataclass(frozen=True)
 class Matrices:
-    """start = M_s [seen; heat], heat = M_h [memory; seen], memory⁺ = M_a [memory; seen; wanted; achieved].
+    """start = M_s [inputs; heat], heat = M_h [memory; inputs], memory⁺ = M_a [memory; inputs; wanted; achieved].
 
-    seen = [reference; cold; temperatures of `lumps`; around]. Entries are zero where nothing acts.
+    inputs = [reference; cold; temperatures of `lumps`; around]. Entries are zero where nothing acts.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Matrices:
     around : tuple of str
         Measured surroundings that are used.
     start, heat, advance : ndarray
-        (n, n_seen + modules), (modules, n + n_seen) and (n, n + n_seen + 2 modules).
+        (n, n_inputs + modules), (modules, n + n_inputs) and (n, n + n_inputs + 2 modules).
     """
 
     sample_time: float
@@ -54,20 +54,20 @@ class Matrices:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Length of every part of what is seen."""
+        """Length of every part of the inputs."""
         return {"reference": self.modules, "cold": self.modules, "temperatures": len(self.lumps),
                 "around": len(self.around)}
 
-    def vector(self, seen: Seen) -> list[float]:
-        """What is seen, in one list.
+    def vector(self, given: ControllerInput) -> list[float]:
+        """The inputs in one list.
 
         Parameters
         ----------
-        seen : Seen
+        given : ControllerInput
             At a sample.
         """
-        parts = [seen.reference, seen.cold, seen.temperatures[list(self.indices)]]
-        return [float(value) for part in [*parts, *([seen.around] if self.around else [])] for value in part]
+        parts = [given.reference, given.cold, given.temperatures[list(self.indices)]]
+        return [float(value) for part in [*parts, *([given.around] if self.around else [])] for value in part]
 
 
 def dot(row: Array, values: list[float]) -> float:
@@ -100,17 +100,17 @@ def matrices(controller: Controller) -> Matrices:
     around = plant.around if plant else ()
     sizes = np.cumsum([m, m, len(names), len(around)])
 
-    def seen(z: Array) -> Seen:
-        return Seen(*np.split(z, sizes[:-1]))
+    def inputs(z: Array) -> ControllerInput:
+        return ControllerInput(*np.split(z, sizes[:-1]))
 
     def start(z: Array) -> Array:
-        return controller.start(seen(z[:k]), z[k:])
+        return controller.start(inputs(z[:k]), z[k:])
 
     def heat(z: Array) -> Array:
-        return controller.heat(z[:n], seen(z[n:]))
+        return controller.heat(z[:n], inputs(z[n:]))
 
     def advance(z: Array) -> Array:
-        return controller.advance(z[:n], seen(z[n:n + k]), z[n + k:n + k + m], z[n + k + m:])
+        return controller.advance(z[:n], inputs(z[n:n + k]), z[n + k:n + k + m], z[n + k + m:])
 
     k = int(sizes[-1])
     n = len(start(np.zeros(k + m)))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ._controller import Controller, Seen, expect_modules
+from ._controller import Controller, ControllerInput, expect_modules
 from ._export_controller import FORMAT
 from ._matrices import Matrices, dot
 from ._modules import Array
@@ -44,18 +44,18 @@ class MatrixController(Controller):
         """Number of modules."""
         return self.matrices.modules
 
-    def start(self, seen: Seen, heat: Array) -> Array:
+    def start(self, given: ControllerInput, heat: Array) -> Array:
         expect_modules(self.count, heat)
-        if self.matrices.n_lumps and len(seen.temperatures) != self.matrices.n_lumps:
+        if self.matrices.n_lumps and len(given.temperatures) != self.matrices.n_lumps:
             raise InputError(f"a controller made for {self.matrices.n_lumps} lumps, in a system of "
-                             f"{len(seen.temperatures)}", where="argument controller", expected="the same system")
-        return self._times(self.matrices.start, self.matrices.vector(seen), heat)
+                             f"{len(given.temperatures)}", where="argument controller", expected="the same system")
+        return self._times(self.matrices.start, self.matrices.vector(given), heat)
 
-    def heat(self, state: Array, seen: Seen) -> Array:
-        return self._times(self.matrices.heat, state, self.matrices.vector(seen))
+    def heat(self, state: Array, given: ControllerInput) -> Array:
+        return self._times(self.matrices.heat, state, self.matrices.vector(given))
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        return self._times(self.matrices.advance, state, self.matrices.vector(seen), wanted, achieved)
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
+        return self._times(self.matrices.advance, state, self.matrices.vector(given), wanted, achieved)
 
     @staticmethod
     def _times(matrix: Array, *parts: Any) -> Array:

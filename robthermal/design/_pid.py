@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ._controller import Controller, Seen, expect_modules
+from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
 from ._numbers import expect, non_negative, per_module, positive
 from ._plant import ColdSide
@@ -48,22 +48,22 @@ class PID(Controller):
         """Number of modules."""
         return len(self.proportional)
 
-    def start(self, seen: Seen, heat: Array) -> Array:
+    def start(self, given: ControllerInput, heat: Array) -> Array:
         expect_modules(len(self.proportional), heat)
         # integrators at the heat, derivative filters at rest
-        return np.concatenate([heat, seen.cold])
+        return np.concatenate([heat, given.cold])
 
-    def heat(self, state: Array, seen: Seen) -> Array:
+    def heat(self, state: Array, given: ControllerInput) -> Array:
         z, filtered = np.split(state, 2)
-        slope = (seen.cold - filtered) / self.filter_time
-        return self.proportional * (seen.reference - seen.cold) + z - self.derivative * slope
+        slope = (given.cold - filtered) / self.filter_time
+        return self.proportional * (given.reference - given.cold) + z - self.derivative * slope
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
         z, filtered = np.split(state, 2)
-        z = z + self.sample_time * self.integral * (seen.reference - seen.cold)
+        z = z + self.sample_time * self.integral * (given.reference - given.cold)
         z = z + -np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
         keep = np.exp(-self.sample_time / self.filter_time)
-        return np.concatenate([z, keep * filtered + (1 - keep) * seen.cold])
+        return np.concatenate([z, keep * filtered + (1 - keep) * given.cold])
 
 
 def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ._controller import Controller, Seen, expect_controller
+from ._controller import Controller, ControllerInput, expect_controller
 from ._modules import Array
 from ._numbers import expect
 from ._plant import ColdSide
@@ -46,15 +46,15 @@ def loop_poles(plant: ColdSide, controller: Controller) -> NDArray[np.complex128
     rest = np.full(len(plant.law.system.lumps), 300.0)
     around = np.zeros(len(plant.around))
 
-    def seen(x: Array) -> Seen:
+    def inputs(x: Array) -> ControllerInput:
         temperatures = rest.copy()
         temperatures[plant.indices] += x
-        return Seen(np.full(m, 300.0), 300.0 + plant.C @ x, temperatures, around)
+        return ControllerInput(np.full(m, 300.0), 300.0 + plant.C @ x, temperatures, around)
 
-    memory = controller.start(seen(np.zeros(n)), np.zeros(m))
+    memory = controller.start(inputs(np.zeros(n)), np.zeros(m))
 
     def step(s: Array) -> Array:
-        now = seen(s[:n])
+        now = inputs(s[:n])
         heat = controller.heat(memory + s[n:], now)
         return np.concatenate([A @ s[:n] + B[:, :m] @ heat, controller.advance(memory + s[n:], now, heat, heat)])
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_discrete_are
 
 from ..errors import InputError, Outcome
-from ._controller import Controller, Seen, expect_modules
+from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
 from ._numbers import expect, numbers, positive
 from ._plant import ColdSide
@@ -47,19 +47,19 @@ class StateFeedback(Controller):
     sample_time: float
     outcome: Outcome = Outcome(True, "designed", "Stable with the linear cold side while no limit is active.")
 
-    def _proportional(self, seen: Seen) -> Array:
-        return self.reference_gain @ seen.reference - self.K @ seen.temperatures[self.plant.indices]
+    def _proportional(self, given: ControllerInput) -> Array:
+        return self.reference_gain @ given.reference - self.K @ given.temperatures[self.plant.indices]
 
-    def start(self, seen: Seen, heat: Array) -> Array:
+    def start(self, given: ControllerInput, heat: Array) -> Array:
         expect_modules(len(self.K), heat)
-        at_rest = self.reference_gain @ seen.cold - self.K @ seen.temperatures[self.plant.indices]
+        at_rest = self.reference_gain @ given.cold - self.K @ given.temperatures[self.plant.indices]
         return heat - at_rest
 
-    def heat(self, state: Array, seen: Seen) -> Array:
-        return state + self._proportional(seen)
+    def heat(self, state: Array, given: ControllerInput) -> Array:
+        return state + self._proportional(given)
 
-    def advance(self, state: Array, seen: Seen, wanted: Array, achieved: Array) -> Array:
-        change = self.sample_time * self.integral @ (seen.reference - seen.cold)
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
+        change = self.sample_time * self.integral @ (given.reference - given.cold)
         return state + change - np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
 
 

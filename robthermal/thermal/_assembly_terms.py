@@ -32,7 +32,7 @@ def terms_of(system: System, index: Index, drives: Drives) -> tuple[Term, ...]:
 def _modules(system: System, index: Index, drives: Drives) -> ModuleTerm:
     modules = list(system.modules.values())
     return ModuleTerm(
-        owners=tuple(system.modules), a=_indices(index[m.hot] for m in modules),
+        components=tuple(system.modules), a=_indices(index[m.hot] for m in modules),
         b=_indices(index[m.cold] for m in modules), drive=_indices(drives.column[name] for name in system.modules),
         S=np.array([m.seebeck.value for m in modules]), S_slope=np.array([m.seebeck.slope for m in modules]),
         R=np.array([m.resistance.value for m in modules]), R_slope=np.array([m.resistance.slope for m in modules]),
@@ -69,9 +69,9 @@ def _effects(system: System, index: Index, drives: Drives) -> list[Term]:
         through = [(h.feedthrough.lump, h.feedthrough.share) if h.feedthrough else (h.lump, 0.0)
                    for h in heaters.values()]
         found.append(HeaterTerm(
-            owners=tuple(heaters), a=_indices(index[h.lump] for h in heaters.values()),
+            components=tuple(heaters), a=_indices(index[h.lump] for h in heaters.values()),
             b=_indices(index[lump] for lump, _ in through), drive=_indices(drives.column[name] for name in heaters),
-            payers=_indices(system.input_names.index(name) for name in heaters),
+            supply_index=_indices(system.input_names.index(name) for name in heaters),
             gain=np.array([h.gain for h in heaters.values()]),
             slope=np.array([h.power_slope for h in heaters.values()], float),
             share=np.array([share for _, share in through]),

@@ -15,14 +15,14 @@ class HeaterTerm:
     """What a heater's power gains with its lump's temperature: gain slope (T_a - T_ref) v, a share of it into b."""
 
     table: ClassVar[str] = "inputs"
-    account: ClassVar[str] = "inputs"
+    supply: ClassVar[str] = "inputs"
     fields: ClassVar[tuple[str, ...]] = ("gain", "power_slope", "feedthrough.share")
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     b: Indices
     drive: Indices
-    payers: Indices
+    supply_index: Indices
     gain: Array
     slope: Array
     share: Array
@@ -56,13 +56,13 @@ class LeadTerm:
     """Lead and contact heating: resistance I² into a lump."""
 
     table: ClassVar[str] = "leads"
-    account: ClassVar[str] = "modules"
+    supply: ClassVar[str] = "modules"
     fields: ClassVar[tuple[str, ...]] = ("resistance",)
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     drive: Indices
-    payers: Indices
+    supply_index: Indices
     resistance: Array
 
     @property
@@ -91,10 +91,10 @@ class CondensationTerm:
     """Condensation: conductance max(0, dew_point - T) into a lump."""
 
     table: ClassVar[str] = "lumps"
-    account: ClassVar[str] = "sources"
+    supply: ClassVar[str] = "sources"
     fields: ClassVar[tuple[str, ...]] = ("condensation.conductance", "condensation.dew_point")
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     conductance: Array
     dew_point: Array
@@ -110,7 +110,7 @@ class CondensationTerm:
         return np.zeros(0, np.intp)
 
     @property
-    def payers(self) -> Indices:
+    def supply_index(self) -> Indices:
         """The moist air."""
         return np.zeros(0, np.intp)
 
@@ -139,10 +139,10 @@ class StepTerm:
     """A link that changes: conductance relative (T_b - T_a), driven by 0 before and 1 after its time."""
 
     table: ClassVar[str] = "links"
-    account: ClassVar[str] = ""
+    supply: ClassVar[str] = ""
     fields: ClassVar[tuple[str, ...]] = ("conductance", "step.relative")
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     b: Indices
     drive: Indices
@@ -151,7 +151,7 @@ class StepTerm:
     warmer: Array  # by how much the gradient makes end b warmer than end a [K]
 
     @property
-    def payers(self) -> Indices:
+    def supply_index(self) -> Indices:
         """Nobody: heat of a link is the ambients'."""
         return np.zeros(0, np.intp)
 

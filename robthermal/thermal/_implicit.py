@@ -166,10 +166,10 @@ def _flows(eq: Equations, x: Array, u: Array) -> Array:
              "inputs": np.array([heater.gain for heater in eq.system.inputs.values()]) * w[:len(eq.system.inputs)]}
     for term in eq.terms:
         into_a, into_b = term.heat(*eq.driven(term, x, w))
-        if term.account == "sources":
+        if term.supply == "sources":
             power["sources"] += into_a.sum() + into_b.sum()
-        elif term.account:
-            np.add.at(power[term.account], term.payers, into_a + into_b)
+        elif term.supply:
+            np.add.at(power[term.supply], term.supply_index, into_a + into_b)
         for nodes, flow in ((term.a, into_a), (term.b, into_b)):
             outside = nodes >= n
             np.subtract.at(ambient, nodes[outside] - n, flow[outside])

@@ -21,11 +21,11 @@ class ModuleTerm:
     """
 
     table: ClassVar[str] = "modules"
-    account: ClassVar[str] = "modules"
+    supply: ClassVar[str] = "modules"
     fields: ClassVar[tuple[str, ...]] = ("seebeck.value", "seebeck.slope", "resistance.value", "resistance.slope",
                                          "conductance.slope", "reference_temperature", "thomson", "joule_split")
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     b: Indices
     drive: Indices
@@ -39,9 +39,9 @@ class ModuleTerm:
     split: Array
 
     @property
-    def payers(self) -> Indices:
+    def supply_index(self) -> Indices:
         """Every module pays for itself."""
-        return np.arange(len(self.owners))
+        return np.arange(len(self.components))
 
     def heat(self, Ta: Array, Tb: Array, current: Array) -> tuple[Array, Array]:
         """Heat into the hot and the cold face [W]."""

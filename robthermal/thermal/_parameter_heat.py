@@ -36,7 +36,7 @@ def touched(eq: Equations, name: str) -> Iterator[tuple[int, int, str]]:
     n = len(eq.system.lumps)
     for number, term in enumerate(eq.terms):
         if table == term.table and field in term.fields:
-            yield from ((number, pair, field) for pair, owner in enumerate(term.owners) if owner == part)
+            yield from ((number, pair, field) for pair, owner in enumerate(term.components) if owner == part)
         elif (table, field) == ("lumps", "gradient") and (isinstance(term, LinkTerm) or term.table == "links"):
             for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
                 if a == eq.index[part] and b >= n:

@@ -122,8 +122,8 @@ def _targets(eq: Equations, layout: Layout, term: Term) -> list[list[list[int]]]
         side = []
         for pair, node in enumerate(nodes):
             row = int(node) if node < len(eq.capacity) else layout.ambient_meters.start + int(node) - len(eq.capacity)
-            meter = [first[term.account] + int(term.payers[pair])] if term.account in first else []
-            side.append([row, *meter, *([layout.source_meter] if term.account == "sources" else [])])
+            meter = [first[term.supply] + int(term.supply_index[pair])] if term.supply in first else []
+            side.append([row, *meter, *([layout.source_meter] if term.supply == "sources" else [])])
         sides.append(side)
     return sides
 

@@ -32,16 +32,17 @@ class Slopes:
 class Term(Protocol):
     """Heat between pairs of nodes.
 
-    `table` and `owners` say which part of the system each pair belongs to, `fields` which of its parameters the term
-    knows, `account` who pays: "modules" and "inputs" by number in `payers`, "sources", or "" for plain links.
+    `table` and `components` say which part of the system each pair belongs to, `fields` which of its parameters the
+    term knows, `supply` where its energy comes from: "modules" or "inputs", by number in `supply_index`; "sources"; or
+    "" for plain links, which only pass heat on.
     """
 
     table: ClassVar[str]
     fields: ClassVar[tuple[str, ...]]
-    account: ClassVar[str]
+    supply: ClassVar[str]
 
     @property
-    def owners(self) -> tuple[str, ...]:
+    def components(self) -> tuple[str, ...]:
         """Part of every pair."""
 
     @property
@@ -57,7 +58,7 @@ class Term(Protocol):
         """Column of w that drives every pair; empty for what nothing drives."""
 
     @property
-    def payers(self) -> Indices:
+    def supply_index(self) -> Indices:
         """Number of the module or heater whose energy meter counts the pair."""
 
     def heat(self, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
@@ -75,9 +76,9 @@ class LinkTerm:
     """What the nonlinear links share: no drive, and an ambient end seen warmer by the other end's `gradient`."""
 
     table: ClassVar[str] = "links"
-    account: ClassVar[str] = ""
+    supply: ClassVar[str] = ""
 
-    owners: tuple[str, ...]
+    components: tuple[str, ...]
     a: Indices
     b: Indices
     warmer_a: Array  # added to the temperature of end a where that is an ambient [K]
@@ -89,7 +90,7 @@ class LinkTerm:
         return np.zeros(0, np.intp)
 
     @property
-    def payers(self) -> Indices:
+    def supply_index(self) -> Indices:
         """Nobody: heat of a link is the ambients'."""
         return np.zeros(0, np.intp)
 

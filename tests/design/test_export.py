@@ -116,7 +116,7 @@ def test_json_reads_back_as_the_same_controller(which, exports, plant, tmp_path)
     rng, m, n = np.random.default_rng(0), 2, len(plant.law.system.lumps)
     mine = yours = None
     for _ in range(50):
-        seen = rt.design.Seen(*(rng.uniform(280, 300, size) for size in (m, m, n, len(plant.around))))
+        seen = rt.design.ControllerInput(*(rng.uniform(280, 300, size) for size in (m, m, n, len(plant.around))))
         if mine is None:
             mine, yours = (c.start(seen, np.array([-1.0, 2.0])) for c in (controller, again))
         wanted, heat = controller.heat(mine, seen), again.heat(yours, seen)
@@ -287,6 +287,6 @@ def test_files_that_are_no_controller_are_refused(exports, tmp_path):
     with pytest.raises(rt.InputError, match="cannot be read"):
         rt.design.load_controller(Path(tmp_path / "none.json"))
     exports["state feedback"][0].export(tmp_path / "s.json")
-    small = rt.design.Seen(np.full(2, 290.0), np.full(2, 290.0), np.full(17, 290.0), np.zeros(1))
+    small = rt.design.ControllerInput(np.full(2, 290.0), np.full(2, 290.0), np.full(17, 290.0), np.zeros(1))
     with pytest.raises(rt.InputError, match="made for 18 lumps"):
         rt.design.load_controller(tmp_path / "s.json").start(small, np.zeros(2))

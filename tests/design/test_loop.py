@@ -1,4 +1,4 @@
-"""Closed loops on the nonlinear plant: the set-point case of the errata, collapse of step responses, runaway."""
+"""Closed loops on the nonlinear plant: the set-point case of the errata, linearity of step responses, runaway."""
 
 import numpy as np
 import pytest
@@ -61,20 +61,21 @@ def test_runaway_in_heating_ends_the_run(system, pi):
 
 
 def test_normalised_steps_collapse(system, pi, law):
-    found = rt.design.collapse(system, pi, law=law, base=308.15, steps=(-30.0, -10.0, 10.0, 30.0), duration=250.0)
+    found = rt.design.step_response_linearity(system, pi, law=law, base=308.15,
+                                              steps=(-30.0, -10.0, 10.0, 30.0), duration=250.0)
     assert found.outcome.code == "collapsed"
     assert found.after < 0.005 < 0.1 < found.before
     assert found.ratio > 30
     assert len(found.plot()) == 2
     with pytest.raises(rt.InputError, match="none zero"):
-        rt.design.collapse(system, pi, law=law, base=308.15, steps=(0.0, 1.0))
+        rt.design.step_response_linearity(system, pi, law=law, base=308.15, steps=(0.0, 1.0))
     with pytest.raises(rt.InputError, match="cannot be held"):
-        rt.design.collapse(system, pi, law=law, base=230.0)
+        rt.design.step_response_linearity(system, pi, law=law, base=230.0)
 
 
 def test_a_limit_in_a_step_is_said(system, pi):
     tight = rt.design.feedback_linearization(system, current_limits=(-0.3, 0.3))
-    found = rt.design.collapse(system, pi, law=tight, base=298.15, steps=(-20.0, 2.0), duration=60.0)
+    found = rt.design.step_response_linearity(system, pi, law=tight, base=298.15, steps=(-20.0, 2.0), duration=60.0)
     assert found.outcome.code == "limited" and "-20 K" in found.outcome.text
 
 
@@ -115,3 +116,9 @@ def test_bad_arguments_are_refused(system, pi, law, arguments, message):
     given = {"reference": 290.0, "law": law, "duration": 10.0, **arguments}
     with pytest.raises(rt.InputError, match=message):
         rt.design.simulate_loop(system, pi, given.pop("reference"), **given)
+
+
+def test_former_names_of_this_version() -> None:
+    design = rt.design
+    assert design.collapse is design.step_response_linearity and design.Collapse is design.StepResponseLinearity
+    assert design.Seen is design.ControllerInput

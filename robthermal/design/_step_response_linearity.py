@@ -1,4 +1,4 @@
-"""Does the loop respond alike to small and large steps? Normalised step responses, with the law and without it."""
+"""Does the loop respond alike to small and large steps? Normalized step responses, with the law and without it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ._numbers import expect, numbers
 
 
 @dataclass(frozen=True)
-class Collapse:
-    """Normalised step responses (y - y0)/step with the law and with its constant-gain tangent.
+class StepResponseLinearity:
+    """Normalized step responses (y - y0)/step with the law and with its constant-gain tangent.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Collapse:
         Times of the samples after the step [s].
     steps : tuple of float
         Sizes of the set-point steps [K].
-    linearised, plain : ndarray, shape (n_steps, n, n_modules)
+    linearized, plain : ndarray, shape (n_steps, n, n_modules)
         Normalized responses of the linearized loop and of the constant-gain loop [-].
     after, before : float
         Largest spread between the steps at one time, with the law and without: 0 is a linear loop.
@@ -38,11 +38,16 @@ class Collapse:
 
     time: Array
     steps: tuple[float, ...]
-    linearised: Array
+    linearized: Array
     plain: Array
     after: float
     before: float
     outcome: Outcome
+
+    @property
+    def linearised(self) -> Array:
+        """Former name of `linearized`, kept for one version."""
+        return self.linearized
 
     @property
     def ratio(self) -> float:
@@ -53,23 +58,25 @@ class Collapse:
         return f"spread {self.before:.4f} without the law, {self.after:.4f} with it. {self.outcome}"
 
     def plot(self) -> Any:
-        """Plot both families of normalised responses, like Evers figures 5.14-5.15; returns the matplotlib axes."""
+        """Plot both families of normalized responses, like Evers figures 5.14-5.15; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(1, 2, sharey=True, layout="constrained")
-        for ax, family, title in zip(axes, (self.plain, self.linearised), ("constant gain", "linearised"), strict=True):
+        for ax, family, title in zip(axes, (self.plain, self.linearized), ("constant gain", "linearized"), strict=True):
             for step, response in zip(self.steps, family, strict=True):
                 ax.plot(self.time, response[:, 0], label=f"{step:+g} K")
             ax.set(xlabel="time [s]", title=title)
-        axes[0].set_ylabel("normalised response [-]")
+        axes[0].set_ylabel("normalized response [-]")
         axes[1].legend()
         return axes
 
 
-def collapse(system: System, controller: Controller, *, law: FeedbackLinearization, base: float,
-             steps: Sequence[float] = (-30.0, -20.0, -10.0, 10.0, 20.0, 30.0), duration: float = 600.0,
-             inputs: Mapping[str, float] | None = None) -> Collapse:
-    """Compare normalised set-point steps of the linearised loop with those of the same controller on a constant gain.
+def step_response_linearity(
+    system: System, controller: Controller, *, law: FeedbackLinearization, base: float,
+    steps: Sequence[float] = (-30.0, -20.0, -10.0, 10.0, 20.0, 30.0), duration: float = 600.0,
+    inputs: Mapping[str, float] | None = None,
+) -> StepResponseLinearity:
+    """Compare normalized set-point steps of the linearized loop with those of the same controller on a constant gain.
 
     Parameters
     ----------
@@ -90,7 +97,7 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
 
     Returns
     -------
-    Collapse
+    StepResponseLinearity
 
     Raises
     ------
@@ -103,7 +110,8 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
     >>> system = rt.systems.two_module()
     >>> law = rt.design.feedback_linearization(system)
     >>> pi = rt.design.pid(rt.design.cold_side(law), bandwidth=0.02, sample_time=1.0)
-    >>> found = rt.design.collapse(system, pi, law=law, base=298.15, steps=(-15.0, 15.0), duration=200.0)
+    >>> found = rt.design.step_response_linearity(system, pi, law=law, base=298.15, steps=(-15.0, 15.0),
+    ...                                           duration=200.0)
     >>> found.ratio > 10
     True
     """
@@ -119,16 +127,16 @@ def collapse(system: System, controller: Controller, *, law: FeedbackLinearizati
         return [simulate_loop(system, controller, base + step, law=way, duration=duration, inputs=inputs, initial=at,
                               current=current) for step in steps]
 
-    linearised, plain = family(law), family(constant_gain(law, at, current))
-    limited = [f"{step:+g} K" for step, loop in zip(steps, linearised, strict=True) if (loop.limit != "").any()]
-    n = min(len(loop.time) for loop in (*linearised, *plain))
+    linearized, plain = family(law), family(constant_gain(law, at, current))
+    limited = [f"{step:+g} K" for step, loop in zip(steps, linearized, strict=True) if (loop.limit != "").any()]
+    n = min(len(loop.time) for loop in (*linearized, *plain))
     after, before = (np.array([(loop.cold[:n] - base) / step for step, loop in zip(steps, loops, strict=True)])
-                     for loops in (linearised, plain))
+                     for loops in (linearized, plain))
     text = (f"A limit was active in the steps {', '.join(limited)}: lower the bandwidth or the steps."
-            if limited else "No limit was active in the linearised loop.")
-    return Collapse(linearised[0].time[:n], tuple(steps), after, before, float(np.ptp(after, axis=0).max()),
-                    float(np.ptp(before, axis=0).max()),
-                    Outcome(not limited, "limited" if limited else "collapsed", text))
+            if limited else "No limit was active in the linearized loop.")
+    return StepResponseLinearity(linearized[0].time[:n], tuple(steps), after, before,
+                                 float(np.ptp(after, axis=0).max()), float(np.ptp(before, axis=0).max()),
+                                 Outcome(not limited, "limited" if limited else "collapsed", text))
 
 
 def _hold(system: System, law: FeedbackLinearization, base: float, inputs: Mapping[str, float] | None) -> Equilibrium:

@@ -1,4 +1,4 @@
-"""What a controller sees at a sample."""
+"""Inputs of a controller at a sample."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from ._modules import Array
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a controller sees at a sample.
+class ControllerInput:
+    """Inputs of a controller at a sample.
 
     Parameters
     ----------
