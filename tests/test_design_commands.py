@@ -351,7 +351,7 @@ def test_not_certified_is_an_answer(run: Cli, tmp_path: Path) -> None:
     (["--sensors", "T_nowhere"], ["T_nowhere", "T_sink, T_part"]),
     (["--sensors", "T_slow"], ["T_slow", "lags"]),
     (["--sensors", "T_part,T_part"], ["one lump"]),
-    (["--bandwidth", "0"], ["bandwidth", "above 0"]),
+    (["--bandwidth", "0"], ["bandwidth", "a positive number"]),
     (["--sample-time", "200", "--bandwidth", "0.2"], ["sample_time", "unstable"]),
     (["--method", "guess"], ["--method"]),
 ])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._celsius import ZERO_CELSIUS
 from ..signals import Record
 from ._score import Score
 
@@ -24,9 +25,9 @@ def draw(columns: list[Column], n_fitted: int) -> NDArray[Any]:
     for place, (record, residuals, score) in enumerate(columns):
         above, below = axes[:, place]
         for i, (name, residual) in enumerate(residuals.items()):
-            above.plot(record.time, record[name] - 273.15, ".", color=f"C{i}", markersize=2, alpha=0.4)
+            above.plot(record.time, record[name] - ZERO_CELSIUS, ".", color=f"C{i}", markersize=2, alpha=0.4)
             label = f"{name}, {score.rmse[name]:.3g} K"
-            above.plot(record.time, record[name] - residual - 273.15, color=f"C{i}", label=label)
+            above.plot(record.time, record[name] - residual - ZERO_CELSIUS, color=f"C{i}", label=label)
             below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
         above.set(title=f"{'fitted' if place < n_fitted else 'validation'}: {score.record}", ylabel="temperature [°C]")
         above.legend(fontsize="small", title="model, RMSE")

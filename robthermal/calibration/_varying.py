@@ -12,6 +12,7 @@ import pandas as pd
 from scipy.stats import chi2
 
 from .._arrays import Floats
+from .._celsius import ADD_ZERO
 from ..errors import InputError
 from ..thermal import System, linearize
 from ._estimates import Estimates
@@ -161,7 +162,7 @@ def join_models(local: Mapping[float, Estimates]) -> VaryingModel:
     temperatures = np.array(sorted(local), float)
     if not np.isfinite(temperatures).all() or temperatures[0] < 150.0:
         raise InputError(f"temperature {temperatures[0]} K", where="argument local", expected="kelvin",
-                         remedy="Add 273.15 to degrees Celsius.")
+                         remedy=ADD_ZERO)
     fits = [local[key] for key in sorted(local)]
     names = tuple(fits[0].parameters)
     for temperature, fit in zip(temperatures, fits, strict=True):

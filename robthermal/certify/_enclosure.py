@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .._celsius import ZERO_CELSIUS
 from ..errors import Outcome
 from ..thermal import System
 from ..verification import Certificate, not_certified
@@ -68,7 +69,7 @@ class RunawayFree:
 
     def table(self) -> pd.DataFrame:
         """The box, °C."""
-        return pd.DataFrame({name: np.array(pair) - 273.15 for name, pair in self.temperature.items()},
+        return pd.DataFrame({name: np.array(pair) - ZERO_CELSIUS for name, pair in self.temperature.items()},
                             index=["lowest [°C]", "highest [°C]"]).T
 
     def __str__(self) -> str:
@@ -189,7 +190,7 @@ def _rate(system: System, current: Mapping[str, Any], ranges: Mapping[str, Any],
 
 
 def _outcome(stays: Certificate, shrinks: Certificate, box: dict[str, Interval]) -> Outcome:
-    low, high = min(p[0] for p in box.values()) - 273.15, max(p[1] for p in box.values()) - 273.15
+    low, high = min(p[0] for p in box.values()) - ZERO_CELSIUS, max(p[1] for p in box.values()) - ZERO_CELSIUS
     if stays.holds and shrinks.holds:
         return Outcome(True, "certified", "Certified: no thermal runaway. Every lump stays in its range (overall "
                        f"{low:.1f} to {high:.1f} °C), in which the network contracts.")

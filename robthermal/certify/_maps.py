@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .._celsius import ZERO_CELSIUS
 from .._fleet import fleet
 from ..errors import InputError, Outcome
 from ..thermal import System, format_system, steady_state
@@ -63,10 +64,11 @@ class LimitMap:
         figure, axes = plt.subplots(1, len(panels), sharey=True, squeeze=False, layout="constrained")
         for ax, (setpoint, panel) in zip(axes[0], panels, strict=True):
             for k, (ambient, part) in enumerate(panel.groupby("ambient [K]")):
-                ax.plot(part["load [W]"], part["needed [A]"], f"C{k % 6}o-", ms=3, label=f"{ambient - 273.15:.3g} °C")
+                ax.plot(part["load [W]"], part["needed [A]"], f"C{k % 6}o-", ms=3,
+                        label=f"{ambient - ZERO_CELSIUS:.3g} °C")
                 usable = part["usable [A]"].where(part["direction"] == "cooling", -part["usable [A]"])
                 ax.plot(part["load [W]"], usable, f"C{k % 6}--", lw=0.9)
-            ax.set(xlabel="load on every cold face [W]", title=f"set-point {setpoint - 273.15:.3g} °C")
+            ax.set(xlabel="load on every cold face [W]", title=f"set-point {setpoint - ZERO_CELSIUS:.3g} °C")
         axes[0, 0].set(ylabel="current needed (line), usable (dashed) [A]")
         lines = [line for line in axes[0, 0].get_lines() if not line.get_label().startswith("_")]
         figure.legend(handles=lines, title="ambient", ncols=6, fontsize="small", loc="outside upper center")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
+from .._checks import positive_number
 from ..conic import Form
 from ..errors import InputError
 from ..thermal import Equations, System
@@ -86,7 +87,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     section["sensors"] = sensor_list(system, sensors)
     section["gain"] = gain_matrix(gain, len(system.lumps), len(section["sensors"]))
     region = region_section(system, current, temperature, parameters)
-    region["sample_time"] = _positive(sample_time)
+    region["sample_time"] = positive_number(sample_time, "sample_time", "s")
     parts: dict[str, Any] = {"system": section, "region": region}
     error = _ErrorMatrices(system, section, region)
     real = error(box_jacobian(system, region))
@@ -224,9 +225,3 @@ def gain_matrix(value: ArrayLike, rows: int, columns: int) -> list[list[float]]:
         raise InputError(f"shape {gain.shape}{finite}", where="argument gain",
                          expected=f"finite numbers, shape ({rows}, {columns}): a row per lump, a column per sensor")
     return gain.tolist()
-
-
-def _positive(value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < value < np.inf:
-        raise InputError(f"sample_time = {value!r}", where="argument sample_time", expected="a positive number [s]")
-    return float(value)

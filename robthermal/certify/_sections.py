@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .._celsius import ADD_ZERO
 from ..errors import InputError
 from ..thermal import System
 
@@ -161,7 +162,7 @@ def _interval(pair: Any, where: str, kelvin: bool = False) -> list[float]:
         raise InputError(f"({low}, {high})", where=where, expected="finite numbers, lower <= upper")
     if kelvin and low < 150.0:
         raise InputError(f"{low} K is below 150 K: it looks like degrees Celsius", where=where, expected="kelvin",
-                         remedy="Add 273.15.")
+                         remedy=ADD_ZERO)
     return [low, high]
 
 

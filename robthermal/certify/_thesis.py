@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
+from .._celsius import ADD_ZERO, ZERO_CELSIUS
 from ..errors import InputError
 from ..thermal import Equations, System
 from ._sections import system_section
@@ -70,7 +71,7 @@ class ThesisBounds:
         _, ax = plt.subplots(layout="constrained")
         name = next(iter(self.lower))
         order = np.argsort(self.cold.ravel())
-        cold = self.cold.ravel()[order] - 273.15
+        cold = self.cold.ravel()[order] - ZERO_CELSIUS
         upper, lower = self.upper[name].ravel()[order], self.lower[name].ravel()[order]
         ax.plot(cold, upper, "C0", label=f"(5.32), upper root, module {name}")
         ax.plot(cold, lower, "C0--", label="lower root, corrected")
@@ -163,5 +164,5 @@ def _kelvin(value: ArrayLike, argument: str) -> Array:
         raise InputError(f"{value!r} is not a temperature", where=f"argument {argument}", expected="kelvin") from None
     if not temperatures.size or not np.isfinite(temperatures).all() or temperatures.min() < 150.0:
         raise InputError(f"smallest value {temperatures.min(initial=np.inf):.6g}", where=f"argument {argument}",
-                         expected="finite temperatures in kelvin", remedy="Add 273.15 to degrees Celsius.")
+                         expected="finite temperatures in kelvin", remedy=ADD_ZERO)
     return temperatures

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .._celsius import ZERO_CELSIUS
 from ..certify import invariance as certify_invariance
 from ..certify import loop as certify_plain_loop
 from ..certify import observer as certify_observer
@@ -167,7 +168,8 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
     for what, part in named.items():
         if part is not None and not part.holds:
             return Outcome(False, "not_certified", f"Not certified: it is not shown that {what}: {part.reason}")
-    low, high = min(pair[0] for pair in box.values()) - 273.15, max(pair[1] for pair in box.values()) - 273.15
+    low = min(pair[0] for pair in box.values()) - ZERO_CELSIUS
+    high = max(pair[1] for pair in box.values()) - ZERO_CELSIUS
     if estimate is not None:
         return Outcome(True, "certified_sampled_model", "Certified for the sampled model only (the heat of the modules "
                        "held over a sample): whatever its start in the box of temperatures and estimates, "

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..signals import Record
 from ._modules import Array
@@ -50,7 +51,7 @@ class Estimate:
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, ax = plt.subplots(layout="constrained")
-        ax.plot(self.time, self.lumps - 273.15, label=self.model.system.lump_names)
+        ax.plot(self.time, self.lumps - ZERO_CELSIUS, label=self.model.system.lump_names)
         ax.set(xlabel="time [s]", ylabel="temperature [°C]", title="estimate from " + ", ".join(self.model.sensors))
         ax.legend(fontsize="small", ncols=2)
         return ax

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._celsius import ZERO_CELSIUS
 from ..export import Program, comment, doubles, identifier, write_export
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ def _test_vector(law: FeedbackLinearization) -> Iterator[list[float]]:
     rng, m = np.random.default_rng(0), len(law.names)
     x = np.full(len(law.system.lumps), 298.15)
     for t in range(_TEST_SAMPLES):
-        x[law.modules.cold] = rng.uniform(273.15, 298.15, m)
+        x[law.modules.cold] = rng.uniform(ZERO_CELSIUS, 298.15, m)
         x[law.modules.hot] = rng.uniform(298.15, 318.15, m)
         wanted = rng.uniform(-1.2, 4.0 if t % 4 > 1 else 1.0, m) * np.abs(law.bounds(x).heat)
         free = law.command(wanted, x).current

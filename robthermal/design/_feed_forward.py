@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from .._checks import positive_number
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_controller
 from ._modules import Array
-from ._numbers import expect, positive
+from ._numbers import expect
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -171,7 +172,7 @@ def disturbance_observer(plant: ColdSide, controller: Controller, *, time_consta
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
     expect_controller(controller)
-    h, tau = controller.sample_time, positive(time_constant, "time_constant", "s")
+    h, tau = controller.sample_time, positive_number(time_constant, "time_constant", "s")
     if tau < 2 * h:
         raise InputError(f"time_constant = {tau:g} s with a sample time of {h:g} s", where="argument time_constant",
                          expected=f"at least {2 * h:g} s", remedy="Sample faster.")

@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._celsius import ADD_ZERO, ZERO_CELSIUS
+from .._checks import positive_number
 from ..errors import Diverged, InputError, Outcome
 from ..thermal import Stepper, System
 from ._constant_gain import ConstantGain
@@ -16,7 +18,6 @@ from ._controller import Controller, ControllerInput, expect_controller
 from ._estimate import Observer
 from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
-from ._numbers import positive
 from ._plant import ColdSide, cold_side
 
 Law = FeedbackLinearization | ConstantGain
@@ -71,8 +72,8 @@ class ClosedLoop:
 
         _, axes = plt.subplots(2, sharex=True, layout="constrained")
         for i, name in enumerate(_base(self.law).names):
-            line, = axes[0].plot(self.time, self.cold[:, i] - 273.15, label=name)
-            axes[0].plot(self.time, self.reference[:, i] - 273.15, "--", color=line.get_color())
+            line, = axes[0].plot(self.time, self.cold[:, i] - ZERO_CELSIUS, label=name)
+            axes[0].plot(self.time, self.reference[:, i] - ZERO_CELSIUS, "--", color=line.get_color())
             axes[1].plot(self.time, self.current[:, i], color=line.get_color(), drawstyle="steps-post")
         axes[0].set(ylabel="cold face [°C]", title=self.outcome.code)
         axes[0].legend()
@@ -162,11 +163,11 @@ class _Run:
         if drive not in ("current", "voltage"):
             raise InputError(f"drive = {drive!r}", where="argument drive", expected='"current" or "voltage"')
         self.law, self.base, self.controller, self.observer = law, base, controller, observer
-        self.h = positive(controller.sample_time, "controller.sample_time", "s")
+        self.h = positive_number(controller.sample_time, "controller.sample_time", "s")
         if observer is not None and abs(observer.sample_time - self.h) > 1e-9 * self.h:
             raise InputError(f"the observer's sample time is {observer.sample_time:g} s", where="argument observer",
                              expected=f"the controller's, {self.h:g} s")
-        self.n = max(int(round(positive(duration, "duration", "s") / self.h)), 1)
+        self.n = max(int(round(positive_number(duration, "duration", "s") / self.h)), 1)
         self.substeps = _SUBSTEPS if drive == "voltage" else 1
         self.plant = Stepper(system, self.h / self.substeps, initial=initial, loads=tuple(load))
         self.inputs = self._signals(inputs, "inputs")
@@ -197,7 +198,7 @@ class _Run:
         wanted_cold = np.broadcast_to(wanted_cold, (self.n, len(self.base.names)))
         if wanted_cold.min() < 150.0:
             raise InputError(f"a set-point is {wanted_cold.min():g} K", where="argument reference", expected="kelvin",
-                             remedy="Add 273.15 to degrees Celsius.")
+                             remedy=ADD_ZERO)
         rows: list[tuple[Any, ...]] = []
         memory = self.observer.start(self.plant.lumps) if self.observer else np.zeros(0)
         state: Array | None = None

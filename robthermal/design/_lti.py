@@ -9,10 +9,11 @@ import control
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
+from .._checks import positive_number
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
-from ._numbers import expect, positive
+from ._numbers import expect
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -92,7 +93,7 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
     [[1.0, 0.0], [0.0, 1.0]]
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
-    h, m = positive(sample_time, "sample_time", "s"), len(plant.law.names)
+    h, m = positive_number(sample_time, "sample_time", "s"), len(plant.law.names)
     if not isinstance(system, control.lti.LTI):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a python-control StateSpace or TransferFunction")

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from .._checks import positive_number
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_modules
 from ._export_controller import FORMAT
 from ._matrices import Matrices, dot
 from ._modules import Array
-from ._numbers import numbers, positive
+from ._numbers import numbers
 
 _LARGEST = 50_000_000  # bytes: the matrices of a hundred states are a hundredth of it
 
@@ -117,5 +118,5 @@ def _controller(content: dict[str, Any]) -> MatrixController:
     found = {key: numbers(content[key], key).reshape(shape) for key, shape in shapes.items()}
     if m < 1 or len(indices) != len(lumps) or not all(0 <= i < content["n_lumps"] for i in indices):
         raise ValueError("lumps, indices and n_lumps contradict each other")
-    return MatrixController(Matrices(positive(content["sample_time"], "sample_time", "s"), m, lumps, indices,
+    return MatrixController(Matrices(positive_number(content["sample_time"], "sample_time", "s"), m, lumps, indices,
                                      int(content["n_lumps"]), around, **found), str(content["name"]))

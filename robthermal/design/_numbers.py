@@ -11,18 +11,6 @@ from ..errors import InputError
 from ._modules import Array
 
 
-def positive(value: Any, argument: str, unit: str) -> float:
-    """A finite number above zero."""
-    try:
-        number = np.nan if isinstance(value, str | bytes | bool) else float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number > 0):
-        raise InputError(f"{argument} = {value!r}", where=f"argument {argument}",
-                         expected=f"a finite number above 0 [{unit}]")
-    return number
-
-
 def numbers(value: Any, argument: str) -> NDArray[np.float64]:
     """An array of finite numbers."""
     try:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from .._checks import positive_number
 from ..certify import observer as certify_observer
 from ..errors import InputError, Outcome
 from ..verification import Certificate
@@ -19,7 +20,6 @@ from ._estimate import Observer
 from ._export_observer import export
 from ._extended import ExtendedKalmanFilter
 from ._modules import Array
-from ._numbers import positive
 from ._observer_model import ObserverModel
 from ._positive import positive_gain
 from ._robust_gain import helpful_sensors, robust_gain
@@ -250,5 +250,5 @@ def without_advice(system: Any, sensors: Sequence[str], sample_time: float, meth
 
 def _factor(sample_time: float, time_constant: float | None) -> float:
     """Decay per sample; 1 where any will do."""
-    tau = np.inf if time_constant is None else positive(time_constant, "time_constant", "s")
+    tau = np.inf if time_constant is None else positive_number(time_constant, "time_constant", "s")
     return float(np.exp(-sample_time / tau))

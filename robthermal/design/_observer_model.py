@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from .._checks import positive_number
 from ..errors import InputError
 from ..thermal import Equations, System
 from ._modules import Array, check_system
-from ._numbers import positive
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class ObserverModel:
             Time between samples [s].
         """
         check_system(system)
-        h, names = positive(sample_time, "sample_time", "s"), check_sensors(system, sensors)
+        h, names = positive_number(sample_time, "sample_time", "s"), check_sensors(system, sensors)
         for name in names:
             sensor = system.sensors[name]
             if sensor.time_constant + sensor.delay > h:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._checks import positive_number
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
-from ._numbers import expect, non_negative, per_module, positive
+from ._numbers import expect, non_negative, per_module
 from ._plant import ColdSide
 from ._sampling import check_sampling
 
@@ -106,13 +107,13 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     True
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
-    h = positive(sample_time, "sample_time", "s")
+    h = positive_number(sample_time, "sample_time", "s")
     if (bandwidth is None) == (proportional is None):
         raise InputError("give either bandwidth or proportional", where="argument bandwidth",
                          expected="one of the two")
     m = len(plant.law.names)
     if bandwidth is not None:
-        w = positive(bandwidth, "bandwidth", "rad/s")
+        w = positive_number(bandwidth, "bandwidth", "rad/s")
         G = plant.C @ np.linalg.solve(1j * w * np.eye(len(plant.A)) - plant.A, plant.B[:, :m])
         kp = 1 / np.abs(np.diag(G))
         ki, kd = kp * w / 4, np.zeros(m)
@@ -121,9 +122,10 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
             (proportional, "proportional", "W/K"), (integral, "integral", "W/(K s)"),
             (derivative, "derivative", "W s/K")))
         non_negative(np.stack([kp, ki, kd]), "proportional, integral, derivative")
-    own = kp / np.where(ki > 0, ki, 1.0) if tracking_time is None else positive(tracking_time, "tracking_time", "s")
+    own = (kp / np.where(ki > 0, ki, 1.0) if tracking_time is None
+           else positive_number(tracking_time, "tracking_time", "s"))
     tracking = np.where(ki > 0, np.maximum(own, h), np.inf)  # what never integrates must not drift either
-    tau = 2 * h if filter_time is None else positive(filter_time, "filter_time", "s")
+    tau = 2 * h if filter_time is None else positive_number(filter_time, "filter_time", "s")
     controller = PID(kp, ki, kd, tau, tracking, h)
     check_sampling(plant, controller, lambda time: PID(kp, ki, kd, max(tau, 2 * time), tracking, time))
     return controller

@@ -9,10 +9,10 @@ from itertools import product
 import numpy as np
 from scipy.optimize import linprog
 
+from .._checks import positive_number
 from ..errors import Outcome
 from ._error_box import Block
 from ._modules import Array
-from ._numbers import positive
 from ._observer_model import ObserverModel
 
 
@@ -54,7 +54,7 @@ def positive_gain(model: ObserverModel, found: list[Block], time_constant: float
             f"box (at best it changes by {fastest:.5f} per sample): lower the current, or add sensors at the modules."))
     h = model.sample_time
     best = -h / np.log(fastest) if fastest > 0 else 0.0
-    tau = 1.2 * best if time_constant is None else positive(time_constant, "time_constant", "s")
+    tau = 1.2 * best if time_constant is None else positive_number(time_constant, "time_constant", "s")
     rate = float(np.exp(-h / tau)) if tau > 0 else 0.0
     solved = _solve(model, columns, max(rate, fastest + 1e-9))
     if tau < best or solved is None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._celsius import ADD_ZERO, ZERO_CELSIUS
 from ..errors import InputError, Outcome
 from ..thermal import Equations, steady_state
 from ._linearization import FeedbackLinearization
@@ -70,8 +71,8 @@ class Reachable:
 
         _, ax = plt.subplots(layout="constrained")
         for i, name in enumerate(self.setpoint):
-            ax.plot([i, i], np.array([self.passive[name], self.limit[name]]) - 273.15, lw=8, alpha=0.4)
-            ax.plot(i, self.setpoint[name] - 273.15, "k_", ms=24)
+            ax.plot([i, i], np.array([self.passive[name], self.limit[name]]) - ZERO_CELSIUS, lw=8, alpha=0.4)
+            ax.plot(i, self.setpoint[name] - ZERO_CELSIUS, "k_", ms=24)
         ax.set_xticks(range(len(self.setpoint)), list(self.setpoint))
         ax.set(ylabel="cold face [°C]", title="set-point (black) and reachable range")
         return ax
@@ -113,7 +114,7 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     target = law.modules.vector(setpoint, "setpoint", "K")
     if target.min() < 150.0:
         raise InputError(f"a set-point is {target.min():g} K", where="argument setpoint", expected="kelvin",
-                         remedy="Add 273.15 to degrees Celsius.")
+                         remedy=ADD_ZERO)
     search = _Search.of(law, dict(load or {}), dict(inputs or {}))
     base = search.passive[search.held]
     share, at, why = search.furthest(target)

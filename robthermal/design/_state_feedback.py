@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, solve_discrete_are
 
+from .._checks import positive_number
 from ..errors import InputError, Outcome
 from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
-from ._numbers import expect, numbers, positive
+from ._numbers import expect, numbers
 from ._plant import ColdSide
 from ._robust_feedback import robust_gain
 from ._sampling import check_sampling
@@ -110,7 +111,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     True
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
-    h, m, n = positive(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
+    h, m, n = positive_number(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
     if (bandwidth is None) == (gain is None):
         raise InputError("give either bandwidth or gain", where="argument bandwidth", expected="one of the two")
     if method not in ("lqr", "lmi") or (method == "lmi") != bool(len(plants)) or (method == "lmi" and gain is not None):
@@ -119,7 +120,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
                          "and plants to stabilise", remedy="rt.design.corner_plants makes those of a constant gain.")
     outcome = StateFeedback.outcome
     if bandwidth is not None:
-        w = positive(bandwidth, "bandwidth", "rad/s")
+        w = positive_number(bandwidth, "bandwidth", "rad/s")
         K, Ki = _lqr(plant, h, w)
         if plants:
             found = robust_gain(plant, plants, h, w, (K, Ki))
@@ -134,7 +135,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
                              expected=f"({m}, {n}) for the lumps {', '.join(plant.lumps)}, and ({m}, {m})")
     own = 10 * h if bandwidth is None else max(1 / bandwidth, h)
     tracking = own if tracking_time is None else tracking_time
-    controller = StateFeedback(plant, K, Kr, Ki, positive(tracking, "tracking_time", "s"), h, outcome)
+    controller = StateFeedback(plant, K, Kr, Ki, positive_number(tracking, "tracking_time", "s"), h, outcome)
     check_sampling(plant, controller, lambda time: replace(controller, sample_time=time))
     return controller
 

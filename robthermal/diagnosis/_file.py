@@ -7,15 +7,12 @@ import math
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from .._write import write
 
 
 def write_json(path: str | Path, content: dict[str, Any]) -> None:
     """Write a dictionary; infinities and nan become null."""
-    try:
-        Path(path).write_text(json.dumps(_finite(content), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write: {error.strerror}", where=str(path), remedy="Choose another place.") from None
+    write(path, (json.dumps(_finite(content), indent=1, ensure_ascii=False) + "\n").encode("utf-8"))
 
 
 def _finite(value: Any) -> Any:

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from .._write import write
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
@@ -18,12 +18,8 @@ def printable(text: str) -> str:
 
 
 def save_text(text: str, path: str | Path) -> Path:
-    """Write UTF-8; one message if the place cannot be written."""
-    try:
-        Path(path).write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(path),
-                         remedy="Choose another place.") from None
+    """Write UTF-8, whole or not at all; one message if the place cannot be written."""
+    write(path, text.encode("utf-8"))
     return Path(path)
 
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..fitting import residual as residual_of
 from ._style import COLOURS, canvas, house_style, plain
 
-_ZERO = 273.15
 _BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures
 
 Array = NDArray[np.float64]
@@ -61,8 +61,8 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         above, below = axes[0, 0], axes[-1, 0]
         for i, (name, (data, answer)) in enumerate(pairs.items()):
             colour, dashes = COLOURS[i % len(COLOURS)], ("-", "--", ":")[i // len(COLOURS) % 3]
-            _dots(above, *thin(t / scale, data - _ZERO), colour)
-            above.plot(*thin(t / scale, answer - _ZERO), dashes, color=colour, label=plain(name))
+            _dots(above, *thin(t / scale, data - ZERO_CELSIUS), colour)
+            above.plot(*thin(t / scale, answer - ZERO_CELSIUS), dashes, color=colour, label=plain(name))
             if residual:
                 below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=colour, linewidth=0.8)
         above.set(ylabel="temperature [°C]", title=plain(title))

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from .._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN
 from ..errors import InputError
 from ._checks import Array
-from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN
 
 RowLabel = Callable[[int], str]
 

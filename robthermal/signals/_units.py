@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-ZERO_CELSIUS = 273.15
-_REST = float(Fraction("273.15") - Fraction(273.15))  # what the float 273.15 lacks: 2.3e-14
-LOWEST_KELVIN = 150.0  # a reading below this, declared kelvin, is Celsius
-HIGHEST_CELSIUS = 250.0  # a reading above this, declared Celsius, is kelvin
+from .._celsius import ZERO_CELSIUS
+
+_REST = float(Fraction("273.15") - Fraction(ZERO_CELSIUS))  # what the float 273.15 lacks: 2.3e-14
 
 _MOST_DECIMALS = 12  # beyond this, 10^d x no longer fits the 53 bits of a float for temperatures
 

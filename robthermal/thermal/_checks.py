@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
+from .._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN
 from ..errors import InputError
-from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN, celsius_to_kelvin
+from ._units import celsius_to_kelvin
 
 
 def positive(value: Any, where: str, unit: str) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._celsius import LOWEST_KELVIN
 from ..errors import InputError
 from ..signals import Record
 from ._checks import by_lump
@@ -14,7 +15,6 @@ from ._equations import Equations
 from ._layout import Layout
 from ._schedule import Schedule
 from ._terms import Array
-from ._units import LOWEST_KELVIN
 
 Initial = ArrayLike | Mapping[str, float] | None
 

@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from .._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN
+from .._write import write
 from ..errors import InputError
 from ..signals import declared
 from ._parameters import LISTED
 from ._parts import Part
 from ._system import System, build
-from ._units import HIGHEST_CELSIUS, LOWEST_KELVIN, celsius_to_kelvin, kelvin_to_celsius
+from ._units import celsius_to_kelvin, kelvin_to_celsius
 
 _MAX_BYTES = 200_000_000
 _TEMPERATURES = {"ambients": ("temperature",), "lumps": ("initial", "condensation.dew_point"),
@@ -101,7 +103,7 @@ def write_system(system: System, path: str | Path) -> None:
     >>> import robthermal as rt
     >>> rt.thermal.write_system(rt.systems.two_module(), "setup.toml")
     """
-    Path(path).write_text(format_system(system), encoding="utf-8")
+    write(path, format_system(system).encode("utf-8"))
 
 
 def format_system(system: System) -> str:

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
+from .._celsius import LOWEST_KELVIN
 from ..errors import InputError
 from ._checks import by_lump
 from ._equations import Equations
@@ -18,7 +19,6 @@ from ._sensors import source_states
 from ._steady import exogenous_point
 from ._system import System, equations
 from ._terms import Array
-from ._units import LOWEST_KELVIN
 
 
 def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,

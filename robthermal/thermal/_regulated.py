@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from .._celsius import ADD_ZERO, LOWEST_KELVIN
 from ..errors import InputError
 from ._equations import Equations
 from ._module_term import ModuleTerm
 from ._system import System, equations
 from ._terms import Array, Indices
-from ._units import LOWEST_KELVIN
 
 
 @dataclass(frozen=True)
@@ -176,4 +176,4 @@ def check_setpoint(system: System, setpoint: Mapping[str, float]) -> None:
                              expected="one of " + ", ".join(system.modules))
         if not np.isfinite(value) or value < LOWEST_KELVIN:
             raise InputError(f"set-point of {name} is {value} K", where="argument setpoint", expected="kelvin",
-                             remedy="Add 273.15 to degrees Celsius.")
+                             remedy=ADD_ZERO)

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..signals import Record
 from ._drive import Initial, held_inputs, held_slopes, start_lumps, start_slope, start_state
@@ -92,7 +93,7 @@ class Trajectory:
         from matplotlib import pyplot as plt  # half a second to import, only when a picture is wanted
 
         _, ax = plt.subplots(layout="constrained")
-        ax.plot(self.time, self.lumps - 273.15, label=self.system.lump_names)
+        ax.plot(self.time, self.lumps - ZERO_CELSIUS, label=self.system.lump_names)
         ax.set(xlabel="time [s]", ylabel="temperature [°C]", title=self.system.name)
         ax.legend(fontsize="small", ncols=2)
         return ax

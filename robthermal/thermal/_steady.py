@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .._celsius import LOWEST_KELVIN, ZERO_CELSIUS
 from ..errors import InputError, Outcome
 from ._continuation import Curve, follow
 from ._equations import Equations
 from ._regulated import check_setpoint, slowest_regulated
 from ._system import System, equations
 from ._terms import Array, Indices
-from ._units import LOWEST_KELVIN
 
 _COLDEST, _HOTTEST = 100.0, 1500.0  # K: beyond, the model means nothing
 
@@ -80,7 +80,7 @@ class SteadyState:
         width = 0.8 / max(len(self.equilibria), 1)
         for i, e in enumerate(self.equilibria):
             where = np.arange(len(e.temperatures)) + i * width
-            ax.bar(where, np.array(list(e.temperatures.values())) - 273.15, width,
+            ax.bar(where, np.array(list(e.temperatures.values())) - ZERO_CELSIUS, width,
                    label=f"equilibrium {i + 1}, {'stable' if e.stable else 'unstable'}")
         ax.set_xticks(range(len(self.system.lumps)), self.system.lump_names, rotation=90)
         ax.set(ylabel="temperature [°C]", title=f"steady states of {self.system.name}")

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from .. import signals
 
-LOWEST_KELVIN = 150.0
-HIGHEST_CELSIUS = 250.0
-
 
 def celsius_to_kelvin(value: float) -> float:
     """Nearest float of the decimal number ``value`` + 273.15 [K].
