@@ -57,12 +57,24 @@ def write_html(report: Report, path: str | Path) -> Path:
         report=report, sections=sections, first=first, drawing=drawing, ranges=_ranges, margins=margins,
         assumptions=numbered_assumptions(report), resting=resting(report), usable=shown(report.usable),
         amps=_amps, least=lambda row: "–" if row.current is None else rounded_down(row.current),
+        cards=_cards(report.claims),
         paired=any(claim.parameters == "ranges" for claim in report.claims),
         about=": about the model, which the data contradict" if report.contradicted else "",
         machine={one.file: one.machine for one in report.evidence},
         twice={one.file for one in report.evidence if one.good and one.second == "valid"},
         claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
     return save_text(printable(page), path)
+
+
+_MOST_CARDS = 8  # a page of sixty cards is read by nobody
+
+
+def _cards(claims: Sequence[Claim]) -> list[Claim]:
+    """Claims that get a card: all of a few; of many the first, and every one that does not hold."""
+    if len(claims) <= _MOST_CARDS:
+        return list(claims)
+    first = {id(claim) for claim in claims[:_MOST_CARDS // 2]}
+    return [claim for claim in claims if id(claim) in first or not claim.good]
 
 
 _OWN = ("top", "usable", "usable-title", "claims", "claims-title", "bounds",

@@ -204,3 +204,13 @@ def test_long_records_and_tables_stay_under_three_megabytes(report: Report, tmp_
     path = write_html(big, tmp_path / "r.html")
     assert path.stat().st_size < 3e6
     assert "99800 more are not shown" in Page(path).text
+
+
+def test_of_many_claims_the_first_and_the_failing_have_cards(tmp_path: Path) -> None:
+    one = Claim("c", "It holds.", True, True, "box", "none", "proof", "", "certificates/c.json", "network", 0.1)
+    good = [replace(one, title=f"Good {k}", file=f"certificates/{k}.json") for k in range(60)]
+    bad = replace(one, title="Bad", holds=False, verified=None, file="certificates/bad.json")
+    report = Report("Many", "", "", [*good, bad], (), {}, (), "today")
+    page = write_html(report, tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count('<article class="claim') == 5 and ">Bad<" in page
+    assert "56 more claims" in page

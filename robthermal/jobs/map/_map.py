@@ -183,7 +183,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
                                         ("contraction", f"Contraction with {box.current:.4g} A", box.contraction)))
     data = in_unit(result.data, system.temperature_unit)
     report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system), label="",
-                    claims=required_claims(checked), sections=(_section(result, data),),
+                    claims=required_claims(checked), sections=(), first=(_section(result, data),),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
                     generated=now())
     with output_folder(out) as folder:
