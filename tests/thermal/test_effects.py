@@ -1,5 +1,7 @@
 """Every effect of the catalogue against balances written by hand and integrated by scipy, and its sensitivities."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -57,24 +59,56 @@ CASES = [
 IDS = [f"{effect} {where[0]}" for effect, where, _ in CASES]
 
 
+def shaped(effect: str, p: dict, u: float) -> float:
+    """What an effect on an input makes of its commanded value."""
+    if effect == "input_gain":
+        return (1 + p["gain"]) * u
+    if effect == "input_offset":
+        return u + p["offset"]
+    if effect == "input_saturation":
+        return np.clip(u, -p["clip"], p["clip"]) if "clip" in p else u - p["cubic"] * u**3
+    return u
+
+
+def heat_added(effect: str, p: dict, y: Sequence[float], acting: Sequence[float]) -> tuple[dict[str, float], float]:
+    """Heat [W] that an effect adds to lumps, and the derivative of its own state."""
+    (plate, cold, hot, extra), (current, ambient, time) = y, acting
+    match effect:
+        case "hysteresis":
+            return {"cold": p["heat"] * extra}, (np.sign(current) - extra) / p["time_constant"]
+        case "hidden_mass":
+            flow = p["capacity"] / p["time_constant"] * (extra - plate)
+            return {"plate": flow}, -flow / p["capacity"]
+        case "natural_convection":
+            return {"plate": p["gain"] * abs(ambient - plate) ** p["exponent"] * (ambient - plate)}, 0.0
+        case "radiation":
+            return {"plate": p["coefficient"] * (ambient**4 - plate**4)}, 0.0
+        case "missing_link":
+            return {"plate": p["conductance"] * (hot - plate), "hot": p["conductance"] * (plate - hot)}, 0.0
+        case "missing_ambient_link":
+            return {"cold": p["conductance"] * (ambient - cold)}, 0.0
+        case "heat_source" | "sensor_self_heating":
+            return {"cold": p["heat"]}, 0.0
+        case "lead_heating":
+            return {"plate": p["resistance"] * current**2}, 0.0
+        case "periodic_load":
+            return {"cold": p["heat"] * np.sin(2 * np.pi * time / p["period"] + p["phase"])}, 0.0
+        case "condensation":
+            return {"cold": p["conductance"] * max(0.0, p["dew_point"] - cold)}, 0.0
+        case _:
+            return {}, 0.0
+
+
 def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
     """Temperatures (n, 3), straight from the table of effects: nothing of the package but the record's numbers."""
     q, m, room = (run[name] for name in ("q", "m", "room"))
     is_ = lambda name, part=None: effect == name and (part is None or where[0] == part)  # noqa: E731
 
-    def shaped(name, u):
-        if is_("input_gain", name):
-            return (1 + p["gain"]) * u
-        if is_("input_offset", name):
-            return u + p["offset"]
-        if is_("input_saturation", name):
-            return np.clip(u, -p["clip"], p["clip"]) if "clip" in p else u - p["cubic"] * u**3
-        return u
-
     def held(name, column, t):
         if is_("input_delay", name):
             t = t - p["delay"]
-        return shaped(name, column[max(int(np.floor(t / H + 1e-12)), 0)])
+        u = column[max(int(np.floor(t / H + 1e-12)), 0)]
+        return shaped(effect, p, u) if where[0] == name else u
 
     def balance(t, y, mid):  # `mid`: a time inside the present piece, for what is held
         plate, cold, hot, extra, lagged = y
@@ -100,31 +134,8 @@ def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
                 + moved,
                 "hot": 0.9 * (ambient - hot) + S * hot * current + 0.5 * R * current**2 - K * (hot - cold) - taken
                 - moved + through}
-        d_extra = 0.0
-        if is_("hysteresis"):
-            d_extra = (np.sign(current) - extra) / p["time_constant"]
-            into["cold"] += p["heat"] * extra
-        elif is_("natural_convection"):
-            into["plate"] += p["gain"] * abs(ambient - plate) ** p["exponent"] * (ambient - plate)
-        elif is_("radiation"):
-            into["plate"] += p["coefficient"] * (ambient**4 - plate**4)
-        elif is_("missing_link"):
-            into["plate"] += p["conductance"] * (hot - plate)
-            into["hot"] += p["conductance"] * (plate - hot)
-        elif is_("missing_ambient_link"):
-            into["cold"] += p["conductance"] * (ambient - cold)
-        elif effect in ("heat_source", "sensor_self_heating"):
-            into["cold"] += p["heat"]
-        elif is_("lead_heating"):
-            into["plate"] += p["resistance"] * current**2
-        elif is_("hidden_mass"):
-            flow = p["capacity"] / p["time_constant"] * (extra - plate)
-            into["plate"] += flow
-            d_extra = -flow / p["capacity"]
-        elif is_("periodic_load"):
-            into["cold"] += p["heat"] * np.sin(2 * np.pi * (t + run.start_time) / p["period"] + p["phase"])
-        elif is_("condensation"):
-            into["cold"] += p["conductance"] * max(0.0, p["dew_point"] - cold)
+        heats, d_extra = heat_added(effect, p, y[:4], (current, ambient, t + run.start_time))
+        into = {lump: flow + heats.get(lump, 0.0) for lump, flow in into.items()}
         return [into["plate"] / 20, into["cold"] / 6, into["hot"] / 9, d_extra, d_lag]
 
     start_lag = {"q": q, "m": m}[where[0]][0] if effect == "input_lag" else 0.0
