@@ -114,7 +114,8 @@ def shaken(plant: rt.System) -> rt.System:
 @pytest.mark.parametrize("first", [0, 5, 10, 15])
 def test_feedback_makes_no_names(shaken: rt.System, first: int) -> None:
     # The stated rate of false names is 1 %: of 20 loops with nothing hidden none is expected.
-    for seed in range(first, first + 5):
+    for more in range(5):
+        seed = first + more
         found = rt.diagnose(shaken, closed_loop(seed, n=100), effects=["sensor_lag", "missing_ambient_link"])
         assert found.verdict == "consistent", seed
 

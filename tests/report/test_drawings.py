@@ -65,7 +65,9 @@ def test_limits_show_values_and_say_what_is_missing() -> None:
 
 
 def test_limits_with_nothing_proven_can_be_drawn() -> None:
-    Figure.draw(current_limits(["a"], [np.nan]), alt="None.", caption="None.")
+    figure = current_limits(["a"], [np.nan])
+    assert labels(figure) == ["nothing proven"]
+    assert Figure.draw(figure, alt="None.", caption="None.").svg.startswith("<svg")
 
 
 def test_ranges_are_bars_for_few_and_a_band_for_many() -> None:

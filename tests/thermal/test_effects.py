@@ -189,6 +189,7 @@ def test_sensitivities_are_the_derivatives(effect, where, values):
     run = record(start=60.0)
     added = rt.thermal.add_effect(without_slope(effect), effect, where, values)
     names = list(added.parameters.values())
+    assert len(names) == len(values)
     exact = rt.thermal.trajectory(added.system, run, sensitivities=names, tolerance=FINE).sensitivity
     for column, name in enumerate(names):
         value = added.system.parameter(name)

@@ -123,7 +123,9 @@ def test_every_leaf_replaced_by_something_that_is_no_number(certificate, path):
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             yield at
 
-    for at in places({key: json.loads(text)[key] for key in ("system", "region", "evidence", "margin")}):
+    found = list(places({key: json.loads(text)[key] for key in ("system", "region", "evidence", "margin")}))
+    assert len(found) > 5
+    for at in found:
         for junk in ("true", "null", '""', "NaN", "-Infinity", "1e999", '"1e999"', '"nan"', "[]", "{}", '"1_0"', '" 1"',
                      '"1\\n"', '"\\u0661"', '"0x"', '"0x1p9999"', "1" + 5000 * "0", '"0e99999999999"', "1e-999",
                      "[[]]"):
@@ -177,10 +179,11 @@ def test_format_kind_and_depth(path):
 def test_key_given_twice_anywhere(path):
     ALL[0].save(path)
     text = path.read_text()
-    for key in ("kind", "lumps", "capacity", "slope", "rate", "m", "room"):
-        if f'"{key}":' in text:
-            with pytest.raises(InputError, match="twice"):
-                read(path, text.replace(f'"{key}":', f'"{key}": 1, "{key}":', 1))
+    keys = [key for key in ("kind", "lumps", "capacity", "slope", "rate", "m", "room") if f'"{key}":' in text]
+    assert len(keys) == 6
+    for key in keys:
+        with pytest.raises(InputError, match="twice"):
+            read(path, text.replace(f'"{key}":', f'"{key}": 1, "{key}":', 1))
 
 
 def test_free_keys_are_free(path):

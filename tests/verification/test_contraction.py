@@ -127,13 +127,16 @@ def test_never_valid_where_a_sample_violates(method, seed):
     """Random systems (slopes of any sign, shared lumps, convection, radiation) around their limit."""
     rng = np.random.default_rng([seed, METHODS.index(method)])
     system = truth.random_system(rng, modules=2, bent=seed % 3 == 1, wild=seed % 2 == 1)
+    held = 0
     for top in (0.5, 1.5, 2.5, 4.0, 8.0):
         region = truth.box(system, top)
         certificate = make(system, region, truth.evidence_for(method, system, region, 0.0, rng), {})
         document = {"system": system, "region": region, "evidence": certificate.evidence}
         if certificate.holds:
+            held += 1
             assert truth.violation(document, rng, 80) <= 1e-9
             assert truth.frozen_abscissa(document, rng, 80) < 0
+    assert held == 0 if method == "lyapunov" and seed % 3 == 1 else held >= 4  # no full P with convection
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -208,24 +211,29 @@ def test_links_that_are_not_linear(bent):
 
 
 def test_energy_with_radiation_is_sharp_enough_and_safe():
-    system = rod()
+    system, held = rod(), []
     for strength in (1e-9, 1e-8, 1e-7, 1e-6):
         system["links"][0] = {**system["links"][0], "radiation": strength}
         document = {"system": system, "region": passive(), "evidence": {"method": "energy", "rate": 0.0}}
         if make(system, passive(), document["evidence"]).holds:
+            held.append(strength)
             assert truth.violation(document, np.random.default_rng(0), 400) < 0
+    assert held == [1e-9, 1e-8]
 
 
 def test_lyapunov_refines_the_current():
     """A full P far from E with a wide current box is only proven with a finer hull, and never beyond the truth."""
     rng = np.random.default_rng(3)
     system = truth.random_system(rng, modules=1)
-    for top in np.linspace(0.5, 8.0, 12):
+    held = []
+    for top in np.linspace(0.5, 12.0, 12):
         region = truth.box(system, float(top))
         evidence = truth.evidence_for("lyapunov", system, region, 0.0, rng)
         document = {"system": system, "region": region, "evidence": evidence}
         if make(system, region, evidence, {}).holds:
+            held.append(float(top))
             assert truth.violation(document, rng, 300) < 0
+    assert 6 <= len(held) < 12  # the last ones are beyond what can be proven
 
 
 def test_many_modules_use_a_common_bound():

@@ -154,6 +154,7 @@ def test_slopes_of_the_law_are_enclosed():
     _, module = machine()
     T, span = (fmpq(285), fmpq(310)), (fmpq(-1, 5), fmpq(1, 2))
     balls = [(float(ball.lower()), float(ball.upper())) for ball in _law.free_slopes(module, T, T, span)]
+    assert len(balls) == 6
     rng, step = np.random.default_rng(5), 1e-4
     for _ in range(40):
         x, current = rng.uniform(285.01, 309.99, 2), rng.uniform(-0.19, 0.49)
