@@ -17,7 +17,7 @@ from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_rec
 
 
 def machine(plate: bool = False) -> rt.System:
-    """A module between two faces, a heater, two sensors, one of them lagged; a plate that touches the cold face only."""
+    """A module between two faces, a heater, two sensors, one lagged; a plate that touches the cold face only."""
     return rt.System(
         ambients={"room": {"temperature": 298.15}},
         lumps={"cold": {"capacity": 20.0, "disturbance": 0.05, "initial": 298.15},
