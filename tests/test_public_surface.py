@@ -114,6 +114,7 @@ def test_former_name_of_the_jobs_has_the_same_objects() -> None:
     inside = [getattr(rt.jobs, name) for name in ("certify", "claims", "couple", "design", "diagnose", "folder", "map",
                                                   "measured", "request", "run", "verify")]
     explained = sys.modules["robthermal.jobs.explain"]  # rt.jobs.explain is the function
+    assert len(rt.project.__all__) > 20
     for name in rt.project.__all__:
         homes = [module for module in (rt.jobs, explained, *inside) if hasattr(module, name)]
         assert homes, name

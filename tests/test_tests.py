@@ -32,7 +32,9 @@ def called(node: ast.AST) -> str:
 
 def checks(node: ast.AST, helpers: set[str]) -> bool:
     """Whether an expression calls something that fails when its claim does not hold."""
-    return any(name.startswith("assert_") or name in FAILING or name in helpers for name in map(called, ast.walk(node)))
+    calls = [one for one in ast.walk(node) if isinstance(one, ast.Call)]
+    return any(name.startswith("assert_") or name in FAILING or name in helpers for name in map(called, calls)) or any(
+        ast.unparse(keyword) == "check=True" for one in calls for keyword in one.keywords)  # a process
 
 
 def never_empty(iterable: ast.expr, known: set[str]) -> bool:
@@ -161,6 +163,7 @@ GOOD = {
     "raised": "with pytest.raises(InputError):\n    f()",
     "numpy": "np.testing.assert_allclose(a, b)",
     "by_helper": "same(a, b)",
+    "process": "subprocess.run(words, check=True)",
     "cleaned_up": "try:\n    assert x\nfinally:\n    f()",
     "as_long": "for a, b in zip(found(), (1, 2), strict=True):\n    assert a == b",
 }
