@@ -351,7 +351,9 @@ def test_check_of_sound_input(run: Cli, system: Path, record: Path) -> None:
     assert run("check", system, record).status == 0
     done = run("check", system, record, "--json")
     answer = json.loads(done.out)
-    assert done.status == 0 and answer["records"][0]["samples"] == 200 and answer["modules"] == ["m1"]
+    understood = answer["records"][0]["import"]
+    assert done.status == 0 and answer["modules"] == ["m1"]
+    assert understood["rows"] == {"file": 200, "used": 200} and [p["samples"] for p in understood["parts"]] == [200]
 
 
 def changed(old: str, new: str) -> str:
@@ -388,12 +390,10 @@ RECORD = HEADER + "".join(ROWS)
 @pytest.mark.parametrize(("text", "words"), [
     (RECORD.replace(",0.5,", ",500,"), ["m1", "500 A", "mA", "1000"]),
     (HEADER + "".join(f"{i},0.5,295.1,295.2,295.3\n" for i in range(20)), ["room", "295.1", "kelvin", "degC"]),
-    (RECORD.replace("22.05", "nan"), ["T_plate", "line 7", "nan", "cut the file"]),
     (RECORD.replace("22.05", "warm"), ["T_plate", "line 7", "warm"]),
-    (HEADER + "".join(ROWS[:9] + ROWS[13:]), ["gap", "line 10", "Split"]),
     (RECORD.replace("\n7,", "\n6,"), ["line 9", "duplicate"]),
     (RECORD.replace("\n7,", "\n3,"), ["line 9", "backward"]),
-    (RECORD.replace("m1", "mm1"), ["'m1'", "Add a column"]),
+    (RECORD.replace("m1", "mm1"), ["'m1'", "Did you mean 'mm1'", "--column", "Zeros if 'm1' was off"]),
     (HEADER, ["no data rows"]),
     ("", ["empty"]),
     (bytes(range(256)) * 100, ["binary"]),
@@ -401,6 +401,21 @@ RECORD = HEADER + "".join(ROWS)
 def test_check_refuses_a_record(run: Cli, system: Path, tmp_path: Path, text: str | bytes, words: list[str]) -> None:
     file = write(tmp_path / "bad.csv", text)
     refused(run("check", system, file), "bad.csv", *words)
+
+
+@pytest.mark.parametrize(("text", "words", "parts"), [
+    (HEADER + "".join(ROWS[:9] + ROWS[13:]), ["line 10", "4 samples are missing"], [9, 7]),
+    (RECORD.replace("22.05", "nan"), ["line 7", "T_plate", "nothing was measured"], [5, 14]),
+])
+def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Cli, system: Path, tmp_path: Path, text: str,
+                                                                     words: list[str], parts: list[int]) -> None:
+    file = write(tmp_path / "gap.csv", text)
+    done = run("check", system, file, "--json")
+    understood = json.loads(done.out)["records"][0]["import"]
+    assert done.status == 0 and [part["samples"] for part in understood["parts"]] == parts
+    assert [one["what"] for one in understood["actions"] if one["what"] != "converted"] == ["split"]
+    assert "note: gap.csv" in done.err
+    refused(run("check", system, file, "--record", "gaps=refuse"), "gap.csv", *words, 'gaps = "split"')
 
 
 def test_check_refuses_celsius_declared_kelvin(run: Cli, tmp_path: Path) -> None:
