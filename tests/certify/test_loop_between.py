@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from loop_machines import AMBIENT, Machine, peltier
+from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.verification import establish
@@ -109,6 +110,53 @@ def test_loops_that_oscillate_are_never_certified_for_the_machine():
         proven = rt.design.certify_loop(system, pi, law, ambient=AMBIENT, observer=estimator)
         assert not proven.holds or proven.outcome.code == "certified_sampled_model"
     assert oscillating >= 2
+
+
+def test_a_loop_that_limit_cycles_is_at_most_certified_as_a_sampled_model():
+    """Observer gain 0.9, samples of 20 s: once certified without a word on the model, and it swings by 13 K."""
+    S, R, K, G_hot, G_cold, room, time = 0.05, 2.0, 0.5, 5.5, 0.24, 298.15, 20.0
+    E = np.array([55.0, 13.0])
+    system = rt.System(
+        ambients={"room": {"temperature": room}}, lumps={"hot": {"capacity": E[0]}, "cold": {"capacity": E[1]}},
+        links=[{"between": ("hot", "room"), "conductance": G_hot},
+               {"between": ("cold", "room"), "conductance": G_cold}],
+        modules={"m": {"hot": "hot", "cold": "cold", "seebeck": {"value": S}, "resistance": {"value": R},
+                       "conductance": {"value": K}, "reference_temperature": room}},
+        sensors={"Th": {"lump": "hot", "noise": 0.01}, "Tc": {"lump": "cold", "noise": 0.01}})
+    law = rt.design.feedback_linearization(system, current_limits=(0.0, 1.8))
+    pi = dataclasses.replace(rt.design.pid(rt.design.cold_side(law), bandwidth=0.2, sample_time=time),
+                             proportional=np.array([3.0]), integral=np.array([0.1]))
+    observer = dataclasses.replace(rt.design.observer(system, ["Th", "Tc"], sample_time=time), gain=0.9 * np.eye(2))
+    proof = rt.design.certify_loop(system, pi, law, observer=observer)
+
+    def motion(current):
+        """x(t + h) = F x(t) + g at a constant current: its equations are linear."""
+        A = np.array([[S * current - G_hot - K, K], [K, -S * current - G_cold - K]]) / E[:, None]
+        b = (np.array([G_hot, G_cold]) * room + 0.5 * R * current**2) / E
+        F = expm(np.block([[A, b[:, None]], [np.zeros((1, 3))]]) * time)
+        return F[:2, :2], F[:2, 2]
+
+    rest, still = motion(0.0)
+    hold = np.linalg.solve(np.array([[-G_hot - K, K], [K, -G_cold - K]]) / E[:, None], rest - np.eye(2)) / E
+    x, seen, z, reference, cold = np.array([290.0, 290.0]), np.array([290.0, 290.0]), 0.0, 285.0, []
+    for _ in range(400):
+        v = pi.proportional[0] * (reference - seen[1]) + z
+        slope = S * seen[1]
+        root = slope**2 + 2 * R * (v - K * (seen[0] - seen[1]))
+        current = min(max((slope - np.sqrt(max(root, 0.0))) / R, 0.0), 1.8)
+        given = K * (seen[0] - seen[1]) + 0.5 * R * current**2 - S * seen[1] * current
+        z += (pi.integral[0] * time * (reference - seen[1])
+              + (1 - np.exp(-time / pi.tracking_time[0])) * (given - v))
+        heat = np.array([S * seen[0], -S * seen[1]]) * current + 0.5 * R * current**2
+        F, g = motion(current)
+        x, seen = F @ x + g, rest @ seen + still + hold @ heat + 0.9 * (x - seen)
+        cold.append(x[1])
+    assert np.ptp(cold[-100:]) == pytest.approx(13.48, abs=0.02) and min(cold) > 268.0 and max(cold) < 303.0
+    run = rt.design.simulate_loop(system, pi, reference, law=law, observer=observer, duration=8000.0)
+    assert np.ptp(run.cold[-100:]) == pytest.approx(np.ptp(cold[-100:]), rel=1e-3)
+    assert not proof.holds or (proof.outcome.code == "certified_sampled_model" and "sampled model" in proof.loop.claim
+                               and "sampled model" in str(proof))
+    assert "plant" not in proof.loop.region or proof.loop.region["plant"] == "held"
 
 
 def test_sensors_with_a_gain():
