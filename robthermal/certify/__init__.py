@@ -16,6 +16,7 @@ from ._invariance import invariance as invariance
 from ._limits import CurrentLimit as CurrentLimit
 from ._limits import largest_current as largest_current
 from ._loop import loop as loop
+from ._loop_parameters import check_loop_parameters as check_loop_parameters
 from ._maps import LimitMap as LimitMap
 from ._maps import limit_map as limit_map
 from ._network import network as network
@@ -32,7 +33,7 @@ from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
 __all__ = ["CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds",
-           "UsableCurrent", "check_certificate", "contraction", "frequency_norm", "frequency_radius", "gains",
-           "heater_heat", "hinf", "invariance", "largest_current", "largest_regulated_current", "limit_map", "loop",
-           "network", "observer", "peak", "regulated", "runaway", "runaway_free", "stability", "thesis_bounds",
-           "usable_current"]
+           "UsableCurrent", "check_certificate", "check_loop_parameters", "contraction", "frequency_norm",
+           "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
+           "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
+           "runaway_free", "stability", "thesis_bounds", "usable_current"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +16,13 @@ from ._flow import Builder
 from ._flow_search import Forms
 from ._flow_search import contraction as flow_contraction
 from ._flow_search import search as flow_search
+from ._loop_parameters import Plant, check_loop_parameters, refuse_uncertain_sensors
 from ._loop_picture import Picture, picture
 from ._loop_search import Candidate, contraction, frozen, search, sides
 from ._lyapunov import check_choice, short_matrices
 from ._observer import gain_matrix, sensor_list
 from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
 
-Plant = Literal["continuous", "held"]
 Array = NDArray[np.floating[Any]]
 _SOLVER = "Clarabel semidefinite program, cutting planes"
 _KEYS = ("A", "B", "C", "D", "windup")
@@ -70,8 +70,9 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
     sensors : sequence of str
         What that observer reads.
     parameters : mapping, optional
-        Uncertain conductances of links, {"links.NAME.conductance": (lower, upper)} [W/K], for plant "continuous". What
-        the law and the controller know (the modules) is not uncertain.
+        Uncertain conductances of links, {"links.NAME.conductance": (lower, upper)} [W/K], for plant "continuous" and
+        without observer. What the law knows (the modules) and what is not offered here (capacities, natural convection,
+        radiation) is refused by name; what no loop depends on (a sensor that is not read, a start) is ignored.
     large : bool
         Search a dense P for more than 40 lumps too, which may take hours.
 
@@ -110,14 +111,15 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
     check_choice(system, "full", large)
     section["controller"] = _controller(controller, len(system.lumps), len(system.modules))
     region = region_section(system, current, temperature, parameters)
-    _links_only(region.get("parameters", {}), plant)
+    check_loop_parameters(system, parameters, plant, observer=gain is not None)
     region["sample_time"] = _number(sample_time, "sample_time", "s")
     if plant not in ("continuous", "held"):
         raise InputError(f"plant = {plant!r}", where="argument plant", expected='"continuous" or "held"')
     region["plant"] = plant
     if gain is not None:
-        _observer_fits(plant, drift, region)
+        _observer_fits(plant, drift)
         section["sensors"] = sensor_list(system, sensors)
+        refuse_uncertain_sensors(system, sensors, parameters or {})
         section["gain"] = gain_matrix(gain, len(system.lumps), len(section["sensors"]))
     if drift is not None:
         region["drift"] = _number(drift, "drift", "K")
@@ -196,10 +198,9 @@ def _prove_flow(parts: dict[str, Any], builder: Builder, forms: Forms, pieces: i
     return not_certified("loop", **parts, evidence={}, reason=reason, made_by=made_by(_SOLVER, f"{solves} solved"))
 
 
-def _observer_fits(plant: str, drift: float | None, region: Mapping[str, Any]) -> None:
-    if plant != "continuous" or drift is not None or "parameters" in region:
-        raise InputError("an observer in the loop", where="argument gain",
-                         expected='plant="continuous", no drift, nominal parameters',
+def _observer_fits(plant: str, drift: float | None) -> None:
+    if plant != "continuous" or drift is not None:
+        raise InputError("an observer in the loop", where="argument gain", expected='plant="continuous", no drift',
                          remedy="Certify loop and observer of the sampled model apart, or the loop without observer.")
 
 
@@ -274,17 +275,6 @@ def _controller(value: Mapping[str, ArrayLike], n: int, m: int) -> dict[str, lis
                              expected=f"finite numbers, {shape}")
         found[key] = matrix.tolist()
     return found
-
-
-def _links_only(parameters: Mapping[str, Interval], plant: str) -> None:
-    other = [name for name in parameters if not name.startswith("links.")]
-    if other:
-        raise InputError(f"{other[0]!r} cannot be uncertain in a loop", where="argument parameters",
-                         expected="conductances of links",
-                         remedy="Certify contraction or regulated with it; the law is built from the modules' values.")
-    if parameters and plant == "held":
-        raise InputError("uncertain links in the sampled model", where="argument parameters",
-                         expected='plant="continuous"')
 
 
 def _number(value: float, name: str, unit: str) -> float:

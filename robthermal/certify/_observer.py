@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..thermal import Equations, System
 from ..verification import Certificate, establish, not_certified
 from ._jacobian import BoxJacobian, box_jacobian
+from ._loop_parameters import refuse_uncertain_sensors
 from ._lyapunov import check_choice, short_matrices
 from ._multipliers import Channel, multiplier_form
 from ._polytope import MOST, Cuts, Polytope, common_form
@@ -53,7 +54,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
         Uncertain numbers of the system as in `contraction`, but for capacities: the error shrinks for every combination
         that plant and observer share. A_d and Γ stay those of the system's own numbers; what the parameters differ from
         them is part of f. An observer whose model differs from the plant has an error that does not vanish: that is not
-        claimed.
+        claimed. Ranges of gains of sensors that it reads are refused.
     large : bool
         Search a dense P for more than 40 lumps too, which may take hours.
 
@@ -85,6 +86,7 @@ def observer(system: System, *, gain: ArrayLike, sensors: Sequence[str], sample_
     section = system_section(system)
     check_choice(system, "full", large)
     section["sensors"] = sensor_list(system, sensors)
+    refuse_uncertain_sensors(system, sensors, parameters or {})
     section["gain"] = gain_matrix(gain, len(system.lumps), len(section["sensors"]))
     region = region_section(system, current, temperature, parameters)
     region["sample_time"] = positive_number(sample_time, "sample_time", "s")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from .._celsius import ZERO_CELSIUS
+from ..certify import check_loop_parameters, runaway_free
 from ..certify import invariance as certify_invariance
 from ..certify import loop as certify_plain_loop
 from ..certify import observer as certify_observer
-from ..certify import runaway_free
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate
@@ -83,7 +83,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         Box of temperatures [K]; default the box of `rt.certify.runaway_free`, which currents within the limits cannot
         leave.
     ambient, heat : mapping, optional
-        {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, none.
+        {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, and the declared
+        limits of the heaters, or none where `temperature` is given.
     observer : GainObserver, optional
         Where the law and the controller use estimates. If the loop is too large, or no proof is found for the plant
         in continuous time, the claim is about the *sampled model* of the observer, the heat of the modules held over a
@@ -91,7 +92,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     drift : float, optional
         As in `rt.certify.loop`.
     parameters : mapping, optional
-        Uncertain conductances of links, as in `rt.certify.loop`; needs a `temperature` box, and no observer.
+        {parameter name: (lower, upper)}, for example `Fit.ranges`: uncertain conductances of links, without observer.
+        Ranges that the loop does not depend on are ignored, others refused by name, as in `rt.certify.loop`.
 
     Returns
     -------
@@ -126,12 +128,9 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         if observer.sample_time != controller.sample_time:
             raise InputError(f"the observer's sample time is {observer.sample_time:g} s", where="argument observer",
                              expected=f"the controller's, {controller.sample_time:g} s")
-    if parameters and temperature is None:
-        raise InputError("uncertain links without a box", where="argument temperature",
-                         expected="a box that is not left for any of these conductances",
-                         remedy="Take the box of rt.certify.runaway_free with some room to spare.")
+    check_loop_parameters(system, parameters, observer=observer is not None)
     if temperature is None:
-        free = runaway_free(system, current=limits, ambient=ambient, heat=heat)
+        free = runaway_free(system, current=limits, ambient=ambient, heat=heat, parameters=parameters)
         stays, box = free.invariance, free.temperature
         if not box:
             return CertifiedLoop(stays, stays, None, Outcome(False, "not_certified", "Not certified: no box was found "
@@ -145,17 +144,14 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     if observer is None:
         loop = certify_plain_loop(system, **limits_and_box, drift=drift, parameters=parameters)
         return CertifiedLoop(loop, stays, None, _outcome(loop, stays, None, box, drift))
-    if parameters:
-        raise InputError("uncertain links with an observer", where="argument parameters", expected="no observer",
-                         remedy="Certify the loop at the true temperatures and rt.certify.observer with them.")
     # the certificate's sensors read gain times their lump, this observer undoes that first
     gain = observer.gain / np.array([system.sensors[name].gain for name in observer.sensors])
-    both = certify_plain_loop(system, **limits_and_box, gain=gain, sensors=list(observer.sensors))
+    read: dict[str, Any] = {"gain": gain, "sensors": list(observer.sensors), "parameters": parameters}
+    both = certify_plain_loop(system, **limits_and_box, **read)
     if both.holds:
         return CertifiedLoop(both, stays, None, _outcome(both, stays, None, box, None))
     held = certify_plain_loop(system, **limits_and_box, plant="held")
-    error = certify_observer(system, gain=gain, sensors=list(observer.sensors), sample_time=observer.sample_time,
-                             current=limits, temperature=box)
+    error = certify_observer(system, **read, sample_time=observer.sample_time, current=limits, temperature=box)
     outcome = _outcome(held, stays, error, box, None)
     text = f"{outcome.text} Why not for the machine itself: {both.reason}" if outcome.ok else outcome.text
     return CertifiedLoop(held, stays, error, replace(outcome, text=text))

@@ -84,12 +84,62 @@ def test_uncertain_links():
         assert (V[1:] <= c**2 * V[:-1] * (1 + 1e-6)).all()
     wide = dataclasses.replace(proven.loop, region={**proven.loop.region, "parameters": {names[0]: [1e-6, 10.0]}})
     assert not rt.verify(wide).valid
-    for parameters, message in (({"modules.m.seebeck.value": (0.049, 0.051)}, "cannot be uncertain in a loop"),
+    for parameters, message in (({"modules.m.seebeck.value": (0.049, 0.051)},
+                                 "'modules.m.seebeck.value' cannot be uncertain in a loop: the law is made of .*"
+                                 "runaway_free and usable_current claim"),
+                                ({"lumps.sink.capacity": (1.0, 1e3)}, "'lumps.sink.capacity' cannot be uncertain"),
                                 ({names[0]: (0.1, 0.2)}, "excludes")):
         with pytest.raises(rt.InputError, match=message):
             rt.design.certify_loop(system, pi, law, temperature=box, parameters=parameters)
-    with pytest.raises(rt.InputError, match="without a box"):
-        rt.design.certify_loop(system, pi, law, parameters=ranges)
+
+
+def test_ranges_of_a_calibration_in_a_loop():
+    """A box is found for all conductances; what the loop does not depend on is ignored, the rest refused by name."""
+    rng = np.random.default_rng(7)
+    plain = machine(rng)
+    system = rt.System(ambients=plain.ambients, links=plain.links, modules=plain.modules,
+                       lumps={name: {"capacity": lump.capacity} for name, lump in plain.lumps.items()},
+                       sensors={"T": {"lump": "cold", "noise": 0.01}},
+                       inputs={"foil": {"lump": "mass", "limits": (0.0, 0.1)}})
+    law, pi = design(system, (-0.15, 0.3))
+    name = "links.sink-room.conductance"
+    value = system.parameter(name)
+    ranges = {name: (0.95 * value, 1.05 * value), "sensors.T.gain": (0.9, 1.1), "sensors.T.offset": (-0.5, 0.5),
+              "inputs.foil.gain": (0.9, 1.1), "lumps.cold.initial": (280.0, 310.0)}
+    ranges = {key: pair for key, pair in ranges.items() if key in system.parameter_names}
+    assert len(ranges) >= 4
+    proven = rt.design.certify_loop(system, pi, law, parameters=ranges)
+    assert proven.holds and rt.verify(proven.loop).valid and rt.verify(proven.invariance).valid
+    assert list(proven.loop.region["parameters"]) == list(proven.invariance.region["parameters"]) == [name]
+    assert proven.invariance.region["heat"]["mass"] == [0.0, pytest.approx(0.11)]
+    bare = rt.design.certify_loop(system, pi, law)
+    low, high = np.array(list(bare.invariance.region["temperature"].values())).T
+    wide = np.array(list(proven.invariance.region["temperature"].values())).T
+    assert (wide[0] <= low).all() and (wide[1] >= high).all() and (wide[1] > high).any()
+    read = rt.design.observer(system, ["T"], sample_time=pi.sample_time)
+    box = {key: tuple(pair) for key, pair in bare.invariance.region["temperature"].items()}
+    for parameters, message in (({"sensors.T.gain": (0.9, 1.1)}, "sensors.T.gain cannot be covered: the observer"),
+                                ({name: ranges[name]}, "'links.sink-room.conductance' cannot be uncertain with an")):
+        with pytest.raises(rt.InputError, match=message):
+            rt.design.certify_loop(system, pi, law, observer=read, parameters=parameters)
+    with pytest.raises(rt.InputError, match="the observer reads this sensor"):
+        rt.certify.observer(system, gain=read.gain, sensors=["T"], current={"m": (0.0, 0.1)}, temperature=box,
+                            parameters={"sensors.T.gain": (0.9, 1.1)})
+
+
+def test_ranges_of_natural_convection_and_radiation_are_refused_in_a_loop():
+    rng = np.random.default_rng(7)
+    plain = machine(rng)
+    links = [{"between": link.between, "conductance": link.conductance} for link in plain.links]
+    ends = next(link["between"] for link in links if "room" not in link["between"])
+    bent = [{**link, "natural": {"gain": 0.01, "exponent": 1.25}, "radiation": 1e-11}
+            if link["between"] == ends else link for link in links]
+    system = rt.System(ambients=plain.ambients, links=bent, modules=plain.modules, lumps=plain.lumps)
+    law, pi = design(system, (-0.15, 0.3))
+    for part, pair in (("natural.gain", (0.005, 0.02)), ("radiation", (0.0, 2e-11))):
+        name = f"links.{ends[0]}-{ends[1]}.{part}"
+        with pytest.raises(rt.InputError, match=f"'{name}' cannot be uncertain in a loop"):
+            rt.design.certify_loop(system, pi, law, parameters={name: pair})
 
 
 def test_limits_are_active_in_these_simulations():
