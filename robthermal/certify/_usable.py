@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from ..errors import InputError, Outcome
 from ..thermal import System
@@ -18,6 +18,8 @@ from ._usable_result import CurrentBound, UsableCurrent
 from ._usable_runaway import runaway_bound
 
 _BACK_OFF = (0.0, 1e-3, 1e-2, 0.05, 0.2)
+_Proven = TypeVar("_Proven", bound=tuple[Any, ...])
+_FINE = 2e-4  # share of a bound within which its largest proven current is found
 
 
 def usable_current(system: System, *, direction: Direction = "cooling", temperature: Temperatures,
@@ -99,14 +101,14 @@ def headline(question: Question, limits: dict[str, CurrentBound], costly: str | 
     """The smallest bound with its certificates; `costly` is the parameter that costs most of the runaway bound."""
     q = question
     limited_by = min(limits, key=lambda name: limits[name].current)
-    for back_off in _BACK_OFF:
-        c = limits[limited_by].current * (1 - back_off)
+
+    def prove(c: float) -> tuple[dict[str, Interval], Certificate, Certificate]:
         box, stays = q.certified_box(c)
-        shrinks = stays if not box else contraction(q.system, current=current_range(q.system, q.direction, c),
-                                                    temperature=box, method=q.method, parameters=q.parameters)
-        if stays.holds and shrinks.holds:
-            break
-    c = c if stays.holds and shrinks.holds else 0.0
+        return box, stays, stays if not box else contraction(
+            q.system, current=current_range(q.system, q.direction, c), temperature=box, method=q.method,
+            parameters=q.parameters)
+
+    c, (box, stays, shrinks) = _largest_proven(limits[limited_by].current, prove)
     if limited_by != "runaway":
         costly = _limiting_parameter(q, limited_by, limits[limited_by].current)
     return UsableCurrent(c, q.direction, limited_by, limits, current_range(q.system, q.direction, c), box, stays,
@@ -115,14 +117,36 @@ def headline(question: Question, limits: dict[str, CurrentBound], costly: str | 
 
 def box_bound(question: Question) -> CurrentBound:
     """Largest current with an invariant box inside the stated one, in which the network contracts."""
-    largest = largest_box_current(question)
-    for back_off in _BACK_OFF:
-        c = largest * (1 - back_off)
-        _, stays = question.certified_box(c)
-        if stays.holds:
-            return CurrentBound(c, stays, "proven", "Up to it a box inside the stated one is never left, for all "
-                                "ambients and heats.")
+    c, (_, stays) = _largest_proven(largest_box_current(question), question.certified_box)
+    if stays.holds:
+        return CurrentBound(c, stays, "proven", "Up to it a box inside the stated one is never left, for all ambients "
+                            "and heats.")
     return CurrentBound(0.0, stays, "proven", "Not even without current is a box inside the stated one proven.")
+
+
+def _largest_proven(limit: float, prove: Callable[[float], _Proven]) -> tuple[float, _Proven]:
+    """Largest current up to a limit for which all certificates of `prove` hold, and these; 0 where there is none."""
+    failed = limit
+    for back_off in _BACK_OFF:
+        c = limit * (1 - back_off)
+        found = prove(c)
+        if _all_hold(found) or not limit:
+            break
+        failed = c
+    if not _all_hold(found):
+        return 0.0, found
+    while failed - c > _FINE * limit:  # back-off steps alone would put ranges of parameters above their own numbers
+        middle = 0.5 * (failed + c)
+        trial = prove(middle)
+        if _all_hold(trial):
+            c, found = middle, trial
+        else:
+            failed = middle
+    return c, found
+
+
+def _all_hold(found: tuple[Any, ...]) -> bool:
+    return all(part.holds for part in found if isinstance(part, Certificate))
 
 
 def _limiting_parameter(question: Question, limited_by: str, current: float) -> str | None:

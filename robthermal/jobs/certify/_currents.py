@@ -32,12 +32,11 @@ def directions(current: Pairs) -> tuple[Direction, ...]:
 
 def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, parameters: Pairs | None,
                     progress: Callable[[str], None]) -> tuple[list[UsableRange], list[Found]]:
-    """Usable currents of all directions, with certificates; for the parameter ranges too where they are asked for."""
+    """Usable currents of all directions, with certificates; for the parameter ranges too where there are some."""
     rows: list[UsableRange] = []
     found: list[Found] = []
     for direction in directions(current) if system.modules else ():
-        asked = any(high > 0.0 if direction == "cooling" else low < 0.0 for low, high in current.values())
-        for ranges in (None, parameters) if parameters and asked else (None,):
+        for ranges in (None, parameters) if parameters else (None,):
             progress(f"searching the usable {direction} current{', for the parameter ranges' * (ranges is not None)}")
             best = usable_current(system, direction=direction, temperature=boxes.temperature, ambient=boxes.ambient,
                                   heat=heat, setpoint=boxes.setpoint or None, parameters=ranges,
@@ -45,15 +44,16 @@ def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, p
                                   method="energy" if boxes.method == "lyapunov" else boxes.method)
             rows.append(_row(best, direction, ranges is not None, system.module_names))
             found += _certificates(best, direction, ranges is not None)
-        rows = [*rows[:-2], _at_least(rows[-2], rows[-1]), rows[-1]] if parameters and asked else rows
+        rows = [*rows[:-2], _at_least(rows[-2], rows[-1]), rows[-1]] if parameters else rows
     return rows, found
 
 
 def _at_least(nominal: UsableRange, robust: UsableRange) -> UsableRange:
     """What is certified for parameter ranges is certified for the parameters as they stand: they are inside."""
-    if nominal.certified is None or robust.certified is None or robust.certified <= nominal.certified:
-        return nominal
-    return replace(nominal, certified=robust.certified, files=robust.files)
+    bounds = [more if more is not None and more.basis == "proven" and (more.current or 0.0) > (one.current or 0.0)
+              else one for one in nominal.bounds for more in [robust.bound(one.name)]]
+    held = nominal if (nominal.certified or 0.0) >= (robust.certified or 0.0) else robust
+    return replace(nominal, bounds=bounds, certified=held.certified, files=held.files)
 
 
 def _row(best: UsableCurrent, direction: str, ranges: bool, modules: tuple[str, ...]) -> UsableRange:
