@@ -83,6 +83,22 @@ def test_nothing_leaves_the_box_at_the_headline(two, direction, lower):
         assert (states >= box[0] - 1e-4).all() and (states <= box[1] + 1e-4).all()
 
 
+@pytest.mark.parametrize("direction", ["cooling", "heating", "symmetric"])
+def test_wider_ranges_never_allow_more_current(two, direction):
+    """Certificates are searched for finely enough that a proof for ranges is not found above one without them."""
+    currents = []
+    for width in (0.0, 1e-3, 1e-2):
+        ranges = {name: (two.parameter(name) * (1 - width), two.parameter(name) * (1 + width)) for name in
+                  ("modules.m1.seebeck.value", "modules.m2.resistance.value", "links.x1-room.conductance")}
+        found = rt.certify.usable_current(two, temperature=(LOW, HIGH), direction=direction, lower="reported",
+                                          parameters=ranges if width else None)
+        assert found.holds
+        currents.append(found.current)
+        binding = found.limits[found.limited_by].current
+        assert binding * (1 - 1e-3) <= found.current <= binding
+    assert currents[1] <= 1.0003 * currents[0] and currents[2] < currents[1]
+
+
 def test_runaway_bound_is_the_coldest_steady_state(two, cooling):
     network, off = Network(two), np.zeros(18)
     coldest = []

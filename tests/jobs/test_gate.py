@@ -232,6 +232,23 @@ def test_a_claim_that_fails_for_the_ranges_names_the_parameter(limit: float, tmp
     assert "For the parameters as they stand" in page and "For all parameters in their ranges" in page
 
 
+def test_usable_currents_of_every_direction_are_found_for_the_ranges_too(limit: float, tmp_path: Path) -> None:
+    """Cooling is asked for only; what is certified for the ranges is certified for the parameters as they stand."""
+    value = stage().parameter("modules.m1.resistance.value")
+    ranges = {"links.sink-room.conductance": (0.88, 0.92), "modules.m1.resistance.value": (0.98 * value, 1.02 * value)}
+    report, page = certified(0.5 * limit, tmp_path, parameters=ranges)
+    rows = {(row.direction, row.parameters): row for row in report.usable}
+    assert set(rows) == {(d, p) for d in ("cooling", "heating") for p in ("nominal", "ranges")}
+    for direction in ("cooling", "heating"):
+        nominal, robust = rows[direction, "nominal"], rows[direction, "ranges"]
+        assert 0.8 * nominal.current < robust.current <= nominal.current
+        for one in robust.bounds:
+            other = nominal.bound(one.name)
+            assert one.current is None or (other is not None and one.current <= other.current)
+    first = page.partition('id="contents"')[0]
+    assert first.count("for the parameter ranges (parameters as they stand:") == 2
+
+
 # Report built again
 
 
