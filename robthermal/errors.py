@@ -1,8 +1,9 @@
-"""Errors and outcomes: every room speaks to the user through these three classes."""
+"""Errors and outcomes: every package speaks to the user through these classes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 
 class RobthermalError(Exception):
@@ -83,3 +84,61 @@ class Outcome:
 
     def __bool__(self) -> bool:
         return self.ok
+
+
+class OutcomeCode(Enum):
+    """Codes of the outcomes of one package, a closed set: each package has one such enum, ``explain`` reads them all.
+
+    A member is ``CODE = (ok, meaning, remedy)``: whether the result is what was asked for (None if each result says so
+    itself), what the code means, and what to do about it. Its name in lower case is `Outcome.code`.
+
+    Examples
+    --------
+    >>> class BatteryCode(OutcomeCode):
+    ...     FULL = (True, "The battery is full.")
+    ...     EMPTY = (False, "The battery is empty.", "Charge it.")
+    >>> print(BatteryCode.EMPTY.outcome())
+    The battery is empty. Charge it.
+    >>> BatteryCode.EMPTY.outcome("The battery is at 3 %:")
+    Outcome(ok=False, code='empty', text='The battery is at 3 %: charge it.')
+    """
+
+    def __init__(self, ok: bool | None, meaning: str, remedy: str = "") -> None:
+        self.ok = ok
+        self.meaning = meaning
+        self.remedy = remedy
+
+    @property
+    def code(self) -> str:
+        """As it stands in `Outcome.code` and in files."""
+        return self.name.lower()
+
+    def outcome(self, happened: str = "", *, remedy: str | None = None, ok: bool | None = None) -> Outcome:
+        """One computation that ended so.
+
+        Parameters
+        ----------
+        happened : str, optional
+            What happened, with the numbers of this result; the meaning of the code if left out. After a colon the
+            remedy goes on with a small letter.
+        remedy : str, optional
+            What to do about this result, where it is not the remedy of the code; "" if `happened` says it already.
+        ok : bool, optional
+            Whether the result is what was asked for, of a code that leaves it to the result.
+
+        Returns
+        -------
+        Outcome
+
+        Raises
+        ------
+        InputError
+            `ok` is given although the code says it, or left out although it does not.
+        """
+        if (ok is None) == (self.ok is None):
+            raise InputError(f"ok is {ok!r}, that of the code {self.ok!r}", where=f"{self}.outcome",
+                             expected="exactly one of them to be None")
+        said, advice = happened or self.meaning, self.remedy if remedy is None else remedy
+        if said.endswith(":"):
+            advice = advice[:1].lower() + advice[1:]
+        return Outcome(bool(self.ok if ok is None else ok), self.code, f"{said} {advice}".strip())

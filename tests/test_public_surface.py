@@ -18,22 +18,24 @@ SURFACE = {
         signals systems thermal verification verify
     """,
     "calibration": """
-        ConvectionLaw Estimates Fit ModuleProperties ResponseFit Score VaryingModel Whiteness calibrate
+        CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseFit Score VaryingModel Whiteness calibrate
         convection_law join_models module_properties
     """,
     "certify": """
-        CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
+        CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
         check_certificate check_loop_parameters contraction frequency_norm frequency_radius gains heater_heat hinf
         invariance largest_current largest_regulated_current limit_map loop network observer peak regulated runaway
         runaway_free stability thesis_bounds usable_current
     """,
     "coupling": """
-        NORMS CoprimeFactors Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors Performance
+        NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors
+        Performance
         ScaledPath Simulation Spectra Uncertainty WorstCase coprime destabilizing discretize dual_youla evaluate
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """
-        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DisturbanceObserver
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DesignCode
+        DisturbanceObserver
         Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
         MatrixController ObserverModel PID Placement Polarity Reach Reachable Seen StateFeedback StepResponseLinearity
         certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
@@ -41,17 +43,18 @@ SURFACE = {
         simulate_loop state_feedback step_response_linearity unobservable
     """,
     "diagnosis": """
-        Adequacy Candidate Decision Diagnosis Effect EffectSet Entry Found Gap HoldOut JointCheck JointSelection
+        Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck
+        JointSelection
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Response
         Scores ShortList UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
         forget_effect hold_out locate next_experiment noise_floor refit refit_short_list register_effect score
         select_jointly unknown_heat
     """,
     "errors": """
-        Diverged InputError Outcome RobthermalError
+        Diverged InputError Outcome OutcomeCode RobthermalError
     """,
     "identify": """
-        FrequencyResponse bla closed_loop etfe is_response lpm lrm lrmp read_response spectral
+        FrequencyResponse IdentifyCode bla closed_loop etfe is_response lpm lrm lrmp read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system couple_subsystems demo_project design_system diagnose_records
@@ -76,7 +79,7 @@ SURFACE = {
     """,
     "signals": """
         Declared DesignCheck Excitation Import ImportOptions Record
-        celsius_to_kelvin crest_factor declared design_check find_glitches
+        SignalsCode celsius_to_kelvin crest_factor declared design_check find_glitches
         inspect_file kelvin_to_celsius median_filter multisine multisines noise
         options_from_text prbs read_record read_records save_records staircase
     """,
@@ -87,7 +90,7 @@ SURFACE = {
         AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
         Feedthrough FitRange Hysteresis Input Layer Lead Linear Link LoadCurve Lump Material MatrixImport Module
         ModuleParameters Natural Periodic PolynomialFit Polynomials Reduction Sensor SteadyState Step Stepper
-        System Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error
+        System ThermalCode Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error
         linearize load_curve materials module_from_datasheet module_from_polynomials parse_system read_matrices
         read_system reduce simulate steady_state system_from_matrices time_constants trajectory write_modelica
         write_system

@@ -18,7 +18,6 @@ import pytest
 import robthermal as rt
 from robthermal import cli
 from robthermal.jobs.claims._assumptions import KIND_ASSUMPTIONS
-from robthermal.jobs.explain._outcomes import outcome_codes
 from robthermal.verification._kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -260,7 +259,7 @@ def test_every_page_that_is_named_exists_and_names_the_effect_or_kind() -> None:
     assert len(explained) >= sum(map(len, known.values())) > 50
     for one in explained:
         pages = [(ROOT / page).read_text(encoding="utf-8") for page in one.page.split()]
-        assert pages and (one.what in ("error", "outcome") or one.name in pages[0]), one.name
+        assert pages and (one.what == "error" or one.name in pages[0]), one.name
 
 
 def test_explain_says_what_an_engineer_asks(run: Cli) -> None:
@@ -274,16 +273,6 @@ def test_explain_says_what_an_engineer_asks(run: Cli) -> None:
         assert words in said.out
     said = run("explain", "ambiguous")
     assert "the answer is no" in said.out and "next_experiment" in said.out
-
-
-def test_codes_are_those_of_results() -> None:
-    """Read from the source, compared with what results say."""
-    codes = outcome_codes()
-    assert rt.systems.two_module() and codes["predicted"][0].ok is True and codes["not_predicted"][0].ok is False
-    limit = rt.certify.largest_current(rt.systems.two_module(), temperature=(278.15, 358.15), direction="cooling")
-    assert any(one.ok is limit.outcome.ok for one in codes[limit.outcome.code])
-    words = "contraction limit inside the box; not a limit for use"
-    assert words in limit.outcome.text and any(words in one.text for one in codes[limit.outcome.code])
 
 
 def test_an_unknown_name_gets_the_nearest_ones(run: Cli) -> None:

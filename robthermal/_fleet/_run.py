@@ -12,6 +12,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from ..errors import InputError, Outcome
+from ._outcomes import FleetCode
 from ._store import Answer, Store, key_of
 
 _SHOWN = 10  # errors on the screen
@@ -133,8 +134,8 @@ def _answer(function: Callable[[Any], Any], key: Any, case: Any) -> tuple[Any, A
 def _run(cases: tuple[Any, ...], answers: list[Answer], computed: int) -> FleetRun:
     errors = {i: _error(i, answer.error) for i, answer in enumerate(answers) if answer.error}
     done = {i: answer.result for i, answer in enumerate(answers) if i not in errors}
-    outcome = Outcome(True, "done", f"{len(cases)} cases done.") if not errors else Outcome(
-        False, "failed", f"{len(errors)} of {len(cases)} cases failed. The first: {errors[min(errors)]}")
+    outcome = FleetCode.DONE.outcome(f"{len(cases)} cases done.") if not errors else FleetCode.FAILED.outcome(
+        f"{len(errors)} of {len(cases)} cases failed. The first: {errors[min(errors)]}", remedy="")
     return FleetRun(cases, done, errors, computed, outcome)
 
 

@@ -7,11 +7,12 @@ from ._estimates import Estimates as Estimates
 from ._fit import Fit as Fit
 from ._module_properties import ModuleProperties as ModuleProperties
 from ._module_properties import module_properties as module_properties
+from ._outcomes import CalibrationCode as CalibrationCode
 from ._response_fit import ResponseFit as ResponseFit
 from ._score import Score as Score
 from ._varying import VaryingModel as VaryingModel
 from ._varying import join_models as join_models
 from ._whiteness import Whiteness as Whiteness
 
-__all__ = ["ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseFit", "Score", "VaryingModel", "Whiteness",
-           "calibrate", "convection_law", "join_models", "module_properties"]
+__all__ = ["CalibrationCode", "ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseFit", "Score",
+           "VaryingModel", "Whiteness", "calibrate", "convection_law", "join_models", "module_properties"]

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from .._arrays import Floats
-from ..errors import Diverged, InputError, Outcome
+from ..errors import Diverged, InputError
 from ..fitting import (
     LOSSES,
     STARTS,
@@ -41,6 +41,7 @@ from ._directions import in_words, named, weights
 from ._estimates import outcome_of
 from ._fit import Fit
 from ._innovations import has_disturbance, whitener
+from ._outcomes import CalibrationCode
 from ._response_fit import ResponseFit, calibrate_response
 from ._score import score_of
 from ._whiteness import whiteness_of
@@ -236,7 +237,7 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
                                        if name in one.sensors])
                    for name in solution.noise},
         iterations=solution.iterations,
-        outcome=Outcome(True, "converged", ""),
+        outcome=CalibrationCode.CONVERGED.outcome(),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 

@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from .._arrays import Floats
 from ..errors import InputError, Outcome
 from ..signals import Record
+from ._outcomes import CalibrationCode
 from ._plateaus import Plateau, column, plateaus
 
 _SETTLED = 0.01  # drift over the tail, as a part of the temperature difference, up to which a plateau counts as steady
@@ -151,9 +152,10 @@ def _fitted(excess: Floats, heat: Floats, area: float) -> ConvectionLaw:
     flat = not size.all() or np.linalg.cond(information / np.outer(size, size)) > 1e12
     covariance = np.full((3, 3), math.inf) if flat or not spare else variance * np.linalg.inv(information)
     points = pd.DataFrame({"difference": excess, "coefficient": h, "heat": heat})
-    outcome = Outcome(True, "fitted", f"Fitted to {h.size} steady plateaus.")
+    outcome = CalibrationCode.FITTED.outcome(f"Fitted to {h.size} steady plateaus.")
     if flat or np.any(run.active_mask):
-        outcome = Outcome(False, "undetermined", "The plateaus do not determine a, b and c together, or one of them "
-                          "is at its bound (a, b ≥ 0, 0.01 ≤ c ≤ 1). Use steps over a wider range of temperatures.")
+        outcome = CalibrationCode.UNDETERMINED.outcome(
+            "The plateaus do not determine a, b and c together, or one of them is at its bound (a, b ≥ 0, "
+            "0.01 ≤ c ≤ 1).", remedy="Use steps over a wider range of temperatures.")
     a, b, c = run.x.tolist()
     return ConvectionLaw(a, b, c, covariance, area, points, outcome)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .._arrays import Floats
 from ..errors import Outcome
 from ..thermal import System
+from ._outcomes import CalibrationCode
 from ._parameter_ranges import Set, ranges_of
 
 
@@ -159,7 +160,7 @@ class Estimates:
             "covariance": self.covariance.tolist(),
             "undetermined": list(self.undetermined),
             "undetermined_parameters": list(self.undetermined_parameters),
-            "ranges": None if self.outcome.code == "not_converged" else {
+            "ranges": None if self.outcome.code == CalibrationCode.NOT_CONVERGED.code else {
                 name: list(ends) for name, ends in self.ranges().items()},
             "iterations": self.iterations,
             "outcome": vars(self.outcome),
@@ -176,13 +177,12 @@ def plain(value: Any) -> float | bool | None:
 def outcome_of(fit: Estimates, converged: bool) -> Outcome:
     """What to say of an estimate, and what to do."""
     if not converged:
-        return Outcome(False, "not_converged", f"Stopped after {fit.iterations} iterations without converging. "
-                       "Raise max_iterations, start closer, or calibrate fewer parameters.")
+        return CalibrationCode.NOT_CONVERGED.outcome(f"Stopped after {fit.iterations} iterations without converging.")
     if fit.undetermined:
-        return Outcome(False, "undetermined", f"Converged, but the data leave open: {'; '.join(fit.undetermined)}. "
-                       "Fix one of these parameters, give it a prior (sigma), or excite the system differently.")
+        return CalibrationCode.UNDETERMINED.outcome(
+            f"Converged, but the data leave open: {'; '.join(fit.undetermined)}.")
     stuck = [name for name, at in zip(fit.parameters, fit.at_bound, strict=True) if at]
     if stuck:
-        return Outcome(True, "at_bound", f"Converged with {', '.join(stuck)} at a bound; standard deviations there "
-                       "ignore the bound. Widen it if the physics allow, else doubt the structure of the model.")
-    return Outcome(True, "converged", f"Converged in {fit.iterations} iterations.")
+        return CalibrationCode.AT_BOUND.outcome(
+            f"Converged with {', '.join(stuck)} at a bound; standard deviations there ignore the bound.")
+    return CalibrationCode.CONVERGED.outcome(f"Converged in {fit.iterations} iterations.")

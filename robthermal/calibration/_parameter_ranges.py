@@ -11,6 +11,7 @@ from scipy.stats import t as t_distribution
 
 from .._arrays import Floats
 from ..errors import InputError
+from ._outcomes import CalibrationCode
 
 if TYPE_CHECKING:
     from ._estimates import Estimates
@@ -66,7 +67,7 @@ def _check(fit: Estimates, confidence: float, shape: str) -> None:
                          expected="a probability between 0 and 1, for example 0.95")
     if shape not in SETS:
         raise InputError(f"set is {shape!r}", where="argument set", expected="one of " + ", ".join(SETS))
-    if fit.outcome.code == "not_converged":
+    if fit.outcome.code == CalibrationCode.NOT_CONVERGED.code:
         raise InputError("the calibration did not converge: its covariance is that of no estimate", where="fit.ranges",
                          remedy=f"{fit.outcome.text} Or give the certificate parameters= yourself.")
     if not np.isfinite(fit.covariance).all():

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from .._arrays import Floats
-from ..errors import InputError, Outcome
+from ..errors import InputError
 from ..fitting import Choice, OperatingPoint, chosen_ranges
 from ..identify import FrequencyResponse
 from ..thermal import System
 from ._covariance import with_priors
 from ._directions import in_words, named, weights
 from ._estimates import Estimates, outcome_of
+from ._outcomes import CalibrationCode
 from ._response_bins import bins_of, independent_freedom, spread_of_score
 from ._response_model import ResponseProblem
 
@@ -138,7 +139,7 @@ def _result(problem: ResponseProblem, q: Floats, converged: bool, iterations: in
         undetermined=in_words(ranges, known.undetermined),
         undetermined_parameters=named(ranges, known.undetermined), bounded=weights(ranges, known.bounded),
         logarithmic=ranges.logarithmic, degrees_of_freedom=known.degrees_of_freedom, covariance_scale=known.scale,
-        iterations=iterations, outcome=Outcome(True, "converged", ""),
+        iterations=iterations, outcome=CalibrationCode.CONVERGED.outcome(),
         response=G, bins=bins.index, outputs=bins.outputs, inputs=bins.inputs,
         model=problem.model(q).reshape(-1, len(bins.inputs), len(bins.outputs)).transpose(2, 1, 0),
         misfit=misfit,

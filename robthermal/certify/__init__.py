@@ -21,6 +21,7 @@ from ._maps import LimitMap as LimitMap
 from ._maps import limit_map as limit_map
 from ._network import network as network
 from ._observer import observer as observer
+from ._outcomes import CertifyCode as CertifyCode
 from ._regulated import largest_regulated_current as largest_regulated_current
 from ._regulated import regulated as regulated
 from ._runaway import Runaway as Runaway
@@ -32,8 +33,8 @@ from ._usable import usable_current as usable_current
 from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
-__all__ = ["CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree", "ThesisBounds",
-           "UsableCurrent", "check_certificate", "check_loop_parameters", "contraction", "frequency_norm",
-           "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
+__all__ = ["CertifyCode", "CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree",
+           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "contraction",
+           "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
            "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
            "runaway_free", "stability", "thesis_bounds", "usable_current"]

@@ -23,6 +23,7 @@ from ._faces import Array, Faces
 from ._invariance import invariance
 from ._jacobian import box_jacobian
 from ._lyapunov import Structure
+from ._outcomes import CertifyCode
 from ._sections import (
     Currents,
     Interval,
@@ -131,7 +132,8 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     box = box_with_reserve(faces(ranges), currents)
     if box is None:
         refused = no_box(system, current)
-        return RunawayFree({}, refused, refused, Outcome(False, "not_certified", f"Not certified: {refused.reason}"),
+        return RunawayFree({}, refused, refused,
+                           CertifyCode.NOT_CERTIFIED.outcome(f"Not certified: {refused.reason}", remedy=""),
                            _limiting(ranges, lambda kept: _size(box_with_reserve(faces(kept), currents))))
     named = named_box(system, box)
     stays = invariance(system, current=current, temperature=named, ambient=around, heat=heat or None,
@@ -192,8 +194,8 @@ def _rate(system: System, current: Mapping[str, Any], ranges: Mapping[str, Any],
 def _outcome(stays: Certificate, shrinks: Certificate, box: dict[str, Interval]) -> Outcome:
     low, high = min(p[0] for p in box.values()) - ZERO_CELSIUS, max(p[1] for p in box.values()) - ZERO_CELSIUS
     if stays.holds and shrinks.holds:
-        return Outcome(True, "certified", "Certified: no thermal runaway. Every lump stays in its range (overall "
-                       f"{low:.1f} to {high:.1f} °C), in which the network contracts.")
+        return CertifyCode.CERTIFIED.outcome("Certified: no thermal runaway. Every lump stays in its range (overall "
+                                             f"{low:.1f} to {high:.1f} °C), in which the network contracts.")
     missing = shrinks if stays.holds else stays
     what = "the network contracts in the box" if stays.holds else "the box is never left"
-    return Outcome(False, "not_certified", f"Not certified: it is not shown that {what}: {missing.reason}")
+    return CertifyCode.NOT_CERTIFIED.outcome(f"Not certified: it is not shown that {what}: {missing.reason}", remedy="")

@@ -16,6 +16,7 @@ from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate, establish, not_certified
 from ._jacobian import BoxJacobian, box_jacobian
+from ._outcomes import CertifyCode
 from ._sections import Currents, Interval, Temperatures, made_by, named_ranges, region_section, system_section
 from ._weights import best_weights
 
@@ -134,15 +135,16 @@ def gains(system: System, *, current: Currents, temperature: Temperatures, heat:
         cert = establish("gain", **parts, evidence=evidence, made_by=made_by(_SOLVER, f"found; {share:g} of the rate"))
         if cert.holds:
             frame = pd.DataFrame(values, index=list(system.lump_names), columns=[*sources, *loads])
-            return Gains(frame.iloc[:, :len(sources)], frame.iloc[:, len(sources):], cert, Outcome(
-                True, "certified", f"Certified: at most {frame[list(sources)].max().max():.3g} K per K of ambient and "
-                                   f"{frame.iloc[:, len(sources):].max().max():.3g} K per W of load."))
+            ambients, heats = frame.iloc[:, :len(sources)], frame.iloc[:, len(sources):]
+            return Gains(ambients, heats, cert, CertifyCode.CERTIFIED.outcome(
+                f"Certified: at most {ambients.max().max():.3g} K per K of ambient and {heats.max().max():.3g} K per W "
+                "of load."))
     return _none(cert)
 
 
 def _none(certificate: Certificate) -> Gains:
     return Gains(pd.DataFrame(), pd.DataFrame(), certificate,
-                 Outcome(False, "not_certified", f"Not certified: {certificate.reason}"))
+                 CertifyCode.NOT_CERTIFIED.outcome(f"Not certified: {certificate.reason}", remedy=""))
 
 
 def _ambient_columns(system: System, region: Mapping[str, Any]) -> dict[str, Array]:

@@ -16,6 +16,7 @@ from ._contraction import METHODS, Method, contraction
 from ._energy import energy_rate
 from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, largest_growth
+from ._outcomes import CertifyCode
 from ._polytope import MOST, Cuts, polytope
 from ._sections import Interval, Temperatures, region_section
 from ._weights import has_weights
@@ -125,8 +126,8 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
                                   method=method, parameters=parameters, structure=structure, large=large)
         if certificate.holds:
             return CurrentLimit(c, direction, method, certificate, _outcome(c, direction, method, back_off))
-    return CurrentLimit(0.0, direction, method, certificate, Outcome(
-        False, "not_certified", f"Not certified, not even without current: {certificate.reason}"))
+    return CurrentLimit(0.0, direction, method, certificate, CertifyCode.NOT_CERTIFIED.outcome(
+        f"Not certified, not even without current: {certificate.reason}", remedy=""))
 
 
 def bisect(holds: Callable[[float], bool], precision: float = _PRECISION) -> tuple[float, float]:
@@ -162,6 +163,6 @@ def current_range(system: System, direction: str, c: float) -> dict[str, tuple[f
 
 def _outcome(c: float, direction: str, method: str, back_off: float) -> Outcome:
     given_up = f", {100 * back_off:g} % given up for the proof" if back_off else ""
-    return Outcome(True, "certified",
-                   f"{c:.4g} A, {direction}: contraction limit inside the box; not a limit for use (method {method}"
-                   f"{given_up}). rt.certify.usable_current tells which currents the machine can bear.")
+    return CertifyCode.CERTIFIED.outcome(
+        f"{c:.4g} A, {direction}: contraction limit inside the box; not a limit for use (method {method}{given_up}).",
+        remedy="rt.certify.usable_current tells which currents the machine can bear.")

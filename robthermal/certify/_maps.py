@@ -16,6 +16,7 @@ from .._fleet import fleet
 from ..errors import InputError, Outcome
 from ..thermal import System, format_system, steady_state
 from ._contraction import Method
+from ._outcomes import CertifyCode
 from ._sections import Interval, Temperatures, parameter_box
 from ._usable import box_bound, headline, question_of
 from ._usable_bounds import Lower, Question, contraction_bound, rating_bound
@@ -157,8 +158,9 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     data["allowed"] = data["needed [A]"].abs() <= data["usable [A]"]
     data["direction"] = data.pop("direction")  # to the end
     allowed = int(data["allowed"].sum())
-    return LimitMap(data, contraction, boxes, Outcome(allowed > 0, "mapped" if allowed else "none",
-                    f"{allowed} of {len(data)} conditions need no more than the usable current."))
+    code = CertifyCode.MAPPED if allowed else CertifyCode.NONE
+    return LimitMap(data, contraction, boxes, code.outcome(
+        f"{allowed} of {len(data)} conditions need no more than the usable current.", remedy=""))
 
 
 def _rows(question: Question, point: Mapping[str, Any]) -> list[dict[str, Any]]:

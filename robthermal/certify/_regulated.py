@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..errors import InputError, Outcome
+from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, not_certified
 from ._contraction import METHODS, Method, best_certificate
@@ -14,6 +14,7 @@ from ._held import held_jacobian
 from ._jacobian import BoxJacobian
 from ._limits import CurrentLimit, bisect
 from ._lyapunov import check_choice, largest_growth
+from ._outcomes import CertifyCode
 from ._polytope import polytope
 from ._sections import (
     Currents,
@@ -145,10 +146,10 @@ def largest_regulated_current(system: System, *, setpoint: SetPoints, temperatur
         cert = regulated(system, setpoint=setpoint, current=ranges, temperature=temperature, method=method,
                          parameters=parameters, large=large)
         if cert.holds:
-            return CurrentLimit(c, "cooling", method, cert, Outcome(
-                True, "certified", f"Certified for regulated modules up to {c:.4g} A (method {method})."))
-    return CurrentLimit(0.0, "cooling", method, cert, Outcome(
-        False, "not_certified", f"Not certified for any current: {cert.reason}"))
+            return CurrentLimit(c, "cooling", method, cert, CertifyCode.CERTIFIED.outcome(
+                f"Certified for regulated modules up to {c:.4g} A (method {method})."))
+    return CurrentLimit(0.0, "cooling", method, cert, CertifyCode.NOT_CERTIFIED.outcome(
+        f"Not certified for any current: {cert.reason}", remedy=""))
 
 
 def _promising(box: BoxJacobian | None, method: str) -> bool:

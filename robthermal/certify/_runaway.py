@@ -13,6 +13,7 @@ import pandas as pd
 from ..errors import Outcome
 from ..thermal import LoadCurve, System, fold
 from ..verification import Certificate, establish
+from ._outcomes import CertifyCode
 from ._sections import Interval, made_by, parameter_box, system_section
 
 _SLACKS = (0.01, 0.05, 0.2)  # share of the spread over the corners of the constants added to it, tried in turn
@@ -113,8 +114,8 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     worst = max(abs(closed[name] / current[name] - 1) for name in setpoint)
     sloped = any(m.seebeck.slope or m.resistance.slope or m.conductance.slope for m in system.modules.values())
     why = " (their S, R, K vary with temperature, the closed form's do not)" if sloped else ""
-    return Runaway(current, load, closed, curve, certificates, Outcome(
-        True, "found", f"The network's fold and the closed form differ by at most {100 * worst:.2g} %{why}."))
+    return Runaway(current, load, closed, curve, certificates, CertifyCode.FOUND.outcome(
+        f"The network's fold and the closed form differ by at most {100 * worst:.2g} %{why}."))
 
 
 def _constants(curve: LoadCurve, i: int, name: str) -> dict[str, float]:

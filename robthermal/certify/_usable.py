@@ -10,6 +10,7 @@ from ..thermal import System
 from ..verification import Certificate
 from ._contraction import METHODS, Method, contraction
 from ._limits import DIRECTIONS, Direction, current_range
+from ._outcomes import CertifyCode
 from ._regulated import SetPoints
 from ._sections import Interval, Temperatures, parameter_box, system_section
 from ._surroundings import ambient_ranges, heater_heat
@@ -175,8 +176,7 @@ def _outcome(current: float, limited_by: str, limits: Mapping[str, CurrentBound]
              shrinks: Certificate) -> Outcome:
     bound = limits[limited_by]
     if current > 0:
-        return Outcome(True, "usable", f"Usable current {current:.4g} A in every module, limited by {limited_by}: "
-                       f"{bound.text}")
+        return CertifyCode.USABLE.outcome(f"Usable current {current:.4g} A in every module, limited by {limited_by}: "
+                                          f"{bound.text}")
     why = bound.text if bound.current == 0 else (shrinks if stays.holds else stays).reason
-    return Outcome(False, "none", f"No current is usable, limited by {limited_by}: {why} Widen the stated box, narrow "
-                   "ambients and heats, or improve the heat sink.")
+    return CertifyCode.NONE.outcome(f"No current is usable, limited by {limited_by}: {why}")

@@ -1,5 +1,6 @@
 """Coupling filters between two controlled subsystems: Youla factors, measured uncertainty, proven robust stability."""
 
+from ._outcomes import CouplingCode as CouplingCode
 from .analysis import Destabilizing as Destabilizing
 from .analysis import Simulation as Simulation
 from .analysis import WorstCase as WorstCase
@@ -31,8 +32,7 @@ from .problem import Norm as Norm
 from .problem import Performance as Performance
 from .synthesis import synthesize as synthesize
 
-__all__ = ["NORMS", "CoprimeFactors", "Destabilizing", "Filters", "FixedPoint", "Joint", "MuBound", "Norm",
-           "NormalizedFactors",
-           "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty", "WorstCase", "coprime",
-           "destabilizing", "discretize", "dual_youla", "evaluate", "inner_factor", "joint", "mu", "mu_bound",
-           "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]
+__all__ = ["NORMS", "CoprimeFactors", "CouplingCode", "Destabilizing", "Filters", "FixedPoint", "Joint", "MuBound",
+           "Norm", "NormalizedFactors", "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty",
+           "WorstCase", "coprime", "destabilizing", "discretize", "dual_youla", "evaluate", "inner_factor", "joint",
+           "mu", "mu_bound", "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]

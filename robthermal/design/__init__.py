@@ -27,6 +27,7 @@ from ._observer import GainObserver as GainObserver
 from ._observer import observer as observer
 from ._observer_model import ObserverModel as ObserverModel
 from ._observer_model import unobservable as unobservable
+from ._outcomes import DesignCode as DesignCode
 from ._pid import PID as PID
 from ._pid import pid as pid
 from ._placement import Placement as Placement
@@ -50,7 +51,7 @@ Seen = ControllerInput
 collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "ControllerInput", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward",
+           "ControllerInput", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward",
            "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController", "ObserverModel",
            "PID", "Placement", "Polarity", "Reach", "Reachable", "Seen", "StateFeedback", "StepResponseLinearity",
            "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain", "corner_plants",

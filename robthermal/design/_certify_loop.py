@@ -21,6 +21,7 @@ from ._lti import LinearController
 from ._modules import Array
 from ._numbers import expect
 from ._observer import GainObserver
+from ._outcomes import DesignCode
 from ._pid import PID
 from ._plant import cold_side
 from ._state_feedback import StateFeedback
@@ -133,8 +134,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         free = runaway_free(system, current=limits, ambient=ambient, heat=heat, parameters=parameters)
         stays, box = free.invariance, free.temperature
         if not box:
-            return CertifiedLoop(stays, stays, None, Outcome(False, "not_certified", "Not certified: no box was found "
-                                 f"that the currents cannot leave. {stays.reason}"))
+            return CertifiedLoop(stays, stays, None, DesignCode.NOT_CERTIFIED.outcome(
+                f"Not certified: no box was found that the currents cannot leave. {stays.reason}", remedy=""))
     else:
         box = dict(temperature) if isinstance(temperature, Mapping) else dict.fromkeys(system.lumps, temperature)
         stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat,
@@ -163,11 +164,13 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
              "the estimation error shrinks in the box": estimate}
     for what, part in named.items():
         if part is not None and not part.holds:
-            return Outcome(False, "not_certified", f"Not certified: it is not shown that {what}: {part.reason}")
+            return DesignCode.NOT_CERTIFIED.outcome(f"Not certified: it is not shown that {what}: {part.reason}",
+                                                    remedy="")
     low = min(pair[0] for pair in box.values()) - ZERO_CELSIUS
     high = max(pair[1] for pair in box.values()) - ZERO_CELSIUS
     if estimate is not None:
-        return Outcome(True, "certified_sampled_model", "Certified for the sampled model only (the heat of the modules "
+        return DesignCode.CERTIFIED_SAMPLED_MODEL.outcome(
+            "Certified for the sampled model only (the heat of the modules "
                        "held over a sample): whatever its start in the box of temperatures and estimates, "
                        f"{low:.1f} to {high:.1f} °C, the sampled model of the loop forgets it, with limits active or "
                        "not, as long as its temperatures and estimates stay in the box. The machine moves between the "
@@ -175,8 +178,9 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
     where = " of temperatures and estimates" if "gain" in loop.system else ""
     moves = "" if drift is None else f", as long as no face of a module moves by more than {drift:g} K within a sample"
     stay = ", as long as the estimates stay in it; the temperatures do" if where else ""
-    return Outcome(True, "certified", f"Certified: whatever its start in the box{where}, {low:.1f} to {high:.1f} °C, "
-                   f"the loop forgets it, with limits active or not{moves}{stay}.")
+    return DesignCode.CERTIFIED.outcome(
+        f"Certified: whatever its start in the box{where}, {low:.1f} to {high:.1f} °C, the loop forgets it, with "
+        f"limits active or not{moves}{stay}.")
 
 
 def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:

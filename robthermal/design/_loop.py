@@ -18,6 +18,7 @@ from ._controller import Controller, ControllerInput, expect_controller
 from ._estimate import Observer
 from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
+from ._outcomes import DesignCode
 from ._plant import ColdSide, cold_side
 
 Law = FeedbackLinearization | ConstantGain
@@ -220,7 +221,7 @@ class _Run:
                 self._advance(command, named, k)
                 current = command.current
         except Diverged as error:
-            return self._result(rows, wanted_cold, Outcome(False, "ran_away", str(error)))
+            return self._result(rows, wanted_cold, DesignCode.RAN_AWAY.outcome(str(error), remedy=""))
         return self._result(rows, wanted_cold, None)
 
     def _heat_of(self, current: Array, temperatures: Array) -> Array:
@@ -260,9 +261,9 @@ def _judge(law: FeedbackLinearization, cold: Array, reference: Array, limit: np.
     tail = slice(-max(len(cold) // 20, 2), None)
     error = np.abs(cold - reference)[tail].max(axis=0)
     if error.max() < _SETTLED:
-        return Outcome(True, "settled", f"Settled: every cold face stays within {_SETTLED} K of its set-point.")
+        return DesignCode.SETTLED.outcome(f"Settled: every cold face stays within {_SETTLED} K of its set-point.")
     i = int(np.argmax(error))
     if (limit[tail, i] != "").all():
-        return Outcome(False, "limited", f"{law.names[i]} is at its {limit[-1, i]} limit and {error[i]:.3g} K from its "
-                       "set-point: rt.design.reachable tells what it can hold with this load.")
-    return Outcome(False, "moving", f"{law.names[i]} is still {error[i]:.3g} K from its set-point: simulate longer.")
+        return DesignCode.LIMITED.outcome(
+            f"{law.names[i]} is at its {limit[-1, i]} limit and {error[i]:.3g} K from its set-point:")
+    return DesignCode.MOVING.outcome(f"{law.names[i]} is still {error[i]:.3g} K from its set-point:")

@@ -21,6 +21,7 @@ from ._export_observer import export
 from ._extended import ExtendedKalmanFilter
 from ._modules import Array
 from ._observer_model import ObserverModel
+from ._outcomes import DesignCode
 from ._positive import positive_gain
 from ._robust_gain import helpful_sensors, robust_gain
 
@@ -242,8 +243,9 @@ def without_advice(system: Any, sensors: Sequence[str], sample_time: float, meth
         return ExtendedKalmanFilter(model, Q, R, P)
     L = np.linalg.solve(model.C @ P @ model.C.T + R, model.C @ P @ model.A_d.T).T
     if method == "kalman":
-        return GainObserver(model, L, method, Outcome(True, "designed", "Steady Kalman gain of the passive network; "
-                            "whether it is stable with the modules on is for rt.certify.observer to prove."))
+        return GainObserver(model, L, method, DesignCode.DESIGNED.outcome(
+            "Steady Kalman gain of the passive network; whether it is stable with the modules on is for "
+            "rt.certify.observer to prove."))
     L, outcome = robust_gain(model, found, _factor(sample_time, time_constant), L)
     return GainObserver(model, L, method, outcome)
 

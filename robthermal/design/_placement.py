@@ -18,6 +18,7 @@ from ._error_box import Interval, Temperatures, check_box
 from ._modules import check_system
 from ._observer import GainObserver, without_advice
 from ._observer_model import unobservable
+from ._outcomes import DesignCode
 
 _MOST = 2000  # sets of one size that are all tried; beyond, the best smaller set is extended
 _METHODS = ("kalman", "positive", "lmi")
@@ -144,11 +145,10 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
         if proven is None:
             proven = _first_certified([found for radius, found in screened if radius < 1], current, temperature)
     if proven is None:
-        return Placement((), None, None, best, Outcome(
-            False, "none", f"No set of up to {largest} sensors was certified over this box: lower the current, or add "
-            "sensors at the modules."))
-    return Placement(proven[0].sensors, *proven, best, Outcome(
-        True, "found", f"{', '.join(proven[0].sensors)}: {proven[1].claim}"))
+        return Placement((), None, None, best, DesignCode.NONE.outcome(
+            f"No set of up to {largest} sensors was certified over this box:"))
+    return Placement(proven[0].sensors, *proven, best, DesignCode.FOUND.outcome(
+        f"{', '.join(proven[0].sensors)}: {proven[1].claim}"))
 
 
 def _first_certified(found: list[GainObserver], current: Mapping[str, Interval],

@@ -13,6 +13,7 @@ from ..signals import Record
 from ..thermal import System, simulate
 from ._modules import check_system
 from ._numbers import expect
+from ._outcomes import DesignCode
 
 _CLEAR = 4.0  # the misfit of the other wiring is this many times smaller in variance
 _MOST = 6  # modules: all wirings are compared
@@ -108,15 +109,15 @@ def check_polarity(system: System, record: Record) -> Polarity:
 def _judge(best: tuple[str, ...], misfit: dict[tuple[str, ...], float]) -> tuple[tuple[str, ...], dict, Outcome]:
     others = min(value for flipped, value in misfit.items() if flipped != best)
     if not np.isfinite(misfit[best]) or others**2 < _CLEAR * misfit[best] ** 2:
-        return (), misfit, Outcome(False, "undecided", f"The wirings fit almost equally badly, {misfit[best]:.3g} and "
-                                   f"{others:.3g} K: step the currents further from rest, or calibrate first.")
+        return (), misfit, DesignCode.UNDECIDED.outcome(
+            f"The wirings fit almost equally badly, {misfit[best]:.3g} and {others:.3g} K:")
     if not best:
-        return (), misfit, Outcome(True, "as_declared", f"The declared wiring fits best, {misfit[best]:.3g} K against "
-                                   f"{others:.3g} K.")
+        return (), misfit, DesignCode.AS_DECLARED.outcome(
+            f"The declared wiring fits best, {misfit[best]:.3g} K against {others:.3g} K.")
     names = ", ".join(best)
-    return best, misfit, Outcome(
-        False, "reversed", f"{names}: reversed polarity fits the data with {misfit[best]:.3g} K, the declared one with "
-        f"{misfit[()]:.3g} K. Swap the leads, or the sign of the current column, or hot and cold in the system file.")
+    return best, misfit, DesignCode.REVERSED.outcome(
+        f"{names}: reversed polarity fits the data with {misfit[best]:.3g} K, the declared one with "
+        f"{misfit[()]:.3g} K.")
 
 
 def _misfit(system: System, record: Record, flipped: tuple[str, ...], sensors: list[str]) -> float:

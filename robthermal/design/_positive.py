@@ -14,6 +14,7 @@ from ..errors import Outcome
 from ._error_box import Block
 from ._modules import Array
 from ._observer_model import ObserverModel
+from ._outcomes import DesignCode
 
 
 @dataclass(frozen=True)
@@ -49,22 +50,22 @@ def positive_gain(model: ObserverModel, found: list[Block], time_constant: float
     fastest = _fastest(model, columns)
     if fastest >= 1:
         gain = _largest_gain(model, columns)
-        return PositiveGain(gain, np.ones(len(gain)), fastest, Outcome(
-            False, "not_contracting", "No gain on these sensors makes the weighted sum of the errors decay over this "
-            f"box (at best it changes by {fastest:.5f} per sample): lower the current, or add sensors at the modules."))
+        return PositiveGain(gain, np.ones(len(gain)), fastest, DesignCode.NOT_CONTRACTING.outcome(
+            "No gain on these sensors makes the weighted sum of the errors decay over this box (at best it changes by "
+            f"{fastest:.5f} per sample):", remedy="lower the current, or add sensors at the modules."))
     h = model.sample_time
     best = -h / np.log(fastest) if fastest > 0 else 0.0
     tau = 1.2 * best if time_constant is None else positive_number(time_constant, "time_constant", "s")
     rate = float(np.exp(-h / tau)) if tau > 0 else 0.0
     solved = _solve(model, columns, max(rate, fastest + 1e-9))
     if tau < best or solved is None:
-        return PositiveGain(_largest_gain(model, columns), np.ones(len(model.A_d)), fastest, Outcome(
-            False, "not_contracting", f"A time constant of {tau:.4g} s is not possible over this box; the fastest is "
-            f"{best:.4g} s."))
+        outcome = DesignCode.NOT_CONTRACTING.outcome(
+            f"A time constant of {tau:.4g} s is not possible over this box; the fastest is {best:.4g} s.", remedy="")
+        return PositiveGain(_largest_gain(model, columns), np.ones(len(model.A_d)), fastest, outcome)
     c, L = solved
-    return PositiveGain(L, c, rate, Outcome(True, "designed", "Errors that start nonnegative in the measured columns "
-                        f"stay so; the weighted sum of the errors decays with {tau:.4g} s or faster over the box, as "
-                        "computed here. rt.certify.observer proves what it can."))
+    return PositiveGain(L, c, rate, DesignCode.DESIGNED.outcome(
+        "Errors that start nonnegative in the measured columns stay so; the weighted sum of the errors decays with "
+        f"{tau:.4g} s or faster over the box, as computed here. rt.certify.observer proves what it can."))
 
 
 def _columns(model: ObserverModel, found: list[Block]) -> Iterator[Array]:

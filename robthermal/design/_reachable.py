@@ -15,6 +15,7 @@ from ..thermal import Equations, steady_state
 from ._linearization import FeedbackLinearization
 from ._modules import Array
 from ._numbers import expect
+from ._outcomes import DesignCode
 
 _FINE = 1e-3  # K
 _STRIDE = 2.0  # K, first step of the march
@@ -124,10 +125,9 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     if share >= 1:
         further = f" In their direction: {_ranges(passive, far)}; beyond, {_words(why)}." if why else ""
         return Reachable(wanted, passive, far, current, why,
-                         Outcome(True, "reachable", f"The set-points can be held.{further}"))
-    return Reachable(wanted, passive, far, current, why, Outcome(
-        False, "unreachable", f"These set-points cannot be held: {_words(why)}. Reachable is {_ranges(passive, far)}. "
-        "Choose set-points within it, lower the load, or cool the hot side better."))
+                         DesignCode.REACHABLE.outcome(f"The set-points can be held.{further}"))
+    return Reachable(wanted, passive, far, current, why, DesignCode.UNREACHABLE.outcome(
+        f"These set-points cannot be held: {_words(why)}. Reachable is {_ranges(passive, far)}."))
 
 
 @dataclass(frozen=True)

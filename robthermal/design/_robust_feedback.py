@@ -17,6 +17,7 @@ from ._constant_gain import ConstantGain
 from ._error_box import Interval
 from ._modules import Array
 from ._numbers import expect, numbers
+from ._outcomes import DesignCode
 from ._plant import ColdSide, cold_side
 
 _ROUNDS, _ADDED = 12, 3  # of the cutting planes, plants added in each
@@ -118,14 +119,14 @@ def robust_gain(plant: ColdSide, plants: Sequence[Any], h: float, w: float, star
     F = _guaranteed_cost(pairs, weight @ np.linalg.inv(root))
     factor = np.inf if F is None else _common_decay([A - B @ F for A, B in pairs])
     if F is None or not factor < 1:
-        return RobustGain(*start, Outcome(False, "not_found", "No state feedback was found with one quadratic norm "
-                          f"that shrinks for all of the {len(plants)} plants; these are the gains for the nominal one. "
-                          "Narrow the range of the plants, or ask for less bandwidth."))
+        return RobustGain(*start, DesignCode.NOT_FOUND.outcome(
+            f"No state feedback was found with one quadratic norm that shrinks for all of the {len(plants)} plants; "
+            "these are the gains for the nominal one."))
     F = F @ root
     K, Ki = F[:, :n] / unit[:, None], -F[:, n:] * w / unit[:, None]
-    return RobustGain(K, Ki, Outcome(True, "designed", f"One quadratic norm shrinks by {factor:.6f} per sample or "
-                      f"faster for each of the {len(plants)} plants, without limits: computed at these plants in "
-                      "floating point, not proven, and not claimed between them."))
+    return RobustGain(K, Ki, DesignCode.DESIGNED.outcome(
+        f"One quadratic norm shrinks by {factor:.6f} per sample or faster for each of the {len(plants)} plants, "
+        "without limits: computed at these plants in floating point, not proven, and not claimed between them."))
 
 
 def _augmented(plant: ColdSide, one: Any, h: float, w: float, unit: Array) -> tuple[Array, Array]:

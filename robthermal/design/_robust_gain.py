@@ -16,6 +16,7 @@ from ..errors import InputError, Outcome
 from ._error_box import Block
 from ._modules import Array
 from ._observer_model import ObserverModel
+from ._outcomes import DesignCode
 
 _LARGEST = 40  # lumps: the time grows with their sixth power
 _KEPT = 0.5  # share of the margin that a gain nearer to the wanted one must leave
@@ -134,13 +135,13 @@ def robust_gain(model: ObserverModel, found: list[Block], factor: float, wanted:
     gain, left = nearest_gain(norm, model, wanted) if norm.margin > 0 else (wanted, 0.0)
     if not left > 0:
         asked = f" by {factor:.6g} per sample" if factor < 1 else ""
-        return wanted, Outcome(False, "not_contracting", f"On {', '.join(model.sensors)} no gain was found with which "
-                               f"the error decays{asked} in one quadratic norm over this box; this is the Kalman gain. "
-                               "Lower the current, allow more time, or add sensors at the modules.")
+        return wanted, DesignCode.NOT_CONTRACTING.outcome(
+            f"On {', '.join(model.sensors)} no gain was found with which the error decays{asked} in one quadratic norm "
+            "over this box; this is the Kalman gain.")
     reached = float(np.sqrt(factor**2 - left))
-    return gain, Outcome(True, "designed", f"In one quadratic norm the error decays at least by {reached:.7f} per "
-                         "sample over the box, as computed here in floating point: .certify(current, temperature) "
-                         "proves it.")
+    return gain, DesignCode.DESIGNED.outcome(
+        f"In one quadratic norm the error decays at least by {reached:.7f} per sample over the box, as computed here "
+        "in floating point: .certify(current, temperature) proves it.")
 
 
 def helpful_sensors(model: ObserverModel, found: list[Block], factor: float) -> list[str]:

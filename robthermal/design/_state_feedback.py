@@ -15,6 +15,7 @@ from ..errors import InputError, Outcome
 from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array
 from ._numbers import expect, numbers
+from ._outcomes import DesignCode
 from ._plant import ColdSide
 from ._robust_feedback import robust_gain
 from ._sampling import check_sampling
@@ -46,7 +47,7 @@ class StateFeedback(Controller):
     integral: Array
     tracking_time: float
     sample_time: float
-    outcome: Outcome = Outcome(True, "designed", "Stable with the linear cold side while no limit is active.")
+    outcome: Outcome = DesignCode.DESIGNED.outcome("Stable with the linear cold side while no limit is active.")
 
     def _proportional(self, given: ControllerInput) -> Array:
         return self.reference_gain @ given.reference - self.K @ given.temperatures[self.plant.indices]

@@ -16,6 +16,7 @@ from ._linearization import FeedbackLinearization
 from ._loop import ClosedLoop, Law, simulate_loop
 from ._modules import Array
 from ._numbers import expect, numbers
+from ._outcomes import DesignCode
 
 
 @dataclass(frozen=True)
@@ -132,11 +133,10 @@ def step_response_linearity(
     n = min(len(loop.time) for loop in (*linearized, *plain))
     after, before = (np.array([(loop.cold[:n] - base) / step for step, loop in zip(steps, loops, strict=True)])
                      for loops in (linearized, plain))
-    text = (f"A limit was active in the steps {', '.join(limited)}: lower the bandwidth or the steps."
-            if limited else "No limit was active in the linearized loop.")
+    outcome = DesignCode.COLLAPSED.outcome() if not limited else DesignCode.LIMITED.outcome(
+        f"A limit was active in the steps {', '.join(limited)}:", remedy="lower the bandwidth or the steps.")
     return StepResponseLinearity(linearized[0].time[:n], tuple(steps), after, before,
-                                 float(np.ptp(after, axis=0).max()), float(np.ptp(before, axis=0).max()),
-                                 Outcome(not limited, "limited" if limited else "collapsed", text))
+                                 float(np.ptp(after, axis=0).max()), float(np.ptp(before, axis=0).max()), outcome)
 
 
 def _hold(system: System, law: FeedbackLinearization, base: float, inputs: Mapping[str, float] | None) -> Equilibrium:

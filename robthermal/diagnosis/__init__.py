@@ -1,5 +1,6 @@
 """Where model and data differ: locate it, name the missing effect, add it, and validate."""
 
+from ._outcomes import DiagnosisCode as DiagnosisCode
 from .data import NoiseEstimate as NoiseEstimate
 from .data import noise_floor as noise_floor
 from .diagnose import diagnose as diagnose
@@ -42,9 +43,9 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "Effect", "EffectSet", "Entry", "Found", "Gap",
-           "HoldOut", "JointCheck", "JointSelection", "LinearizedRecord", "Location", "Measurement", "NextExperiment",
-           "NoiseEstimate", "NoiseScaling", "Quantity", "Refit", "Response", "Scores", "ShortList", "UnknownHeat",
-           "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect",
-           "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect",
-           "score", "select_jointly", "unknown_heat"]
+__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet", "Entry", "Found",
+           "Gap", "HoldOut", "JointCheck", "JointSelection", "LinearizedRecord", "Location", "Measurement",
+           "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refit", "Response", "Scores", "ShortList",
+           "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
+           "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list",
+           "register_effect", "score", "select_jointly", "unknown_heat"]

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import Outcome
+from ._outcomes import DiagnosisCode
 from .data import Measured
 from .evidence import Adequacy, HoldOut, adequacy, hold_out
 from .fit import Refit, Whitened
@@ -120,7 +121,7 @@ def reconsider_noise(judged: Judged, validation: Validation) -> Judged:
         state=SearchState(nominal=fit, names=state.names, scores=scores, fit=fit, current=scores,
                           short=ShortList(fit, (), {}), complete=True),
         adequacy=checks, hold_out=held, verdict="consistent",
-        outcome=Outcome(True, "consistent", text + ("" if fit.levels.share else " Declare it.")))
+        outcome=DiagnosisCode.CONSISTENT.outcome(text + ("" if fit.levels.share else " Declare it.")))
 
 
 def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[str]:
@@ -143,17 +144,15 @@ def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcom
         helped = "; ".join(map(str, state.rounds))
         text = "None of the known effects explains the records. " + " ".join(faults)
         text += f" Provisional, no name: {helped}." if helped else ""
-        return "unexplained", Outcome(False, "unexplained", text + " Look at `located`: lump, sensor and conditions.")
+        return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
     if not state.rounds:
-        return "consistent", Outcome(True, "consistent", "Nothing is missing that these records could show: see "
-                                     "not_testable and the detection limits in scores.")
+        return "consistent", DiagnosisCode.CONSISTENT.outcome()
     labels = ", ".join(candidate.label for candidate in ruled_out(state.rounds))
     excluded = f" The validation records rule out {labels}, which the others could not." if labels else ""
     if any(map(alternatives, state.rounds)):
-        text = ("The records cannot distinguish some effects: see alternatives, and next_experiment for what separates "
-                "them.")
-        return "ambiguous", Outcome(False, "ambiguous", text + excluded)
-    return "named", Outcome(True, "named", f"One set of effects explains the records.{excluded}")
+        code = DiagnosisCode.AMBIGUOUS
+        return "ambiguous", code.outcome("The records cannot distinguish some effects:", remedy=code.remedy + excluded)
+    return "named", DiagnosisCode.NAMED.outcome(f"One set of effects explains the records.{excluded}")
 
 
 def _independent_of_step(fit: Refit) -> bool:

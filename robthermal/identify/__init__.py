@@ -6,10 +6,11 @@ from ._etfe import etfe as etfe
 from ._lpm import lpm as lpm
 from ._lrm import lrm as lrm
 from ._lrmp import lrmp as lrmp
+from ._outcomes import IdentifyCode as IdentifyCode
 from ._read_response import read_response as read_response
 from ._response import FrequencyResponse as FrequencyResponse
 from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
-__all__ = ["FrequencyResponse", "bla", "closed_loop", "etfe", "is_response", "lpm", "lrm", "lrmp",
+__all__ = ["FrequencyResponse", "IdentifyCode", "bla", "closed_loop", "etfe", "is_response", "lpm", "lrm", "lrmp",
            "read_response", "spectral"]

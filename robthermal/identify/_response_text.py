@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robthermal.errors import Outcome
+from robthermal.identify._outcomes import IdentifyCode
 
 if TYPE_CHECKING:
     from ._response import FrequencyResponse
@@ -15,20 +16,20 @@ if TYPE_CHECKING:
 def outcome(result: FrequencyResponse) -> Outcome:
     """Whether the estimate may be used as it stands, and what to distrust."""
     if not result.has_covariance:
-        return Outcome(False, "frf_without_covariance", " ".join(result.notes))
+        return IdentifyCode.FRF_WITHOUT_COVARIANCE.outcome(" ".join(result.notes), remedy="")
     undetermined = np.isnan(result.response).any(axis=(0, 1))
     if undetermined.any():
-        text = f"{int(undetermined.sum())} of {len(result)} bins are not determined by the data (NaN). "
-        return Outcome(False, "undetermined", text + " ".join(result.notes))
+        text = f"{int(undetermined.sum())} of {len(result)} bins are not determined by the data (NaN)."
+        return IdentifyCode.UNDETERMINED.outcome(text, remedy=" ".join(result.notes))
     if result.suspect.any():
         where = result.frequencies[result.suspect]
         text = (
             f"{where.size} of {len(result)} bins are suspect, from {where[0]:.3g} to {where[-1]:.3g} Hz: the local "
             "model does not describe the window (wider than the slowest pole, or wrong poles), or the loop hides "
-            "the plant. Prescribe the slow poles (lrmp), record longer, or leave these bins out."
+            "the plant."
         )
-        return Outcome(False, "suspect", " ".join([text, *result.notes]))
-    return Outcome(True, "estimated", " ".join([f"All {len(result)} bins estimated.", *result.notes]))
+        return IdentifyCode.SUSPECT.outcome(text, remedy=" ".join([IdentifyCode.SUSPECT.remedy, *result.notes]))
+    return IdentifyCode.ESTIMATED.outcome(" ".join([f"All {len(result)} bins estimated.", *result.notes]))
 
 
 def table(result: FrequencyResponse) -> str:

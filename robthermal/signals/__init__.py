@@ -11,6 +11,7 @@ from ._export import save_records as save_records
 from ._glitches import find_glitches as find_glitches
 from ._glitches import median_filter as median_filter
 from ._multisine import multisine as multisine
+from ._outcomes import SignalsCode as SignalsCode
 from ._record import Record as Record
 from ._staircase import staircase as staircase
 from ._units import celsius_to_kelvin as celsius_to_kelvin
@@ -31,6 +32,7 @@ __all__ = [
     "Import",
     "ImportOptions",
     "Record",
+    "SignalsCode",
     "celsius_to_kelvin",
     "crest_factor",
     "declared",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import Outcome
 from ._checks import Array
+from ._outcomes import SignalsCode
 
 _SHOWN = 8  # poles in the printed table
 
@@ -130,22 +131,21 @@ class DesignCheck:
             bad = f[self.undetermined]
             text = (
                 f"The excitation does not determine G of every input at {bad.size} of {f.size} lines, {bad[0]:.3g} to "
-                f"{bad[-1]:.3g} Hz. Increase half_width, excite more lines, use fewer periods per record, or one "
-                "experiment per input (orthogonal multisines)."
+                f"{bad[-1]:.3g} Hz."
             )
-            return Outcome(False, "undetermined", text)
+            return SignalsCode.UNDETERMINED.outcome(text)
         if not self.unresolved.any():
-            return Outcome(True, "resolved", f"All {f.size} excited lines are resolved to {self.tolerance:.0%}.")
+            return SignalsCode.RESOLVED.outcome(f"All {f.size} excited lines are resolved to {self.tolerance:.0%}.")
         bad = f[self.unresolved]
         worst = 1.0 / abs(self.poles[self.pole_errors[:, self.unresolved].max(axis=1).argmax()])
         text = (
             f"{bad.size} of {f.size} excited lines are unresolved, {bad[0]:.3g} to {bad[-1]:.3g} Hz: in "
             f"{self.duration:.4g} s the time constant of {worst:.3g} s leaves an error above {self.tolerance:.0%}."
         )
-        return Outcome(False, "unresolved", f"{text} {self._remedy()}")
+        return SignalsCode.UNRESOLVED.outcome(text, remedy=self._remedy())
 
     def _remedy(self) -> str:
-        prescribed = "Estimate these lines with prescribed poles (lrmp), or leave them out."
+        prescribed = SignalsCode.UNRESOLVED.remedy
         if not np.isfinite(self.resolved_from):
             return f"{prescribed} Or record longer."
         return (

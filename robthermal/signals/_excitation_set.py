@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import Outcome
 from ._checks import Array
 from ._crest import crest_of
+from ._outcomes import SignalsCode
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,10 +67,10 @@ class Excitation:
         )
         text = f"Largest crest factor of each input: {numbers}."
         if self.phases == "low_crest" and (worst > self.schroeder_crest_factors).any():
-            return Outcome(False, "not_lower", f"{text} Try another seed, or more lines.")
+            return SignalsCode.NOT_LOWER.outcome(text)
         if self.phases != "random" and len(self.signals) > 1:
             text += " The distortion level of a best linear approximation assumes random phases; these are not."
-        return Outcome(True, "designed", text)
+        return SignalsCode.DESIGNED.outcome(text)
 
     def __str__(self) -> str:
         realisations, experiments, samples, inputs = self.signals.shape

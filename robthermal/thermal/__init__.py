@@ -22,6 +22,7 @@ from ._matrices import system_from_matrices as system_from_matrices
 from ._matrix_files import read_matrices as read_matrices
 from ._modelica import format_modelica as format_modelica
 from ._modelica import write_modelica as write_modelica
+from ._outcomes import ThermalCode as ThermalCode
 from ._parts import Ambient as Ambient
 from ._parts import Condensation as Condensation
 from ._parts import Drive as Drive
@@ -63,7 +64,7 @@ __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "Dat
            "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
            "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
            "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
-           "System", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
+           "System", "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
            "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
            "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
            "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_modelica", "write_system"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError, Outcome
 from ._checks import kelvin, positive
+from ._outcomes import ThermalCode
 from ._parts import Linear, Module
 
 _HIGHEST_DT = 90.0  # single-stage modules reach about 80 K
@@ -171,8 +172,8 @@ def module_from_datasheet(*, v_max: float, i_max: float, dt_max: float, t_hot: f
                          where="argument i_max", expected="ampere", remedy="Divide by 1000.")
     voltage = _parameters(v_max / t_hot, i_max, dt_max, t_hot)
     if q_max is None or bool(np.isnan(q_max)):  # a missing entry of a table of datasheets is NaN
-        return DatasheetFit(v_max, i_max, dt_max, None, t_hot, voltage, None, None, None, Outcome(
-            True, "unchecked", "Without Qmax nothing checks the sheet against itself."))
+        return DatasheetFit(v_max, i_max, dt_max, None, t_hot, voltage, None, None, None,
+                            ThermalCode.UNCHECKED.outcome())
     q_max = positive(q_max, "argument q_max", "W")
     heat = _parameters(2 * q_max / (i_max * (t_hot + dt_max)), i_max, dt_max, t_hot)
     q_misfit = 0.5 * voltage.seebeck * i_max * (t_hot + dt_max) / q_max - 1
@@ -198,9 +199,8 @@ def _difference(value: float, t_hot: float) -> float:
 
 def _outcome(misfit: float) -> Outcome:
     if abs(misfit) <= _AGREE:
-        return Outcome(True, "agrees", f"Vmax and Qmax agree within {abs(misfit):.1%}.")
-    return Outcome(False, "disagrees", "The two inversions differ by more than 10 %: check t_hot and the gas of the "
-                   "rating, then measure one of them, or let calibration decide between both sets.")
+        return ThermalCode.AGREES.outcome(f"Vmax and Qmax agree within {abs(misfit):.1%}.")
+    return ThermalCode.DISAGREES.outcome("The two inversions differ by more than 10 %:")
 
 
 def _row(name: str, p: ModuleParameters, predicted: str, misfit: float | None) -> str:

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array, diags_array, issparse
 
 from ..errors import InputError, Outcome
 from ._checks import kelvin, positive
+from ._outcomes import ThermalCode
 from ._parts import Ambient, Input, Link, Lump, Sensor
 from ._system import System
 
@@ -273,9 +274,10 @@ def _names(lump_names: Sequence[str] | None, n: int) -> list[str]:
 def _outcome(network: csr_array, residual: NDArray[np.float64], heat: float, names: Sequence[str]) -> Outcome:
     worst = int(np.argmax(np.abs(residual)))
     if np.abs(residual).max() <= 1e-9 * np.abs(network.diagonal()).max():
-        return Outcome(True, "closed", "The rows close to rounding.")
-    return Outcome(True, "rounded", f"Row sums up to {abs(residual[worst]):.2g} W/K (lump {names[worst]}) were taken "
-                   f"as rounding and removed; left in, they would have made {heat:.3g} W of false heat.")
+        return ThermalCode.CLOSED.outcome()
+    return ThermalCode.ROUNDED.outcome(
+        f"Row sums up to {abs(residual[worst]):.2g} W/K (lump {names[worst]}) were taken as rounding and removed; left "
+        f"in, they would have made {heat:.3g} W of false heat.")
 
 
 def _rows(rows: NDArray[np.intp]) -> str:

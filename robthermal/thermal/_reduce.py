@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import eig, solve_continuous_lyapunov, svd
 
 from ..errors import InputError, Outcome
+from ._outcomes import ThermalCode
 from ._terms import Array
 
 _MOST_STATES = 3000
@@ -100,7 +101,7 @@ def reduce(model: control.StateSpace, *, order: int | None = None, tolerance: fl
         reduced = truncate(order)
         error = hinf_error(model, reduced)
         return Reduction(reduced, order, error, bounds[order], hankel,
-                         Outcome(True, "reduced", f"{n} states reduced to {order}; error {error:.3g}."))
+                         ThermalCode.REDUCED.outcome(f"{n} states reduced to {order}; error {error:.3g}."))
     accepted = float(tolerance) if tolerance is not None else 0.0
     low, high = 0, n  # the error falls with the order for balanced truncation; verified below for what is returned
     while low < high:
@@ -110,13 +111,13 @@ def reduce(model: control.StateSpace, *, order: int | None = None, tolerance: fl
         else:
             low = middle + 1
     if high >= n:
-        return Reduction(model, n, 0.0, 0.0, hankel, Outcome(False, "not_reducible",
-                         f"No order below {n} meets {accepted:g}: every state matters at this tolerance. Accept "
-                         "a larger error or keep the full model."))
+        return Reduction(model, n, 0.0, 0.0, hankel, ThermalCode.NOT_REDUCIBLE.outcome(
+            f"No order below {n} meets {accepted:g}: every state matters at this tolerance."))
     reduced = truncate(high)
     error = hinf_error(model, reduced)
     return Reduction(reduced, high, error, bounds[high], hankel,
-                     Outcome(True, "reduced", f"{n} states reduced to {high}; error {error:.3g} within {accepted:g}."))
+                     ThermalCode.REDUCED.outcome(
+                         f"{n} states reduced to {high}; error {error:.3g} within {accepted:g}."))
 
 
 def _check(model: Any, order: int | None, tolerance: float | None, method: str) -> None:

@@ -13,6 +13,7 @@ from .._celsius import LOWEST_KELVIN, ZERO_CELSIUS
 from ..errors import InputError, Outcome
 from ._continuation import Curve, follow
 from ._equations import Equations
+from ._outcomes import ThermalCode
 from ._regulated import check_setpoint, slowest_regulated
 from ._system import System, equations
 from ._terms import Array, Indices
@@ -138,13 +139,15 @@ def steady_state(system: System, inputs: Mapping[str, float] | None = None, *,
 def _outcome(found: tuple[Equilibrium, ...], curve: Curve, problem: _Problem) -> Outcome:
     if found:
         stable = sum(e.stable for e in found)
-        return Outcome(True, "found", f"{len(found)} steady state{'s' * (len(found) > 1)}, {stable} of them stable.")
+        return ThermalCode.FOUND.outcome(f"{len(found)} steady state{'s' * (len(found) > 1)}, {stable} of them stable.")
     if problem.held.size:
-        return Outcome(False, "none", "None: the load is above q*, what the modules can take at these set-points. The "
-                       f"largest share of set-point change and load that has an equilibrium is {curve.reached:.3f}. "
-                       "Raise the set-point, lower the load, or cool the hot side better.")
-    return Outcome(False, "none", "None: these currents drive a thermal runaway; the largest share of them that has an "
-                   f"equilibrium is {curve.reached:.3f}. Lower the currents or cool the hot side better.")
+        return ThermalCode.NONE.outcome(
+            "None: the load is above q*, what the modules can take at these set-points. The largest share of set-point "
+            f"change and load that has an equilibrium is {curve.reached:.3f}.",
+            remedy="Raise the set-point, lower the load, or cool the hot side better.")
+    return ThermalCode.NONE.outcome(
+        "None: these currents drive a thermal runaway; the largest share of them that has an equilibrium is "
+        f"{curve.reached:.3f}.", remedy="Lower the currents or cool the hot side better.")
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 import control
 
 from ...errors import Outcome
+from .._outcomes import CouplingCode
 from ..factors import intervals_of
 from ..problem import NORMS, Problem, Proofs, Realization, coupled, h2, prepare, realization, variances, youla_parameter
 from ..systems import LTI, beside, negative, plus_one, realize, series, state_space_of
@@ -165,18 +166,13 @@ def _broken(asked: Mapping[str, float], reached: Mapping[str, float]) -> list[st
 
 def _outcome(problem: Problem, nominal: bool, robustly: bool, broken: list[str], proofs: Proofs) -> Outcome:
     if not proofs.prove:
-        return Outcome(False, "not_proven", "Numbers only: nothing was proven.")
+        return CouplingCode.NOT_PROVEN.outcome("Numbers only: nothing was proven.", remedy="")
     if not nominal:
-        return Outcome(False, "not_stable", f"Internal stability is not proven: {'; '.join(proofs.failed)}. "
-                       "Give better scaled or better conditioned models.")
+        return CouplingCode.NOT_STABLE.outcome(f"Internal stability is not proven: {'; '.join(proofs.failed)}.")
     if problem.uncertainty is not None and not robustly:
-        return Outcome(False, "not_robust", "The loop is stable for the model, but not proven stable for every plant "
-                       "under the envelope. Make X_hat and Y_hat smaller where robust >= 1 (see worst_frequency), or "
-                       "couple one way only.")
+        return CouplingCode.NOT_ROBUST.outcome()
     if broken:
-        return Outcome(False, "limit", f"Proven stable, but not within what was asked: {'; '.join(broken)}.")
-    text = "Proven stable" + (" for every plant under the envelope." if problem.uncertainty is not None else
-                              " for the model; no uncertainty was given.")
-    if proofs.failed:
-        text += f" Not proven: {'; '.join(proofs.failed)}."
-    return Outcome(True, "robust" if problem.uncertainty is not None else "nominal", text)
+        return CouplingCode.LIMIT.outcome(f"Proven stable, but not within what was asked: {'; '.join(broken)}.",
+                                          remedy="")
+    code = CouplingCode.ROBUST if problem.uncertainty is not None else CouplingCode.NOMINAL
+    return code.outcome(remedy=f"Not proven: {'; '.join(proofs.failed)}." if proofs.failed else None)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import InputError, Outcome
 from ...verification import Certificate
+from .._outcomes import CouplingCode
 from ..factors import CoprimeFactors, Loop, Uncertainty, from_factors, intervals_of
 from ..problem import Problem, Proofs, Subsystem, youla_parameter
 from ..systems import apart
@@ -124,17 +125,17 @@ def _verdict(axes: dict[str, Filters], uncertainty: Uncertainty | None, robust: 
     robustly = known and robust < 1 and all(filters.nominally_stable for filters in axes.values())
     missed = [name for name, filters in axes.items() if not filters.holds]
     if missed:
-        outcome = Outcome(False, "axis", f"Not everything that was asked holds for {', '.join(missed)}: see the "
-                          "outcome of that axis.")
+        outcome = CouplingCode.AXIS.outcome(f"Not everything that was asked holds for {', '.join(missed)}:")
     elif uncertainty is not None and not robustly:
-        outcome = Outcome(False, "not_robust", "Each axis is proven by itself, all together are not for every plant "
-                          "under the envelope. Design the axes with more margin, or make them act less on each other.")
+        outcome = CouplingCode.NOT_ROBUST.outcome(
+            "Each axis is proven by itself, all together are not for every plant under the envelope.",
+            remedy="Design the axes with more margin, or make them act less on each other.")
     elif uncertainty is not None:
-        outcome = Outcome(True, "robust", "All axes are proven stable for every plant under the envelope, "
-                                          "interaction between axes included.")
+        outcome = CouplingCode.ROBUST.outcome("All axes are proven stable for every plant under the envelope, "
+                                              "interaction between axes included.")
     else:
-        outcome = Outcome(True, "robust" if robustly else "nominal",
-                          "Each axis is proven by itself. Assumed: the axes do not act on each other.")
+        code = CouplingCode.ROBUST if robustly else CouplingCode.NOMINAL
+        outcome = code.outcome("Each axis is proven by itself. Assumed: the axes do not act on each other.")
     return Joint(axes, uncertainty, robust, where, robustly, outcome.ok, certificates, outcome)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
 
 from ..._arrays import Array
-from ...errors import InputError, Outcome
+from ...errors import InputError
+from .._outcomes import CouplingCode
 from ..systems import Zpk, realize, series
 
 if TYPE_CHECKING:
@@ -46,8 +47,9 @@ def reduce(filters: Filters, order: int | None = None, tolerance: float = 0.01) 
         candidate = _shortened(filters, size, tolerance, prove=True)
         if candidate.holds == filters.holds and _keeps(candidate, filters, tolerance):
             return candidate
-    return filters.with_outcome(Outcome(filters.holds, "not_reduced", f"No shorter filters lose less than "
-                                        f"{100 * tolerance:g} % and keep what was asked: {filters.outcome.text}"))
+    return filters.with_outcome(CouplingCode.NOT_REDUCED.outcome(
+        f"No shorter filters lose less than {100 * tolerance:g} % and keep what was asked: {filters.outcome.text}",
+        remedy="", ok=filters.holds))
 
 
 def _shortened(filters: Filters, order: int, tolerance: float, prove: bool) -> Filters:

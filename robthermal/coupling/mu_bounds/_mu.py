@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robthermal.coupling._outcomes import CouplingCode
 from robthermal.errors import InputError, Outcome
 
 from ._blocks import Complex, Real, Structure, read_blocks
@@ -81,11 +82,11 @@ def bounds(M: Complex, structure: Structure) -> tuple[Real, Real, Complex]:
 def _outcome(lower: Real, upper: Real) -> Outcome:
     gap = upper - lower
     if (gap <= MET * upper).all():
-        return Outcome(True, "met", "Lower and upper bounds meet.")
+        return CouplingCode.MET.outcome()
     worst = int(np.argmax(gap / np.maximum(upper, np.finfo(float).tiny)))
     text = (f"mu is between the bounds: the largest gap is {lower[worst]:.5g} to {upper[worst]:.5g}. "
-            "With more than three blocks, or repeated ones, scalings need not reach mu: design with the upper bound.")
-    return Outcome(True, "gap", text)
+            "With more than three blocks, or repeated ones, scalings need not reach mu:")
+    return CouplingCode.GAP.outcome(text)
 
 
 def _read_matrix(M: ArrayLike) -> Complex:

@@ -8,7 +8,8 @@ from typing import Any
 import control
 import numpy as np
 
-from robthermal.errors import InputError, Outcome
+from robthermal.coupling._outcomes import CouplingCode
+from robthermal.errors import InputError
 from robthermal.linear import frequency_norm, hinf
 from robthermal.verification import Certificate
 
@@ -91,13 +92,14 @@ def _result(samples: Samples, upper: float, certificate: Certificate) -> MuBound
     _, _, delta = bounds(samples.at(omega[worst:worst + 1]), samples.structure)
     if not certificate.holds:
         upper = np.inf
-        outcome = Outcome(False, "not_proven", f"No upper bound is proven: {certificate.reason}. The largest one seen "
-                          f"is {curve.max():.5g}: an estimate. Reduce the order of the system and try again.")
+        outcome = CouplingCode.NOT_PROVEN.outcome(
+            f"No upper bound is proven: {certificate.reason}. The largest one seen is {curve.max():.5g}: an estimate.",
+            remedy="Reduce the order of the system and try again.")
     elif upper <= _CLOSE * lower[worst]:
-        outcome = Outcome(True, "met", "The upper bound is proven, and within 2 % of a perturbation that is known.")
+        outcome = CouplingCode.MET.outcome("The upper bound is proven, and within 2 % of a perturbation that is known.")
     else:
-        outcome = Outcome(True, "gap", "The upper bound is proven; the worst perturbation found gives "
-                          f"{lower[worst]:.5g}. Design with the upper bound.")
+        outcome = CouplingCode.GAP.outcome(
+            f"The upper bound is proven; the worst perturbation found gives {lower[worst]:.5g}.")
     return MuBound(float(lower[worst]), float(upper), delta[0], outcome, float(omega[worst]), certificate, omega,
                    (lower, curve))
 

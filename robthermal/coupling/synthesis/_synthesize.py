@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...errors import InputError, Outcome
+from .._outcomes import CouplingCode
 from ..evaluation import Filters, finish, refused
 from ..factors import Uncertainty
 from ..problem import NORMS, prepare
@@ -23,8 +24,9 @@ _FIELDS = {key: norm.limit for key, norm in NORMS.items() if norm.limit} | {"msd
 _MARGINS = {key: norm.proof_margin for key, norm in NORMS.items()}
 _ATTEMPTS = 6
 _SPARE = 2e-3  # taken off beyond what a bound was missed by
-_BARELY = ("Filters meet the limits on a grid of frequencies, but too barely for a proof between them. Relax the "
-           "limits by a percent. Both filters are zero.")
+_BARELY = CouplingCode.NOT_PROVEN.outcome(
+    "Filters meet the limits on a grid of frequencies, but too barely for a proof between them.",
+    remedy="Relax the limits by a percent. Both filters are zero.")
 
 
 def synthesize(
@@ -141,7 +143,7 @@ def _prove_or_back_off(design: Design, start: Array | None, limits: Limits, star
     """Solve inside the limits; where one is missed by what can be proven, ask for that much less and solve again."""
     tried, asked = limits, _asked(design, limits)
     requested: dict[str, float] = {}
-    outcome = Outcome(False, "not_proven", _BARELY)
+    outcome = _BARELY
     for _ in range(_ATTEMPTS):
         solution = solve(design.responses, design.demands(tried), start)
         if not solution.solved:
@@ -200,8 +202,7 @@ def _infeasible(design: Design, limits: Limits) -> Outcome:
             sentences.append(f"{argument} = {bound:g} is below what is possible: {smallest:.4g} is the smallest value "
                              "that filters of this basis and uncertainty reach")
     text = "; ".join(sentences) or "each limit is possible alone, all of them together are not"
-    return Outcome(False, "infeasible", f"No coupling filter: {text}. Relax the limit, raise order, or ask for less "
-                                        "margin. Both filters are zero.")
+    return CouplingCode.INFEASIBLE.outcome(f"No coupling filter: {text}.")
 
 
 def _check_goal(objective: str, hinf_limit: float | None, window: float | None, msd_limit: float | None) -> None:

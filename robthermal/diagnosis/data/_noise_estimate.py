@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, Outcome
 from ...fitting import SMALLEST, Data, declared_noise, quantum
 from ...thermal import System
+from .._outcomes import DiagnosisCode
 from ._glitches import counted
 from ._measured import Measured, as_measured, records_of, responses_of
 
@@ -117,8 +118,8 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
         raise InputError("noise is given with a frequency response", where="argument noise",
                          remedy="Leave it out: the response brings its covariance.")
     if not data:
-        outcome = Outcome(True, "estimated", "Noise of the elements as estimated with the frequency response, relative "
-                          "to its size.")
+        outcome = DiagnosisCode.ESTIMATED.outcome(
+            "Noise of the elements as estimated with the frequency response, relative to its size.")
         return NoiseEstimate(relative, (), {}, relative, outcome)
     _refuse_short(data)
     levels = declared_noise(system, data, noise)
@@ -152,11 +153,10 @@ def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[st
     far = [name for name in noise if rough[name] and not 1 / 3 < noise[name] / rough[name] < 3]
     if far:
         listed = ", ".join(f"{name} (declared {noise[name]:.3g} K, record {rough[name]:.3g} K)" for name in far)
-        return Outcome(False, "doubtful", f"The declared noise is far from what the record shows: {listed}. Correct "
-                       "it: every test below rests on it.")
+        return DiagnosisCode.DOUBTFUL.outcome(f"The declared noise is far from what the record shows: {listed}.")
     if unknown:
-        return Outcome(True, "estimated", f"Noise of {', '.join(unknown)} estimated from third differences.")
-    return Outcome(True, "declared", "Noise as declared.")
+        return DiagnosisCode.ESTIMATED.outcome(f"Noise of {', '.join(unknown)} estimated from third differences.")
+    return DiagnosisCode.DECLARED.outcome()
 
 
 def _quantised(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from ...errors import Outcome
+from .._outcomes import DiagnosisCode
 from ..fit import Refit
 from ..path import N_SPLINES, Linearized
 from ._frequency_tails import inflation, relative_degrees_of_freedom
@@ -98,10 +99,11 @@ def adequacy(fit: Refit) -> Adequacy:
     white = float(chi2.sf(*together)) if tested else 1.0
     p = min(1.0, 2.0 * min(white, min(lumps.values()) * len(lumps)))
     ok = p > SMALLEST_P
-    text = (f"Nothing is left to explain (p = {p:.2g})." if ok else
-            f"Something is left (p = {p:.1e}): the model with these effects does not explain the records.")
+    outcome = DiagnosisCode.ADEQUATE.outcome(f"Nothing is left to explain (p = {p:.2g}).") if ok else (
+        DiagnosisCode.INADEQUATE.outcome(
+            f"Something is left (p = {p:.1e}): the model with these effects does not explain the records.", remedy=""))
     return Adequacy({name: float(chi2.sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p, fit.variance,
-                    Outcome(ok, "adequate" if ok else "inadequate", text))
+                    outcome)
 
 
 def _portmanteau(segments: list[Array]) -> tuple[float, int]:

@@ -12,6 +12,7 @@ from scipy.stats import f as f_distribution
 from ...errors import Diverged, InputError, Outcome
 from ...fitting import Start, free_run, refuse_same, rmse
 from ...thermal import System
+from .._outcomes import DiagnosisCode
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
 from ..fit import Point, Refit, Structure, Whitened, descend, filters
 from ..path import Linearized, White, gathered, linearized_records
@@ -146,11 +147,11 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     variance_before, _ = predicted(before, after, data)
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
-    text = (f"The validation records are predicted as well as the training records are fitted (p = {p:.2g})." if ok else
-            f"The validation records are not predicted (p = {p:.1e}): something else is missing, or has changed. If "
-            "nothing has changed in between, diagnose with them among the training records.")
-    return HoldOut(gap, variance_before, variance_after, p, Outcome(ok, "predicted" if ok else "not_predicted", text),
-                   residuals)
+    outcome = DiagnosisCode.PREDICTED.outcome(
+        f"The validation records are predicted as well as the training records are fitted (p = {p:.2g})."
+    ) if ok else DiagnosisCode.NOT_PREDICTED.outcome(
+        f"The validation records are not predicted (p = {p:.1e}): something else is missing, or has changed.")
+    return HoldOut(gap, variance_before, variance_after, p, outcome, residuals)
 
 
 def validation_data(fit: Refit, validation: Measured | Sequence[Measured], operating_point: Mapping[str, float] | None

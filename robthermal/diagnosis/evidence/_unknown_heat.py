@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from ...errors import Diverged, InputError, Outcome
 from ...signals import Record
 from ...thermal import Input
+from .._outcomes import DiagnosisCode
 from ..data import DataSet, RecordData, records_of
 from ..fit import Refit, Whitened, filters
 from ..path import LinearizedRecord
@@ -240,7 +241,9 @@ def _posterior(lump: str, knots: list[Array], modes: Array, s: Array, a: Array, 
     mean = modes @ (shrunk * s * a)
     std = np.sqrt((modes**2) @ shrunk)
     ends = np.cumsum([t.size for t in knots])[:-1]
-    text = (f"This heat into {lump} would explain the residual; it is located, not named." if gain > 0 else
-            f"The records are as likely without any extra heat into {lump}.")
+    outcome = DiagnosisCode.FOUND.outcome(
+        f"This heat into {lump} would explain the residual; it is located, not named."
+    ) if gain > 0 else DiagnosisCode.NONE.outcome(
+        f"The records are as likely without any extra heat into {lump}.", remedy="")
     return UnknownHeat(lump, tuple(knots), tuple(np.split(mean, ends)), tuple(np.split(std, ends)), rate, gain,
-                       Outcome(gain > 0, "found" if gain > 0 else "none", text))
+                       outcome)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import Diverged, InputError, Outcome
 from ...fitting import NONE, Choice, chosen_ranges
 from ...thermal import System
+from .._outcomes import DiagnosisCode
 from ..data import Measured, NoiseEstimate, as_measured, noise_floor, without_outliers
 from ..path import Linearized, White, linearized_records
 from ._descent import Descent, descend
@@ -140,6 +141,5 @@ def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit:
 
 def _outcome(found: Descent) -> Outcome:
     if found.converged:
-        return Outcome(True, "converged", f"Converged in {found.iterations} evaluations.")
-    return Outcome(False, "not_converged", f"Stopped after {found.iterations} evaluations without converging. Narrow "
-                   "the bounds, or give priors (sigma) to parameters the data do not determine.")
+        return DiagnosisCode.CONVERGED.outcome(f"Converged in {found.iterations} evaluations.")
+    return DiagnosisCode.NOT_CONVERGED.outcome(f"Stopped after {found.iterations} evaluations without converging.")

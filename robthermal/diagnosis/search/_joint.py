@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import Outcome
+from .._outcomes import DiagnosisCode
 from ..effects import Candidate
 from ..evidence import Scores
 from ..fit import Refit
@@ -156,7 +157,7 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit |
     program = program_of(fit, scores)
     last = math.sqrt(2.0 * math.log(max(len(program.candidates), 2))) + _NOISE
     if not program.candidates or program.largest_penalty <= last:
-        nothing = Outcome(True, "nothing", "No candidate stands out of the noise.")
+        nothing = DiagnosisCode.NOTHING.outcome()
         return JointSelection(candidates=program.candidates, penalties=np.zeros(0), kkt=np.zeros(0), supports=(),
                               sizes=np.zeros((0, len(program.candidates))), irrepresentable=0.0, likeness=0.0, sets=(),
                               before=fit, outcome=nothing)
@@ -170,8 +171,9 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit |
                      for pair in _solved_pairs(program, pairs[:1])], known)
     condition, likeness = _condition(program, sets)
     exact = bool(np.all(kkt < _SMALL))
-    outcome = (Outcome(True, "selected", f"Solved: largest KKT residual {kkt.max():.1g}.") if exact else
-               Outcome(False, "inexact", f"The convex program was not solved: KKT residual {kkt.max():.1g}."))
+    outcome = (DiagnosisCode.SELECTED.outcome(f"Solved: largest KKT residual {kkt.max():.1g}.") if exact else
+               DiagnosisCode.INEXACT.outcome(f"The convex program was not solved: KKT residual {kkt.max():.1g}.",
+                                             remedy=""))
     return JointSelection(
         candidates=program.candidates, penalties=penalties, sizes=np.array([program.sizes(b) for b, _ in solved]),
         supports=tuple(tuple(program.candidates[i] for i in support) for support in supports), kkt=kkt,

@@ -9,10 +9,9 @@ import numpy as np
 
 from ...errors import InputError, Outcome
 from ...identify import FrequencyResponse, read_response
+from .._outcomes import JobsCode
 
-CIRCLES_LEFT_OUT = Outcome(
-    False, "circles_left_out", "The 95 % circles of the measured responses are not in the envelope (circles = false): "
-    "a plant in them need not be stabilised. Leave circles out of [uncertainty] to have them included.")
+CIRCLES_LEFT_OUT = JobsCode.CIRCLES_LEFT_OUT.outcome()
 
 
 def plants_from_pairs(first: list[Path], second: list[Path], dt: float) -> tuple[FrequencyResponse, ...]:
@@ -57,9 +56,9 @@ def plant_remarks(measured: Sequence[FrequencyResponse], names: Sequence[str], c
     bare = [name for plant, name in zip(measured, names, strict=True) if not plant.has_covariance]
     if bare:
         listed = ", ".join(bare[:3]) + (f" and {len(bare) - 3} more" if len(bare) > 3 else "")
-        yield Outcome(False, "frf_without_covariance",
-                      f"Responses without covariance: {listed}. The envelope holds their values without the noise of "
-                      "the measurement. Give the .json files that robthermal frf writes.")
+        yield JobsCode.FRF_WITHOUT_COVARIANCE.outcome(
+            f"Responses without covariance: {listed}. The envelope holds their values without the noise of the "
+            "measurement.")
     if len(bare) < len(measured) and not circles:
         yield CIRCLES_LEFT_OUT
 

@@ -10,10 +10,10 @@ from difflib import get_close_matches
 
 from ... import errors
 from ...diagnosis import Effect, Quantity, effects
-from ...errors import InputError
+from ...errors import InputError, OutcomeCode
 from ...verification import KINDS
 from ..claims import ARITHMETIC, GateCode, kind_assumptions
-from ._outcomes import Said, outcome_codes
+from ._codes import outcome_codes, package_of
 
 _PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency"), "linear_certificates")}
 _ERRORS = {cls.__name__: cls for cls in (errors.InputError, errors.Diverged)}
@@ -143,8 +143,7 @@ def _certificate(name: str) -> Explanation:
                        f"docs/explanations/{_PAGES.get(name, 'certificates')}.md")
 
 
-def _outcome(name: str, places: tuple[Said, ...]) -> Explanation:
-    told = tuple(f"{said.room}, {_ANSWER[said.ok]}" + (f": {said.text}" if said.text else ".") for said in places)
-    rooms = list(dict.fromkeys("errors" if said.room.startswith("_") else said.room for said in places))
-    return Explanation(name, "outcome", ("How a computation ended; … is what only the result knows.",),
-                       {"Said by": told}, " ".join(f"docs/api/{room}.md" for room in rooms))
+def _outcome(name: str, codes: tuple[OutcomeCode, ...]) -> Explanation:
+    told = tuple(f"{package_of(code)}, {_ANSWER[code.ok]}: {code.meaning} {code.remedy}".rstrip() for code in codes)
+    return Explanation(name, "outcome", ("How a computation ended; its text has the numbers.",), {"Said by": told},
+                       "docs/explanations/outcomes.md")

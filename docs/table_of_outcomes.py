@@ -1,0 +1,36 @@
+"""Write docs/explanations/outcomes.md from the enums of the packages: python docs/table_of_outcomes.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robthermal.errors import OutcomeCode
+from robthermal.jobs.explain import outcome_codes, package_of
+
+PAGE = Path(__file__).resolve().parent / "explanations" / "outcomes.md"
+ANSWER = {True: "yes", False: "no", None: "depends"}
+HEAD = """# Codes of outcomes
+
+A result has an `outcome`: whether it is what was asked for (`.ok`), a code for scripts (`.code`), and what happened
+with what to do about it (`.text`, with the numbers of this result). Each package has one closed enum of codes, for
+example `rt.certify.CertifyCode`; `robthermal explain CODE` says the same as this page, which
+`docs/table_of_outcomes.py` writes. The second column says whether the result is what was asked for.
+The text of a result may say more precisely what to do than the last column.
+"""
+
+
+def page() -> str:
+    """The page as it has to be."""
+    packages: dict[str, list[OutcomeCode]] = {}
+    for code in (code for codes in outcome_codes().values() for code in codes):
+        packages.setdefault(package_of(code), []).append(code)
+    lines = [HEAD]
+    for name in sorted(packages):
+        lines += [f"## `{name}`", "", "| code | asked for | meaning | what to do |", "|---|---|---|---|"]
+        lines += [f"| `{code.code}` | {ANSWER[code.ok]} | {code.meaning} | {code.remedy} |" for code in packages[name]]
+        lines.append("")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
