@@ -96,6 +96,11 @@ class UsableCurrent:
         """Draw the four bounds as bars, the usable current as a line; returns the matplotlib axes.
 
         Bars of bounds far beyond the usable current end at the edge of the picture, with their number.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
         """
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

@@ -367,17 +367,12 @@ class FrequencyResponse:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> FrequencyResponse:
-        """Read a file, as :func:`robthermal.identify.read_response`.
+        """Read a file, as :func:`robthermal.identify.read_response`; returns the saved estimate.
 
         Parameters
         ----------
         path : str or path-like
             File that :meth:`save` wrote, or CSV; the content tells the format.
-
-        Returns
-        -------
-        FrequencyResponse
-            The saved estimate; correlation between bins is kept as uncorrelated beyond the covariance of each bin.
         """
         return cls(**_response_files.load(path))
 
@@ -387,7 +382,7 @@ class FrequencyResponse:
         Parameters
         ----------
         kind : {"bode", "coherence", "transient"}
-            Magnitude and phase with confidence band, coherence of each output, or transient beside the noise level.
+            Magnitude and phase with confidence band, coherence, or transient beside the noise level.
         p : float
             Confidence level of the band [-].
 

@@ -102,19 +102,43 @@ class LinearizedRecord:
         return residual(self.one.readings, self.readings[:, self.one.columns])
 
     def white(self, noise: Callable[[LinearizedRecord], tuple[Any, ...]]) -> Whitener:
-        """As `Linearized.white`: a Kalman filter along the record."""
+        """As `Linearized.white`: a Kalman filter along the record.
+
+        Parameters
+        ----------
+        noise : callable
+            Gives the noise of a record; a response brings its own.
+        """
         return whitener(self, *noise(self))
 
     def bands(self, z: Array) -> list[str]:
-        """As `Linearized.bands`: the conditions of records are looked at together."""
+        """As `Linearized.bands`: the conditions of records are looked at together.
+
+        Parameters
+        ----------
+        z : ndarray
+            Whitened residuals of the data set.
+        """
         return []
 
     def noise_windows(self, block: Array) -> Iterator[tuple[ResponseData, Array]]:
-        """As `Linearized.noise_windows`: none."""
+        """As `Linearized.noise_windows`: none.
+
+        Parameters
+        ----------
+        block : ndarray
+            Rows of this data set.
+        """
         return iter(())
 
     def slopes(self, unknowns: Unknowns) -> Array:
-        """As `Linearized.slopes`: exact, by the simulation's own derivatives."""
+        """As `Linearized.slopes`: exact, by the simulation's own derivatives.
+
+        Parameters
+        ----------
+        unknowns : Unknowns
+            Where, and what they are.
+        """
         names, chain = unknowns.names, unknowns.chain
         own = [number for number in unknowns.gain_names if number not in names]
         initial = ([f"lumps.{lump}.initial" for lump in self.run.system.lumps]
@@ -128,7 +152,13 @@ class LinearizedRecord:
         return out
 
     def columns(self, trials: Sequence[Candidate]) -> Array:
-        """As `Linearized.columns`: by signatures, or by simulating again with a small effect."""
+        """As `Linearized.columns`: by signatures, or by simulating again with a small effect.
+
+        Parameters
+        ----------
+        trials : sequence of Candidate
+            Effects with trial values.
+        """
         signed = [(i, trial, trial.effect.signature) for i, trial in enumerate(trials)]
         linear = [(i, trial, signature) for i, trial, signature in signed if signature is not None]
         out = np.zeros((*self.one.readings.shape, len(trials)))
@@ -144,7 +174,13 @@ class LinearizedRecord:
         return out
 
     def splines(self, lump: int) -> Array:
-        """As `Linearized.splines`: a spline in time of 1 W."""
+        """As `Linearized.splines`: a spline in time of 1 W.
+
+        Parameters
+        ----------
+        lump : int
+            Place of the lump.
+        """
         basis = heat_splines(self.time)
         start = np.zeros((*self.x.shape, basis.shape[1]))
         end = np.zeros_like(start)

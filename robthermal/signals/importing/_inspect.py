@@ -44,6 +44,13 @@ def inspect(
     ------
     InputError
         As `read_records`.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> found = rt.signals.inspect_file({"time": [0.0, 1.0, 2.0], "T1 [°C]": [20.0, 20.1, 20.2]})
+    >>> [(column.column, column.role, column.unit) for column in found.columns]
+    [('time', 'time', ''), ('T1 [°C]', 'unused', 'degC')]
     """
     try:
         choice = declared(*tables, (options, {}, "arguments"))

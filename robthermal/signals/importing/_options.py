@@ -161,6 +161,22 @@ def declared(*places: tuple[Mapping[str, Any], Mapping[str, Any], str]) -> Decla
     ----------
     places : tuple of (record table, columns table, place)
         As read from system file, project file, record entry or call; the place is named in messages.
+
+    Returns
+    -------
+    Declared
+
+    Raises
+    ------
+    InputError
+        Unknown keys, values that are not allowed.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> made = rt.signals.declared(({"gaps": "fill"}, {"T1": "NTC 1"}, "setup.toml"), ({"gaps": "split"}, {}, "call"))
+    >>> made.record.gaps, made.columns["T1"].column
+    ('split', 'NTC 1')
     """
     record: dict[str, Any] = {}
     columns: dict[str, Any] = {}
@@ -211,6 +227,17 @@ def from_text(record: Sequence[str] = (), column: Sequence[str] = ()) -> tuple[d
     -------
     record, columns : dict
         For `declared`.
+
+    Raises
+    ------
+    InputError
+        A text without "=".
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.signals.options_from_text(["gaps=fill"], ["T1=NTC 1"])
+    ({'gaps': 'fill'}, {'T1': 'NTC 1'})
     """
     options: dict[str, Any] = {}
     for text in record:

@@ -13,6 +13,7 @@ from ..._matfile import Value, kind_of, read_matlab
 from ...errors import InputError
 from .._export import require_pyarrow
 from .._source import memory_limit, refuse_large
+from .._tdms import TdmsSource
 from ._frames import frame_table
 from ._options import ImportOptions
 from ._table import Table
@@ -135,8 +136,6 @@ def read_tdms(path: Path, max_bytes: float | None) -> Table:
     max_bytes : float or None
         Largest size unpacked [bytes].
     """
-    from .._tdms import TdmsSource  # heavy, only for such files
-
     source = TdmsSource(path, max_bytes)
     columns, left_out = source.everything()
     table = _equally_long(columns, left_out, path)

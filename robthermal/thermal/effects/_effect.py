@@ -17,6 +17,15 @@ LAST = 10_000  # place in the catalogue of an effect that asks for none
 
 
 def _visible(system: System, where: Where) -> str:
+    """A frequency response can show the effect: no reason why not.
+
+    Parameters
+    ----------
+    system : System
+        System without the effect.
+    where : tuple of str
+        Place of the effect.
+    """
     return ""
 
 
