@@ -71,8 +71,8 @@ def test_the_recipes_run_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.
     names: dict[str, Any] = {}
     for block in blocks:
         exec(compile(block, "how_to.md", "exec"), names)  # noqa: S102  (our own documentation)
-    found, proof, limit, possible = (names[name] for name in ("found", "proof", "limit", "possible"))
+    found, proof, usable, possible = (names[name] for name in ("found", "proof", "usable", "possible"))
     assert found.verdict == "named" and found.effects[0].effect == "sensor_lag"
     assert names["verdict"].valid and proof.holds and possible.outcome.ok
-    assert limit.current == pytest.approx(5.52, abs=0.01)
+    assert usable.current == pytest.approx(1.47, abs=0.01) and usable.outcome.ok
     assert 500 not in rt.signals.find_glitches(names["record"]).get("T", ())
