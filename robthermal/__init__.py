@@ -49,7 +49,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
 
 _PACKAGES = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "jobs", "report",
              "signals", "systems", "thermal", "verification")
-_FORMER = ("project",)  # names of the version before: `rt.project` is `rt.jobs`
+_FORMER = ("project",)  # names of the version before: `rt.project` is now `rt.jobs` and the packages inside
 
 _HOME = {  # public name: the package it lives in
     "Certificate": "verification",
