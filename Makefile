@@ -9,11 +9,22 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint docs bench clean
+.PHONY: help demo test quick lint docs bench clean
+
+# Tests that together take less than half a minute on two cores: one or more of every package, chosen by measured times.
+QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py tests/test_project.py tests/diagnosis/test_structure.py \
+	tests/signals/test_units.py tests/signals/test_record.py tests/signals/test_read_csv.py tests/signals/test_importing.py \
+	tests/signals/test_formats.py tests/thermal/test_equations.py tests/thermal/test_datasheet.py tests/thermal/test_geometry.py \
+	tests/thermal/test_mixing.py tests/thermal/test_effect_catalogue.py tests/thermal/test_linear.py \
+	tests/thermal/test_system_file.py tests/identify/test_response.py tests/identify/test_bad_input.py \
+	tests/coupling/test_norms.py tests/coupling/test_factors.py tests/design/test_linearization.py tests/certify/test_weights.py \
+	tests/report/test_verdict.py tests/report/test_summaries.py tests/jobs/test_read_project.py \
+	tests/verification/test_network.py tests/verification/test_runaway.py tests/verification/test_sentences.py
 
 help:
 	@echo "make demo    (simulated) records -> calibrated model -> certificates -> build/demo/report.html"
 	@echo "make test    lint, types, then all tests (import contract, doctests, docs build included)"
+	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"
 	@echo "make bench   the timings quoted in the documentation"
@@ -25,6 +36,12 @@ demo: $(VENV)/.installed
 
 test: lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
+
+quick: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal $(QUICK)
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
