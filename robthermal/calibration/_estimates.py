@@ -157,7 +157,11 @@ class Estimates:
         table = self.table()
         return {
             "parameters": {name: {key: plain(row[key]) for key in table.columns} for name, row in table.iterrows()},
-            "covariance": self.covariance.tolist(),
+            "logarithmic": dict(zip(self.parameters, self.logarithmic.tolist(), strict=True)),
+            "bounded": dict(zip(self.parameters, self.bounded.tolist(), strict=True)),
+            "covariance": self.covariance.tolist() if np.isfinite(self.covariance).all() else None,
+            "covariance_scale": plain(self.covariance_scale),
+            "degrees_of_freedom": plain(self.degrees_of_freedom),
             "undetermined": list(self.undetermined),
             "undetermined_parameters": list(self.undetermined_parameters),
             "ranges": None if self.outcome.code == CalibrationCode.NOT_CONVERGED.code else {

@@ -64,21 +64,27 @@ def demo(out: Out = Path("robthermal-demo"), as_json: Json = False) -> None:
 
     Example: robthermal demo --out demo
     """
-    _run(rt.jobs.demo_project(), out, as_json)
+    _run(rt.jobs.read_project(rt.jobs.demo_project()), out, as_json)
 
 
 @app.command()
 def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="PROJECT.toml")],
-        out: Out = Path("robthermal-out"), as_json: Json = False) -> None:
+        out: Out = Path("robthermal-out"),
+        confidence: Annotated[float | None, typer.Option(
+            help="Of the parameter ranges, above 0.5; default that of the file.")] = None,
+        tolerance: Annotated[list[str] | None, typer.Option(
+            help="How far a prediction may be off beyond the noise [K], may repeat.",
+            metavar="SENSOR=VALUE|default=VALUE")] = None,
+        as_json: Json = False) -> None:
     """Run the main job on your system and records: data, calibrated model, certificates, report.
 
     Example: robthermal run project.toml --out results
     """
-    _run(project, out, as_json)
+    _run(rt.jobs.request.gate_from_text(rt.jobs.read_project(project), confidence=confidence,
+                                        tolerance=tolerance or []), out, as_json)
 
 
-def _run(project: Path, out: Path, as_json: bool) -> None:
-    job = rt.jobs.read_project(project)
+def _run(job: rt.jobs.request.Project, out: Path, as_json: bool) -> None:
     rt.jobs.folder.check_free(out)
     with progress() as stage:
         result = rt.jobs.run_job(job, stage)
@@ -153,7 +159,9 @@ def calibrate(system: SystemFile,
         fit = rt.jobs.measured.calibrate_files(found, records, validation or [], median_filter=median_filter,
                                                operating_point=point, tables=reading(record, column))
     rt.thermal.write_system(fit.system, out)
-    answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}"))
+    rt.jobs.request.write_calibrated(fit, (system, *records), out.with_suffix(".json"))
+    answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}",
+                                               f"its parameters with covariance: {out.with_suffix('.json')}"))
     exit_unless(bool(fit.outcome))
 
 
@@ -202,6 +210,10 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
             ambient: AmbientRange = None,
             setpoint: Annotated[list[str] | None, typer.Option(
                 help="Regulated cold face, in the unit of the file.", metavar="NAME=VALUE")] = None,
+            parameters: Annotated[list[str] | None, typer.Option(
+                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
+                metavar="FILE.json|NAME=LO:HI")] = None,
+            confidence: Annotated[float, typer.Option(help="Of ranges from a calibration, above 0.5.")] = 0.95,
             method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
             structure: Annotated[str, typer.Option(help="With lyapunov: full or block P.")] = "full",
             large: Annotated[bool, typer.Option(help="With lyapunov: more than 40 lumps too, slowly.")] = False,
@@ -213,12 +225,15 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
     found = rt.read_system(system)
     boxes = rt.jobs.request.boxes_from_text(found, temperature=temperature, current=current or [],
                                             ambient=ambient or [], setpoint=setpoint or [], method=method,
-                                            structure=structure, large=large)
+                                            structure=structure, large=large, parameters=parameters or [],
+                                            confidence=confidence)
+    ranges = rt.jobs.request.ranges_from_text(found, parameters or [], confidence)
     rt.jobs.folder.check_free(out)
     with progress() as stage:
-        result = rt.jobs.certify_system(found, boxes, stage)
+        result = rt.jobs.certify_system(found, boxes, stage, parameters=ranges or None)
         stage("writing the report")
-        report = rt.jobs.write_certify(result, (system,), out)
+        given = [Path(text) for text in parameters or [] if text.endswith(".json")]
+        report = rt.jobs.write_certify(result, (system, *given), out)
     show_report(report, out, as_json)
 
 

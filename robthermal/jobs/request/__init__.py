@@ -1,7 +1,11 @@
 """What is asked of a job: project files and values of the command line."""
 
 from ._arguments import boxes_from_text as boxes_from_text
+from ._arguments import gate_from_text as gate_from_text
 from ._arguments import point_from_text as point_from_text
+from ._arguments import ranges_from_text as ranges_from_text
+from ._calibrated import read_calibrated as read_calibrated
+from ._calibrated import write_calibrated as write_calibrated
 from ._schema import Boxes as Boxes
 from ._schema import Gate as Gate
 from ._schema import Method as Method
@@ -14,5 +18,6 @@ from ._toml import read_text as read_text
 from ._toml import read_toml as read_toml
 from ._toml import refusal as refusal
 
-__all__ = ["Boxes", "Gate", "Method", "Number", "Project", "Table", "boxes_from_text", "in_kelvin", "point_from_text",
-           "read_project", "read_text", "read_toml", "refusal"]
+__all__ = ["Boxes", "Gate", "Method", "Number", "Project", "Table", "boxes_from_text", "gate_from_text", "in_kelvin",
+           "point_from_text", "ranges_from_text", "read_calibrated", "read_project", "read_text", "read_toml",
+           "refusal", "write_calibrated"]

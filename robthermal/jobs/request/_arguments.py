@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
 
 from ...errors import InputError
 from ...thermal import System
-from ._schema import METHODS, STRUCTURES, Boxes, in_kelvin, range_in_kelvin
+from ._calibrated import read_calibrated
+from ._schema import METHODS, STRUCTURES, Boxes, Project, in_kelvin, range_in_kelvin
 
 
 def boxes_from_text(system: System, *, temperature: tuple[float, float] | None = None, current: Sequence[str] = (),
                     ambient: Sequence[str] = (), setpoint: Sequence[str] = (), method: str = "energy",
-                    structure: str = "full", large: bool = False) -> Boxes:
+                    structure: str = "full", large: bool = False, parameters: Sequence[str] = (),
+                    confidence: float = 0.95) -> Boxes:
     """Boxes from command-line values.
 
     Parameters
@@ -30,6 +35,10 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
         Method "lyapunov": "full" or "block", as in `rt.certify.contraction`.
     large : bool
         Method "lyapunov": search P for more than 40 lumps too.
+    parameters : sequence of str
+        As in `ranges_from_text`; with files alone the boxes say "calibration".
+    confidence : float
+        Of the ranges from a file, above 0.5.
 
     Returns
     -------
@@ -50,6 +59,7 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
         raise InputError(f"method is {method!r}", where="--method", expected="energy, sum, max or lyapunov")
     if structure not in STRUCTURES:
         raise InputError(f"structure is {structure!r}", where="--structure", expected="full or block")
+    ranges = ranges_from_text(system, parameters, confidence)
     unit = system.temperature_unit
     default = {name: m.current_limits for name, m in system.modules.items() if m.current_limits is not None}
     currents = {**default, **dict(_range(text, "--current") for text in current)}
@@ -59,7 +69,92 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     return Boxes(temperature=box, current=currents,
                  ambient={name: range_in_kelvin(pair, unit, "--ambient") for name, pair in surroundings.items()},
                  setpoint={name: in_kelvin(value, unit, "--setpoint") for name, value in points.items()},
-                 method=method, structure=structure, large=large)
+                 method=method, structure=structure, large=large, confidence=confidence,
+                 parameters=Boxes().parameters if all(map(_is_file, parameters)) else ranges)
+
+
+def gate_from_text(project: Project, *, confidence: float | None = None, tolerance: Sequence[str] = ()) -> Project:
+    """A project with options of its [gate] table from the command line.
+
+    Parameters
+    ----------
+    project : Project
+        From `read_project`.
+    confidence : float, optional
+        Of the parameter ranges; default that of the file.
+    tolerance : sequence of str
+        ``SENSOR=VALUE`` or ``default=VALUE`` [K]; they replace those of the file by name.
+
+    Returns
+    -------
+    Project
+
+    Raises
+    ------
+    InputError
+        A confidence that is none, a value that does not read or is negative, an unknown sensor.
+    """
+    boxes = project.boxes if confidence is None else replace(project.boxes, confidence=checked_confidence(confidence))
+    given = dict(_value(text, "--tolerance") for text in tolerance)
+    known = ("default", *project.system.sensors)
+    for name, value in given.items():
+        if name not in known or not (isfinite(value) and value >= 0.0):
+            raise InputError(f"{name}={value:g}", where="--tolerance",
+                             expected="a number of at least 0 [K] for " + " or ".join(known))
+    return replace(project, boxes=boxes, gate=replace(project.gate, tolerance={**project.gate.tolerance, **given}))
+
+
+def checked_confidence(value: float) -> float:
+    """A confidence as [gate] takes it.
+
+    Parameters
+    ----------
+    value : float
+        Probability, above 0.5 and below 1.
+    """
+    if not 0.5 < value < 1.0:
+        raise InputError(f"{value:g}", where="--confidence", expected="a probability above 0.5 and below 1")
+    return value
+
+
+def ranges_from_text(system: System, texts: Sequence[str], confidence: float = 0.95) -> dict[str, tuple[float, float]]:
+    """Ranges of uncertain parameters from the command line.
+
+    Parameters
+    ----------
+    system : System
+        The calibrated system.
+    texts : sequence of str
+        ``NAME=LO:HI`` [unit of the parameter], or the calibrated.json of a calibration; a range beside a file replaces
+        that of the file.
+    confidence : float
+        Of the ranges from such a file, above 0.5.
+
+    Returns
+    -------
+    dict
+        {parameter: (lower, upper)}; empty where nothing is given.
+
+    Raises
+    ------
+    InputError
+        A value that does not read, a file that is no calibration of this system.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.jobs.request.ranges_from_text(rt.systems.two_module(), ["lumps.x1.capacity=38:42"])
+    {'lumps.x1.capacity': (38.0, 42.0)}
+    """
+    confidence = checked_confidence(confidence)
+    ranges: dict[str, tuple[float, float]] = {}
+    for text in filter(_is_file, texts):
+        ranges |= read_calibrated(Path(text), system).ranges(confidence)
+    return ranges | dict(_range(text, "--parameters") for text in texts if not _is_file(text))
+
+
+def _is_file(text: str) -> bool:
+    return text.endswith(".json")
 
 
 def point_from_text(system: System, values: Sequence[str]) -> dict[str, float]:

@@ -86,7 +86,9 @@ def _diagnosis(result: JobResult) -> Iterator[Reason]:
              "named": GateCode.DIAGNOSIS_NAMED}
     if found.verdict in codes:
         code = codes[found.verdict]
-        names = ", ".join(effect.label for effect in found.effects)
+        names = ", ".join(" or ".join([effect.label, *(f"{name}({', '.join(where)})" for name, where in others
+                                                       if (name, where) != (effect.effect, effect.where))])
+                          for effect, others in zip(found.effects, found.alternatives, strict=True))
         off = any(one.beyond for one in result.misfits)
         yield Reason("fail" if off else "remark", code.code, "diagnose", names or "model",
                      code.meaning[:-1] + (f": {names}." if names else "."), code.remedy)

@@ -12,6 +12,7 @@ from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance, subtitle
+from ..request import write_calibrated
 from ._gate import GATES
 from ._result import JobResult
 from ._sections import comparison_section, first_section, parameter_section
@@ -68,6 +69,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
         write_system(result.system, folder / "calibrated.toml")
         if result.fit is not None:
             result.fit.table().to_csv(folder / "parameters.csv", index_label="parameter")
+            write_calibrated(result.fit, project.files, folder / "calibrated.json")
     return report
 
 
