@@ -163,7 +163,8 @@ def test_demo_writes_a_complete_folder_and_says_yes(demo: tuple[subprocess.Compl
     done, out = demo
     assert done.returncode == 0, done.stderr
     assert {path.name for path in out.iterdir()} == {"report.html", "report.json", "junit.xml", "summary.json",
-                                                     "certificates", "calibrated.toml", "parameters.csv"}
+                                                     "certificates", "calibrated.toml", "calibrated.json",
+                                                     "parameters.csv"}
     assert [path.name for path in out.parent.iterdir()] == ["out"]
     assert "SIMULATED DATA" in (out / "report.html").read_text(encoding="utf-8")
     assert str(Path("out") / "report.html") in done.stdout

@@ -79,7 +79,7 @@ def gate_from_text(project: Project, *, confidence: float | None = None, toleran
     Parameters
     ----------
     project : Project
-        From `read_project`.
+        As the project file says, from `read_project`.
     confidence : float, optional
         Of the parameter ranges; default that of the file.
     tolerance : sequence of str
