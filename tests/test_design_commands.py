@@ -129,11 +129,11 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def bent() -> rt.jobs.design.ControllerDesign:
+def nonlinear() -> rt.jobs.design.ControllerDesign:
     """With natural convection, heater, offset and gain of a sensor: everything that design.json can hold."""
     text = BENCH.replace('between = ["stage", "part"]',
                          'between = ["stage", "part"]\nnatural = { gain = 0.01, exponent = 0.25 }\nradiation = 1e-10')
-    system = rt.thermal.parse_system(text, "bent.toml")
+    system = rt.thermal.parse_system(text, "nonlinear.toml")
     return rt.jobs.design_system(system, rt.jobs.design.design_from_text(system, setpoint=["m1=12"], bandwidth=0.05,
                                                                          sample_time=2.0))
 
@@ -270,7 +270,7 @@ def closed_loop(numbers: dict[str, Any], system: rt.System, inputs: list[float],
 @pytest.mark.parametrize("which", ["bench", "two"])
 def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
         which: str, bench: rt.System, two: rt.jobs.design.ControllerDesign, request: pytest.FixtureRequest) -> None:
-    done = two if which == "two" else request.getfixturevalue("bent")
+    done = two if which == "two" else request.getfixturevalue("nonlinear")
     numbers = json.loads(json.dumps(design_numbers(done)))
     system = done.certification.system
     inputs = [0.0] * len(system.inputs) + [part.temperature for part in system.ambients.values()]

@@ -88,8 +88,8 @@ def _check(problem: Problem, channel: Channel, heat: list[Fraction]) -> Answer:
 
 
 def _linear(network: Network) -> bool:
-    """Whether no link to an ambient is bent: rows then attain their bounds."""
-    return not any(link.bent and len(link.lumps) == 1 for link in network.links)
+    """Whether no link to an ambient is nonlinear: rows then attain their bounds."""
+    return not any(link.nonlinear and len(link.lumps) == 1 for link in network.links)
 
 
 def _load(network: Network, name: str) -> list[Fraction]:
@@ -111,7 +111,7 @@ def _ambient_heat(network: Network, ambient: dict[str, Interval], name: str) -> 
 
 def _steepest(link: Link, own: Interval, far: Interval | None) -> Fraction:
     if far is None:
-        if link.bent:
+        if link.nonlinear:
             raise Malformed("region.ambient: the range of an ambient is missing, whose link is not linear")
         return link.conductance[1]
     return link.exchange(own, far)[1] + link.emission(far)[1]

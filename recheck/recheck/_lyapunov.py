@@ -60,7 +60,7 @@ def check(network: Network, P: list[list[Fraction]], rate: Fraction) -> Answer:
     if not status:
         return not_valid("P is not positive definite") if status is False else not_covered("P > 0 is not proven")
     G = [[entry / network.capacity[j][0] for j, entry in enumerate(row)] for row in P]
-    base, bent = link_shares(network)
+    base, nonlinear = link_shares(network)
     start: Entries = {(i, j): -2 * rate * P[i][j] for i in range(n) for j in range(n)}
     for place, value in _form(G, base).items():
         add(start, place, value)
@@ -74,7 +74,7 @@ def check(network: Network, P: list[list[Fraction]], rate: Fraction) -> Answer:
         return is_exact and decide([[matrix[i, j] for j in range(n)] for i in range(n)]) is False
 
     scaling = Scaling([start[k, k] for k in range(n)])
-    return refine(network, (scaling.matrix(start), 1), bent,
+    return refine(network, (scaling.matrix(start), 1), nonlinear,
                   lambda entries: (scaling.matrix(_form(G, entries)), 1), real_violation)
 
 
@@ -84,19 +84,19 @@ def check_work(total: int, size: int) -> None:
         raise NotCovered(f"{total} joint vertices of {size} rows are too many")
 
 
-def refine(network: Network, start: Units, bent: Sequence[Sequence[Entries]], part: Callable[[Entries], Units],
+def refine(network: Network, start: Units, nonlinear: Sequence[Sequence[Entries]], part: Callable[[Entries], Units],
            violated: Callable[[list[Vertex]], bool]) -> Answer:
     """Decide a matrix that is affine in J at all vertices, currents cut finer where only the relaxation fails.
 
-    ``part`` returns the share of some entries of J, ``bent`` has the ends of slopes of links that vary.
+    ``part`` returns the share of some entries of J, ``nonlinear`` has the ends of slopes of links that vary.
     """
     found, size = groups(network), len(start[0])
-    links = [[Share(*part(entries)) for entries in ends] for ends in bent]
+    links = [[Share(*part(entries)) for entries in ends] for ends in nonlinear]
     failed = Failure([])
     for pieces in PIECES:
         cuts = [pieces] * len(network.modules)
         counts = [count(network, group, cuts) for group in found]
-        total = math.prod([*counts, *(len(ends) for ends in bent)])
+        total = math.prod([*counts, *(len(ends) for ends in nonlinear)])
         check_work(total, size)
         if sum(counts) * size**2 > _MOST_ENTRIES:
             raise NotCovered(f"{sum(counts)} vertices of matrices of {size} rows are too many to keep")
@@ -142,7 +142,7 @@ def decide(matrix: list[list[Fraction]]) -> bool | None:
 def link_shares(network: Network) -> tuple[Entries, list[list[Entries]]]:
     """Return the linear links at their least conductance, and the two ends of every slope that varies."""
     base: Entries = {}
-    bent: list[list[Entries]] = []
+    nonlinear: list[list[Entries]] = []
     for link in network.links:
         lumps = link.lumps
         if not lumps:
@@ -156,16 +156,16 @@ def link_shares(network: Network) -> tuple[Entries, list[list[Entries]]]:
             raise NotCovered("convection to an ambient has no bounded slope for a full matrix")
         else:
             low, high = link.conductance
-        _vary(bent, unit, (low - link.conductance[0], high - link.conductance[0]))
+        _vary(nonlinear, unit, (low - link.conductance[0], high - link.conductance[0]))
         for i in lumps if link.radiation[1] != 0 else ():
-            _vary(bent, {place: value for place, value in unit.items() if place[1] == i},
+            _vary(nonlinear, {place: value for place, value in unit.items() if place[1] == i},
                   link.emission(network.temperature[i]))
-    return base, bent
+    return base, nonlinear
 
 
-def _vary(bent: list[list[Entries]], unit: Entries, slope: Interval) -> None:
+def _vary(nonlinear: list[list[Entries]], unit: Entries, slope: Interval) -> None:
     if slope != (ZERO, ZERO):
-        bent.append([{place: value * s for place, value in unit.items()} for s in sorted(set(slope))])
+        nonlinear.append([{place: value * s for place, value in unit.items()} for s in sorted(set(slope))])
 
 
 def _form(G: list[list[Fraction]], entries: Entries) -> Entries:

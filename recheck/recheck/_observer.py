@@ -85,14 +85,14 @@ def check(problem: Problem) -> Answer:
         return not_valid("P is not positive definite") if status is False else not_covered("P > 0 is not proven")
     check_cost(problem.network)
     sampled = _Sampled(problem)
-    base, bent = link_shares(problem.network)
+    base, nonlinear = link_shares(problem.network)
     form = _Form(sampled, [P[k][k] for k in range(n)], c)
 
     def violated(found: list[Vertex]) -> bool:
         entries, is_exact = jacobian(problem.network, found)
         return is_exact and definite(*form.start(entries)) is False
 
-    return refine(problem.network, form.start(base), bent, form.share, violated)
+    return refine(problem.network, form.start(base), nonlinear, form.share, violated)
 
 
 class _Sampled:

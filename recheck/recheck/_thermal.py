@@ -32,7 +32,7 @@ class Link:
         return [node for node in self.nodes if isinstance(node, int)]
 
     @property
-    def bent(self) -> bool:
+    def nonlinear(self) -> bool:
         """Whether natural convection or radiation goes along it."""
         return self.gain[1] != 0 or self.radiation[1] != 0
 

@@ -116,10 +116,10 @@ class Faces:
         sign, link = SIGNS[side], self._links
         own, far = nodes[link["own"]], nodes[link["far"]]
         d = far - own
-        bent = np.abs(d) ** link["exponent"]
+        power = np.abs(d) ** link["exponent"]
         total, by_own, by_far = np.zeros_like(d), np.zeros_like(d), np.zeros_like(d)
         for name, flow, loss, gain in (("conductance", d, 1.0, 1.0),
-                                       ("natural", bent * d, (1 + link["exponent"]) * bent, None),
+                                       ("natural", power * d, (1 + link["exponent"]) * power, None),
                                        ("radiation", far**4 - own**4, 4 * own**3, 4 * far**3)):
             size = np.where(sign * flow >= 0, link[name][1], link[name][0])
             total += size * (sign * flow + self.reserve * np.abs(flow))

@@ -10,12 +10,12 @@ from ..thermal import System
 from ..verification import Certificate, not_certified
 from ._contraction import METHODS, Method, best_certificate
 from ._energy import energy_rate
-from ._held import held_jacobian
 from ._jacobian import BoxJacobian
 from ._limits import CurrentLimit, bisect
 from ._lyapunov import check_choice, largest_growth
 from ._outcomes import CertifyCode
 from ._polytope import polytope
+from ._regulated_jacobian import regulated_jacobian
 from ._sections import (
     Currents,
     Interval,
@@ -86,7 +86,7 @@ def regulated(system: System, *, setpoint: SetPoints, current: Currents, tempera
     _check(system, method, large)
     region = _region(system, setpoint, current, temperature, parameters)
     parts: dict[str, Any] = {"system": system_section(system), "region": region}
-    box = held_jacobian(system, region)
+    box = regulated_jacobian(system, region)
     if box is None:
         return _no_grip(parts, method)
     return best_certificate("regulated", parts, method, box)
@@ -139,7 +139,7 @@ def largest_regulated_current(system: System, *, setpoint: SetPoints, temperatur
         ranges = given | {name: (0.0, c) for name in setpoint}
         return _region(system, setpoint, ranges, temperature, parameters)
 
-    low, _ = bisect(lambda c: _promising(held_jacobian(system, region(c)), method))
+    low, _ = bisect(lambda c: _promising(regulated_jacobian(system, region(c)), method))
     for back_off in _MATRIX_BACK_OFF if method == "lyapunov" else _BACK_OFF:
         c = low * (1 - back_off)
         ranges = given | {name: (0.0, c) for name in setpoint}

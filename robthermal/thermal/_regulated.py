@@ -142,8 +142,8 @@ def regulated_feedback(eq: Equations, x: Array, u: Array, held: Indices, columns
 
 def slowest_regulated(eq: Equations, x: Array, u: Array, held: Indices, columns: Indices) -> float:
     """Largest real part of the regulated machine's eigenvalues [1/s]; infinite where more current no longer cools."""
-    grip = eq.jacobians(x, u)[1][held, columns]
-    if not (grip < 0).all():  # beyond S x_c = R I the controller's sign is wrong
+    cooling_slope = eq.jacobians(x, u)[1][held, columns]
+    if not (cooling_slope < 0).all():  # beyond S x_c = R I the controller's sign is wrong
         return np.inf
     matrix = regulated_feedback(eq, x, u, held, columns)
     return float(np.linalg.eigvals(matrix).real.max(initial=-np.inf))

@@ -36,7 +36,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
     nominal = read_system(system)
     box = read_region(region, nominal)
     parameters = read_parameters(region)
-    network = worst_system(nominal, system, parameters, bent=True)
+    network = worst_system(nominal, system, parameters, nonlinear=True)
     norm = read_norm(evidence, len(network.lumps))
     return Contraction(network, box, norm.method, norm.rate, margin_of(margin, "rate"), norm.weights, norm.matrix,
                        parameters)

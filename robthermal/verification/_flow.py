@@ -76,8 +76,8 @@ class Layout:
 def flow_growth(problem: Loop, Q: arb_mat) -> Growth | str:
     """Prove what does not depend on the contraction; return K'SK at all corners, lazily, or what fails."""
     system, region = problem.system, problem.region
-    base, bent, missing = link_slopes(system, region)
-    missing = missing or too_many_cases(region, problem.pieces, bent, Q.nrows())
+    base, nonlinear, missing = link_slopes(system, region)
+    missing = missing or too_many_cases(region, problem.pieces, nonlinear, Q.nrows())
     if missing:
         return missing
     for module, current in zip(system.modules, region.current, strict=True):
@@ -91,7 +91,7 @@ def flow_growth(problem: Loop, Q: arb_mat) -> Growth | str:
     cases = list(product(*([*_modes(problem, k)] for k in range(len(system.modules)))))
     if len(problem.start) not in (1, len(cases)):
         return f"{len(problem.start)} matrices for the start of a sample: 1 or {len(cases)} are needed"
-    links = math.prod(len(items) for items in bent)
+    links = math.prod(len(items) for items in nonlinear)
     moves = sum(math.prod(len(mode.flow) for mode in case) for case in cases) * links
     jumps = sum(math.prod(len(mode.corners) for mode in case) for case in cases) * (1 if sampled is None else links)
     size = Q.nrows() + len(system.modules)
@@ -105,10 +105,10 @@ def flow_growth(problem: Loop, Q: arb_mat) -> Growth | str:
         where = "; ".join(mode.where for mode in case)
         if not is_positive(S):
             return f"the form at the start of a sample is not positive or cannot be proven to be, {where}"
-        if failed := _moves(problem, layout, S, Q, base, bent, case):
+        if failed := _moves(problem, layout, S, Q, base, nonlinear, case):
             return f"between the samples the form may grow, {where}: {failed}"
         starts.append((layout, S, case))
-    return Growth(_jumps(problem, starts, sampled, base, bent), jumps)
+    return Growth(_jumps(problem, starts, sampled, base, nonlinear), jumps)
 
 
 def _modes(problem: Loop, k: int) -> Iterator[Mode]:
@@ -149,14 +149,14 @@ def control_points(module: Module, box: tuple[Interval, Interval, Interval]) -> 
         for place in product(*(range(len(axis)) for axis in marks))}
     for axis in range(3):
         middle = [place for place in found if place[axis] == 1]
-        bent = False
+        nonlinear = False
         for place in middle:
             low, high = (found[(*place[:axis], end, *place[axis + 1:])] for end in (0, 2))
             chord = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
             control = tuple(2 * a - b for a, b in zip(found[place], chord, strict=True))
-            bent |= any(a != b for a, b in zip(control, chord, strict=True))
+            nonlinear |= any(a != b for a, b in zip(control, chord, strict=True))
             found[place] = control
-        if not bent:
+        if not nonlinear:
             found = {place: value for place, value in found.items() if place[axis] != 1}
     return list(dict.fromkeys(found.values()))
 
@@ -168,8 +168,8 @@ def _slopes(module: Module, hot: fmpq, cold: fmpq, current: fmpq) -> Slopes:
     return hh, hc, ch, cc, S * hot + R * current, R * current - S * cold
 
 
-def _moves(problem: Loop, layout: Layout, S: arb_mat, Q: arb_mat, base: Entries, bent: Sequence[Sequence[Described]],
-           case: Sequence[Mode]) -> str:
+def _moves(problem: Loop, layout: Layout, S: arb_mat, Q: arb_mat, base: Entries,
+           nonlinear: Sequence[Sequence[Described]], case: Sequence[Mode]) -> str:
     """Return where S - Q - T (P A + A'P) > 0 fails, for P = S and P = Q; empty where it is proven."""
     time, capacity, d = arb(problem.sample_time), problem.system.capacity, layout.size
     place = [layout.after(k) for k in range(layout.end)]
@@ -191,7 +191,7 @@ def _moves(problem: Loop, layout: Layout, S: arb_mat, Q: arb_mat, base: Entries,
                for k, mode in enumerate(case)]
     for P in (S, after):
         start = S - after + grown(P, (base, "", True)).matrix
-        failed = first_failure(start, [*bent, *modules], partial(grown, P))
+        failed = first_failure(start, [*nonlinear, *modules], partial(grown, P))
         if failed is not None:
             return "at the start of the sample" if P is S else "at the end of the sample"
     return ""
@@ -207,9 +207,10 @@ def _entries(module: Module, slopes: Slopes, current: int | None) -> Entries:
 
 
 def _jumps(problem: Loop, starts: Sequence[tuple[Layout, arb_mat, tuple[Mode, ...]]], sampled: Sampled | None,
-           base: Entries, bent: Sequence[Sequence[Described]]) -> Iterator[tuple[arb_mat, str]]:
+           base: Entries, nonlinear: Sequence[Sequence[Described]]) -> Iterator[tuple[arb_mat, str]]:
     """Yield K'SK and where, for every corner of every case."""
-    links = [[_seen_link(problem, sampled, entries) for entries, _, _ in items] for items in bent] if sampled else []
+    links = ([[_seen_link(problem, sampled, entries) for entries, _, _ in items] for items in nonlinear]
+             if sampled else [])
     for layout, S, case in starts:
         fixed = _fixed_rows(problem, layout, sampled)
         parts = [[(_corner_rows(problem, layout, sampled, k, corner), corner.where) for corner in mode.corners]

@@ -20,7 +20,7 @@ class Growth:
     count: int
 
 
-def too_many_cases(region: Region, pieces: int, bent: Sequence[Collection[Described]], rows: int) -> str:
+def too_many_cases(region: Region, pieces: int, nonlinear: Sequence[Collection[Described]], rows: int) -> str:
     """Return why a loop has too many cases, counted before any is made; empty where it has not.
 
     At least one per module and piece of its current or limit, and one per end of every link that is not linear.
@@ -29,7 +29,7 @@ def too_many_cases(region: Region, pieces: int, bent: Sequence[Collection[Descri
         return f"temperatures and controller states need matrices with {rows} rows: too many, at most {MOST_ROWS}"
     modules = [pieces + 2 if low < high else 1 for low, high in region.current]
     most = int(MOST_WORK / (rows**3 + 2000))
-    if product_up_to([*modules, *map(len, bent)], most) > most:
-        return (f"{len(modules)} modules with {pieces} pieces each and {len(bent)} links that are not linear have too "
-                "many combinations of slopes to check one by one")
+    if product_up_to([*modules, *map(len, nonlinear)], most) > most:
+        return (f"{len(modules)} modules with {pieces} pieces each and {len(nonlinear)} links that are not linear have "
+                "too many combinations of slopes to check one by one")
     return ""

@@ -49,7 +49,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     """Return the exact problem, or raise InputError."""
     nominal, table = read_system(system), mapping(region, "region")
     parameters = read_parameters(table)
-    network = worst_system(nominal, system, parameters, bent=True)
+    network = worst_system(nominal, system, parameters, nonlinear=True)
     mapping(evidence, "evidence")
     given = get(table, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")

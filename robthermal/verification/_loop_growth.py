@@ -47,8 +47,8 @@ class Share:
 def growth(problem: Loop, P: arb_mat) -> Growth | str:
     """Return the cases, lazily, or why there are none."""
     system, region = problem.system, problem.region
-    base, bent, missing = link_slopes(system, region)
-    missing = missing or too_many_cases(region, problem.pieces, bent, P.nrows())
+    base, nonlinear, missing = link_slopes(system, region)
+    missing = missing or too_many_cases(region, problem.pieces, nonlinear, P.nrows())
     if missing:
         return missing
     faces = [(region.temperature[module.hot], region.temperature[module.cold]) for module in system.modules]
@@ -62,7 +62,7 @@ def growth(problem: Loop, P: arb_mat) -> Growth | str:
         return sampled
     currents = [_current(problem, k) for k in range(len(system.modules))]
     shares = [_module_shares(problem, k, rows) for k, (rows, _) in enumerate(currents)]
-    shares += [[_link_share(problem, entries, words) for entries, words, _ in items] for items in bent]
+    shares += [[_link_share(problem, entries, words) for entries, words, _ in items] for items in nonlinear]
     total = math.prod(len(items) for items in shares)
     if total * P.nrows() ** 3 > MOST_WORK:
         return f"{total} combinations of slopes: too many to check one by one"
@@ -73,7 +73,8 @@ def growth(problem: Loop, P: arb_mat) -> Growth | str:
     if (len(problem.weights), len(problem.sizes)) != expected:
         return (f"weights and sizes must have {expected[0]} and {expected[1]} numbers: one per port; two per port and "
                 "four per module")
-    bounds = _bounds(problem, ports, [found for _, found in currents], [(pair[0][0], pair[-1][0]) for pair in bent])
+    bounds = _bounds(problem, ports, [found for _, found in currents],
+                     [(pair[0][0], pair[-1][0]) for pair in nonlinear])
     found = deviation(sampled, ports, system.capacity, problem.sample_time, bounds, problem.weights, problem.sizes)
     if isinstance(found, str):
         return found

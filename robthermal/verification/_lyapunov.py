@@ -56,8 +56,8 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     if broken:
         return Proof(False, f"method lyapunov: {broken}")
     n = len(problem.matrix)
-    base, bent, missing = link_slopes(problem.system, problem.region)
-    missing = missing or too_much(problem.system, problem.region, bent, PIECES[0], n)
+    base, nonlinear, missing = link_slopes(problem.system, problem.region)
+    missing = missing or too_much(problem.system, problem.region, nonlinear, PIECES[0], n)
     if missing:
         return Proof(False, f"method lyapunov: {missing}")
     form = _Form(problem)
@@ -67,10 +67,10 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     words = f"P E^-1 J + J' E^-1 P < -2 ({decimal(rate)}) P"
     proof = Proof(False, "method lyapunov: too many vertices to check any")
     for pieces in PIECES:
-        more = too_much(problem.system, problem.region, bent, pieces, n)
+        more = too_much(problem.system, problem.region, nonlinear, pieces, n)
         if more:
             return Proof(False, f"{proof.reason} ({more})")
-        groups: list[Collection[Described]] = [*bent, *module_slopes(problem.system, problem.region, pieces)]
+        groups: list[Collection[Described]] = [*nonlinear, *module_slopes(problem.system, problem.region, pieces)]
         failed = first_failure(start, groups, form.part)
         if failed is None:
             return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")
@@ -80,13 +80,13 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
     return proof
 
 
-def too_much(system: ThermalSystem, region: Region, bent: Sequence[Collection[Described]], pieces: int,
+def too_much(system: ThermalSystem, region: Region, nonlinear: Sequence[Collection[Described]], pieces: int,
              rows: int) -> str:
     """Return why the vertices would take minutes or the matrices gigabytes, counted before any is made; else empty."""
     n = len(system.lumps)
     if rows > MOST_ROWS:
         return f"{n} lumps need dense matrices with {rows} rows, too large to check: at most {MOST_ROWS}"
-    groups = [*map(len, bent), *map(len, module_slopes(system, region, pieces))]
+    groups = [*map(len, nonlinear), *map(len, module_slopes(system, region, pieces))]
     most = int(MOST_WORK / (n**3 + 2000))
     if sum(groups) + product_up_to(groups, most) > most:
         return (f"too many vertices of the modules and of the links that are not linear, with pieces per current: "
@@ -146,7 +146,7 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
     """Return the linear links, the two ends of every slope that varies, and what is missing to bound one."""
     names, temperature = system.lumps, region.temperature
     base: Entries = {}
-    bent: list[list[Described]] = []
+    nonlinear: list[list[Described]] = []
     for link in system.links:
         a, b = link.nodes
         ends = [node for node in (a, b) if isinstance(node, int)]
@@ -154,21 +154,22 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
             i, j = ends
             exchange: Entries = {(i, i): fmpq(-1), (i, j): fmpq(1), (j, j): fmpq(-1), (j, i): fmpq(1)}
             if link.convects or link.spread != 0:
-                bent.append(_ends(exchange_slope(link, temperature[i], temperature[j]), exchange, "conductance"))
+                nonlinear.append(_ends(exchange_slope(link, temperature[i], temperature[j]), exchange, "conductance"))
         elif ends and link.convects:
-            return base, bent, (f"natural convection from lump {name_of(names[ends[0]])} to an ambient has no bounded "
-                                "slope; use energy, sum or max")
+            return base, nonlinear, (f"natural convection from lump {name_of(names[ends[0]])} to an ambient has no "
+                                     "bounded slope; use energy, sum or max")
         else:
             exchange = {(i, i): fmpq(-1) for i in ends}
             if ends and link.spread != 0:
-                bent.append(_ends((fmpq(0), link.spread), exchange, "uncertain conductance"))
+                nonlinear.append(_ends((fmpq(0), link.spread), exchange, "uncertain conductance"))
         for place, value in exchange.items():
             base[place] = base.get(place, fmpq(0)) + link.conductance * value
         if link.radiates:
             for i in ends:
                 column = {place: value for place, value in exchange.items() if place[1] == i}
-                bent.append(_ends(radiation_slope(link, temperature[i]), column, f"radiation at {name_of(names[i])}"))
-    return base, bent, ""
+                words = f"radiation at {name_of(names[i])}"
+                nonlinear.append(_ends(radiation_slope(link, temperature[i]), column, words))
+    return base, nonlinear, ""
 
 
 def _ends(slope: Interval, entries: Entries, words: str) -> list[Described]:

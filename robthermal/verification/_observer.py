@@ -129,9 +129,9 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     n = len(problem.matrix)
     if contraction <= 0:
         return Proof(False, f"contraction {show(contraction)} is not positive")
-    base, bent, missing = link_slopes(problem.system, problem.region)
+    base, nonlinear, missing = link_slopes(problem.system, problem.region)
     broken = (asymmetry(problem.matrix) or missing
-              or too_much(problem.system, problem.region, bent, refinements[0], 2 * n))
+              or too_much(problem.system, problem.region, nonlinear, refinements[0], 2 * n))
     if broken:
         return Proof(False, broken)
     P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])
@@ -147,10 +147,10 @@ def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PI
     words = f"M'PM < {decimal(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
     proof = Proof(False, "too many vertices to check any")
     for pieces in refinements:
-        more = too_much(problem.system, problem.region, bent, pieces, 2 * n)
+        more = too_much(problem.system, problem.region, nonlinear, pieces, 2 * n)
         if more:
             return Proof(False, f"{proof.reason} ({more})")
-        groups: list[Collection[Described]] = [*bent, *module_slopes(problem.system, problem.region, pieces)]
+        groups: list[Collection[Described]] = [*nonlinear, *module_slopes(problem.system, problem.region, pieces)]
         failed = first_failure(start, groups, lambda item: _part(left, item, n))
         if failed is None:
             return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")

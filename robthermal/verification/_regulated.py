@@ -2,7 +2,7 @@
 
 The currents of these modules are whatever holds them. With the heat pumped instead of the current as the coordinate,
 the ranges of the currents are a convex set, so that two trajectories obey E e' = J e with J a mean of the reduced
-Jacobian (see ``_held``) over the box; every inequality is convex in J (proof note, 12).
+Jacobian (see ``_regulated_modules``) over the box; every inequality is convex in J (proof note, 12).
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from ._corners import is_positive as dense_is_positive
 from ._cost import product_up_to, too_many_corners
 from ._definite import eliminate, is_positive
 from ._fields import get, kelvin_interval, mapping, margin_of
-from ._held import Alternative, Groups, HeldNetwork, lost_grip, shares
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import MOST_ROWS, asymmetry
 from ._norm import NORMS, read_norm, say_rate
 from ._numbers import decimal, name_of, round_down, show
+from ._regulated_modules import Alternative, Groups, RegulatedNetwork, lost_regulation, shares
 from ._system import ThermalSystem, read_region, read_system, say_interval
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 from ._vertices import Entries
@@ -42,7 +42,7 @@ Sparse = defaultdict[int, dict[int, arb]]
 class Regulated:
     """The exact problem of one certificate; weights and P over the lumps that are not held, in order."""
 
-    network: HeldNetwork
+    network: RegulatedNetwork
     method: str
     rate: fmpq
     margin: fmpq
@@ -80,7 +80,7 @@ def claim(problem: Regulated, machine: str) -> str:
 def prove(problem: Regulated) -> Proof:
     """Prove that the currents hold their lumps, and the inequality of the method with the stored margin added."""
     with working_precision():
-        lost = lost_grip(problem.network) or _malformed(problem)
+        lost = lost_regulation(problem.network) or _malformed(problem)
         if lost:
             return Proof(False, lost)
         extra = max(problem.margin, fmpq(0))
@@ -240,7 +240,7 @@ def _block(rows: Rows | Sparse, ports: list[int]) -> list[list[arb]]:
     return [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
 
 
-def _held_network(system: ThermalSystem, region: Mapping[str, Any]) -> HeldNetwork:
+def _held_network(system: ThermalSystem, region: Mapping[str, Any]) -> RegulatedNetwork:
     where = "region.setpoint"
     setpoint = mapping(get(region, "setpoint", "region"), where)
     modules = {module.name: k for k, module in enumerate(system.modules)}
@@ -259,8 +259,8 @@ def _held_network(system: ThermalSystem, region: Mapping[str, Any]) -> HeldNetwo
         if system.modules[k].hot in holder:
             raise InputError(f"the hot lump of {name_of(system.modules[k].name)} is held by another module",
                              where=where, expected="modules whose hot lumps are free (no cascades)")
-    return HeldNetwork(system, read_region({**region, "temperature": _temperatures(system, region, holder)}, system),
-                       holder)
+    known = {**region, "temperature": _temperatures(system, region, holder)}
+    return RegulatedNetwork(system, read_region(known, system), holder)
 
 
 def _temperatures(system: ThermalSystem, region: Mapping[str, Any], holder: Mapping[int, int]) -> dict[str, Any]:
@@ -276,7 +276,7 @@ def _temperatures(system: ThermalSystem, region: Mapping[str, Any], holder: Mapp
     return {**given, **held}
 
 
-def _say_temperatures(network: HeldNetwork) -> str:
+def _say_temperatures(network: RegulatedNetwork) -> str:
     names, boxes, free = network.system.lumps, network.region.temperature, network.free
     if all(boxes[k] == boxes[free[0]] for k in free):
         return f"other lump temperatures in {say_interval(boxes[free[0]])} K"

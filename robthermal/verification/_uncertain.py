@@ -52,10 +52,10 @@ def say_subject(system: ThermalSystem, parameters: Parameters, machine: str, pla
 
 
 def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: Parameters, *,
-                 bent: bool = False) -> ThermalSystem:
+                 nonlinear: bool = False) -> ThermalSystem:
     """Return the network whose inequalities imply those of every network in the ranges.
 
-    ``bent``: whether the claim covers ranges of natural convection and radiation.
+    ``nonlinear``: whether the claim covers ranges of natural convection and radiation.
     """
     modules = {module.name: k for k, module in enumerate(system.modules)}
     lumps = {name: k for k, name in enumerate(system.lumps)}
@@ -70,7 +70,7 @@ def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: 
             _at_least(low, fmpq(0), where, strict=True)
             must_contain((low, high), system.capacity[lumps[part]], where)
             capacity[lumps[part]] = high
-        elif table == "links" and (place := _link_number(rest, links, bent)) is not None:
+        elif table == "links" and (place := _link_number(rest, links, nonlinear)) is not None:
             k, field = place
             _at_least(low, fmpq(0), where, strict=False)
             must_contain((low, high), getattr(system.links[k], field), where)
@@ -82,17 +82,17 @@ def worst_system(system: ThermalSystem, section: Mapping[str, Any], parameters: 
         else:
             raise InputError("no such number can be uncertain", where=where,
                              expected="lumps.NAME.capacity, links.NAME.conductance (of one link)"
-                                      + (", links.NAME.natural.gain, links.NAME.radiation" if bent else "")
+                                      + (", links.NAME.natural.gain, links.NAME.radiation" if nonlinear else "")
                                       + ", or modules.NAME.{seebeck,resistance,conductance}.{value,slope}")
     variants = tuple(_variants(module, own) for module, own in zip(system.modules, ends, strict=True))
     return replace(system, capacity=tuple(capacity), links=tuple(changed), variants=variants)
 
 
-def _link_number(rest: str, links: Mapping[str, int], bent: bool) -> tuple[int, str] | None:
+def _link_number(rest: str, links: Mapping[str, int], nonlinear: bool) -> tuple[int, str] | None:
     """Return which link and which of its numbers a name after "links." means."""
     for key, field in _NUMBERS.items():
         part = rest.removesuffix(f".{key}")
-        if part != rest and part in links and (bent or field == "conductance"):
+        if part != rest and part in links and (nonlinear or field == "conductance"):
             return links[part], field
     return None
 

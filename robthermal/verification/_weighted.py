@@ -31,7 +31,7 @@ class _Pair:
     """Everything between two lumps."""
 
     conductance: fmpq = field(default_factory=lambda: fmpq(0))
-    bent: list[Link] = field(default_factory=list)
+    nonlinear: list[Link] = field(default_factory=list)
     modules: list[int] = field(default_factory=list)
 
 
@@ -93,7 +93,7 @@ def _collect(problem: Contraction) -> tuple[list[fmpq], list[dict[int, _Pair]]]:
             shared = _between(pairs, a, b)
             shared.conductance += link.conductance
             if link.convects or link.radiates or link.spread != 0:
-                shared.bent.append(link)
+                shared.nonlinear.append(link)
         else:
             for lump in (node for node in (a, b) if isinstance(node, int)):
                 losses[lump] += least_ambient_slope(link, lump, problem.region)
@@ -164,7 +164,7 @@ def _links(problem: Contraction, j: int, p: int, pair: _Pair, sign: int) -> fmpq
     w, v = problem.weights[j], sign * problem.weights[p]
     total = (v - w) * pair.conductance
     own, other = problem.region.temperature[j], problem.region.temperature[p]
-    for link in pair.bent:
+    for link in pair.nonlinear:
         total += max((v - w) * slope for slope in exchange_slope(link, own, other))
         here, there = radiation_slope(link, own), radiation_slope(link, other)
         if problem.method == "sum":  # row p, column j also holds the slope at j

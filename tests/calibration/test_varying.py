@@ -53,10 +53,10 @@ def test_between_the_models_the_parameters_and_the_linear_model_are_interpolated
 
 
 def test_a_bent_property_is_not_called_a_line(joined):
-    bent = joined.values.copy()
-    bent[1] += 20 * joined.std[1]
+    nonlinear = joined.values.copy()
+    nonlinear[1] += 20 * joined.std[1]
     crooked = rt.calibration.VaryingModel(system=joined.system, names=joined.names, temperatures=joined.temperatures,
-                                          values=bent, std=joined.std)
+                                          values=nonlinear, std=joined.std)
     assert crooked.trend().loc[NAME, "p_value"] < 1e-6
 
 

@@ -23,7 +23,7 @@ class Case:
 
 
 def machine(rng: np.random.Generator) -> Case:
-    """2 to 8 lumps, 1 to 3 modules, properties that vary with temperature, bent losses, heaters, a random box."""
+    """2 to 8 lumps, 1 to 3 modules, properties that vary with temperature, nonlinear losses, heaters, a random box."""
     modules_count = int(rng.integers(1, 4))
     n = int(rng.integers(modules_count + 1, 9))
     lumps = [f"x{i}" for i in range(n)]

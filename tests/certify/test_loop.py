@@ -8,7 +8,7 @@ import pytest
 import robthermal as rt
 
 
-def machine(rng, bent=False):
+def machine(rng, nonlinear=False):
     """A hot and a cold face, with up to two more lumps behind them."""
     lumps = {"hot": {"capacity": rng.uniform(20, 80)}, "cold": {"capacity": rng.uniform(8, 30)},
              "sink": {"capacity": rng.uniform(50, 200)}, "mass": {"capacity": rng.uniform(5, 40)}}
@@ -17,7 +17,7 @@ def machine(rng, bent=False):
              {"between": ("cold", "mass"), "conductance": rng.uniform(0.3, 3)},
              {"between": ("mass", "room"), "conductance": rng.uniform(0.05, 0.3)},
              {"between": ("cold", "room"), "conductance": rng.uniform(0.05, 0.3)}]
-    if bent:
+    if nonlinear:
         links[3] |= {"radiation": 2e-10}
         links.append({"name": "air", "between": ("cold", "sink"), "conductance": 0.0,
                       "natural": {"gain": 0.01, "exponent": 0.25}})
@@ -44,15 +44,15 @@ def pair(system, law, pi, box, rng, samples=40):
     return states[0] - states[1], run
 
 
-@pytest.mark.parametrize("bent", [False, True])
-def test_certified_loops_contract_in_simulation(bent):
-    rng = np.random.default_rng(7 + bent)
+@pytest.mark.parametrize("nonlinear", [False, True])
+def test_certified_loops_contract_in_simulation(nonlinear):
+    rng = np.random.default_rng(7 + nonlinear)
     certified = 0
     for _ in range(3):
-        system = machine(rng, bent)
+        system = machine(rng, nonlinear)
         law, pi = design(system, (-0.15, 0.3), bandwidth=float(rng.uniform(0.02, 0.1)))
         proven = rt.design.certify_loop(system, pi, law)
-        if not (proven.loop.holds if bent else proven.holds):  # bent: that the box is kept is seen below, not proven
+        if not (proven.loop.holds if nonlinear else proven.holds):  # that the box is kept is seen below
             continue
         certified += 1
         box, P = proven.loop.region["temperature"], np.array(proven.loop.evidence["matrix"])

@@ -105,7 +105,7 @@ def test_uncertain_convection_and_radiation_are_judged_alike_by_both():
     rng = np.random.default_rng(4)
     seen = set()
     for trial in range(12):
-        system = certificate_truth.random_system(rng, modules=1, bent=True)
+        system = certificate_truth.random_system(rng, modules=1, nonlinear=True)
         ranges = {}
         for k, link in enumerate(system["links"]):
             link["name"] = f"l{k}"

@@ -126,14 +126,15 @@ def frozen_abscissa(document: Document, rng: np.random.Generator, count: int = 6
                for x, i in points(system, document["region"], rng, count))
 
 
-def random_system(rng: np.random.Generator, *, modules: int = 2, bent: bool = False, wild: bool = False) -> Document:
+def random_system(rng: np.random.Generator, *, modules: int = 2, nonlinear: bool = False,
+                  wild: bool = False) -> Document:
     """Return a connected random network; ``wild`` slopes may be negative and modules may share lumps."""
     n = int(rng.integers(2 * modules, 2 * modules + 4)) if not wild else int(rng.integers(3, 6))
     names = [f"x{k}" for k in range(n)]
     links = [{"between": [names[k], names[int(rng.integers(k))]], "conductance": round(float(rng.uniform(0.5, 5)), 3)}
              for k in range(1, n)]
     links += [{"between": [name, "room"], "conductance": round(float(rng.uniform(0.2, 1)), 3)} for name in names]
-    if bent:
+    if nonlinear:
         links[0]["natural"] = {"gain": 0.05, "exponent": 0.25}
         links[-1]["natural"] = {"gain": 0.03, "exponent": 0.33}
         links[1]["radiation"] = 2e-10

@@ -95,7 +95,7 @@ def violation(document, rng, count=40):
     return worst
 
 
-def machine(rng, *, bent=False, extra=False):
+def machine(rng, *, nonlinear=False, extra=False):
     """Return a random machine: one or two modules holding cold lumps with cold plates, maybe one that holds nothing."""
     count = int(rng.integers(1, 3))
     lumps, links, modules = {"sink": {"capacity": 50.0}}, [], {}
@@ -114,7 +114,7 @@ def machine(rng, *, bent=False, extra=False):
                             "seebeck": {"value": 0.05, "slope": float(rng.choice([0.0, 7e-5, -5e-5]))},
                             "resistance": {"value": 4.5, "slope": float(rng.choice([0.0, 0.02, -0.01]))},
                             "conductance": {"value": 0.3, "slope": float(rng.choice([0.0, 1e-3]))}}
-    if bent:
+    if nonlinear:
         links[1]["natural"] = {"gain": 0.05, "exponent": 0.25}
         links[2]["radiation"] = 5e-10
         links[3]["radiation"] = 3e-10

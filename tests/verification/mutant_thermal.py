@@ -44,11 +44,11 @@ def make_contraction(rng: np.random.Generator) -> Document:
     method = str(rng.choice(_METHODS))
     uncertain = bool(rng.random() < 0.3)
     system = truth.random_system(rng, modules=1 if uncertain else int(rng.integers(1, 3)),
-                                 bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.3))
+                                 nonlinear=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.3))
     region = truth.box(system, float(rng.uniform(0.2, 2.0)))
     if uncertain:
         names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
-        names += 2 * names_of(system, bent=True)
+        names += 2 * names_of(system, nonlinear=True)
         region["parameters"] = spans(system, names, rng, 3, 0.8, 1.2)
     evidence = truth.evidence_for(method, system, region, 1e-4, rng)
     good = establish("contraction", system=system, region=region, evidence=evidence, made_by={})
@@ -67,12 +67,12 @@ def break_contraction(document: Document, rng: np.random.Generator) -> float:
 
 
 def make_invariance(rng: np.random.Generator) -> Document:
-    system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.3))
+    system = truth.random_system(rng, modules=1, nonlinear=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.3))
     lump, top = str(rng.choice(list(system["lumps"]))), float(rng.uniform(0.05, 0.8))
     region = {"temperature": [float(rng.uniform(200, 280)), float(rng.uniform(320, 450))],
               "current": {name: [-0.3 * top, top] for name in system["modules"]}, "ambient": {"room": [290.0, 300.0]}}
     if rng.random() < 0.3:
-        region["parameters"] = spans(system, names_of(system, bent=True), rng, 3, 0.8, 1.2)
+        region["parameters"] = spans(system, names_of(system, nonlinear=True), rng, 3, 0.8, 1.2)
     good = establish("invariance", system=system, region=region, evidence={}, made_by={})
     if not good.holds:
         return make_invariance(rng)
@@ -259,7 +259,7 @@ def _plain(system: Document) -> Document:
 
 
 def make_gain(rng: np.random.Generator) -> Document:
-    system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.4), wild=bool(rng.random() < 0.3))
+    system = truth.random_system(rng, modules=1, nonlinear=bool(rng.random() < 0.4), wild=bool(rng.random() < 0.3))
     region = {**truth.box(system, float(rng.uniform(0.1, 1.0))), "ambient": {"room": [285.0, 305.0]}}
     lump, rate = str(rng.choice(list(system["lumps"]))), float(rng.choice([0.0, 1e-4]))
     if rng.random() < 0.3:
@@ -318,7 +318,7 @@ def break_gain(document: Document, rng: np.random.Generator) -> float:
 
 
 def make_regulated(rng: np.random.Generator) -> Document:
-    document = held_truth.machine(rng, bent=bool(rng.random() < 0.3), extra=bool(rng.random() < 0.2))
+    document = held_truth.machine(rng, nonlinear=bool(rng.random() < 0.3), extra=bool(rng.random() < 0.2))
     method = str(rng.choice(_METHODS))
     if method == "lyapunov":
         document["system"]["links"][0].pop("natural", None)

@@ -126,7 +126,7 @@ def test_no_path_to_ambient_is_never_certified(method):
 def test_never_valid_where_a_sample_violates(method, seed):
     """Random systems (slopes of any sign, shared lumps, convection, radiation) around their limit."""
     rng = np.random.default_rng([seed, METHODS.index(method)])
-    system = truth.random_system(rng, modules=2, bent=seed % 3 == 1, wild=seed % 2 == 1)
+    system = truth.random_system(rng, modules=2, nonlinear=seed % 3 == 1, wild=seed % 2 == 1)
     held = 0
     for top in (0.5, 1.5, 2.5, 4.0, 8.0):
         region = truth.box(system, top)
@@ -196,11 +196,11 @@ def test_opposite_modules_and_negative_off_diagonals():
         assert make(system, region, evidence).holds == expected
 
 
-@pytest.mark.parametrize("bent", [{"natural": {"gain": 5.0, "exponent": 0.25}}, {"radiation": 1e-7}])
-def test_links_that_are_not_linear(bent):
+@pytest.mark.parametrize("nonlinear", [{"natural": {"gain": 5.0, "exponent": 0.25}}, {"radiation": 1e-7}])
+def test_links_that_are_not_linear(nonlinear):
     """Strong convection or radiation helps a lump and feeds its neighbour: the sum must notice unequal weights."""
     system = rod()
-    system["links"][0] = {**system["links"][0], **bent}
+    system["links"][0] = {**system["links"][0], **nonlinear}
     evidence = {"method": "sum", "rate": 0.0, "weights": [1.0, 1.2]}
     assert make(rod(), passive(), evidence).holds is True
     good = make(system, passive(), evidence)

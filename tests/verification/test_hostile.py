@@ -88,12 +88,13 @@ def test_a_sensor_that_does_more_than_read_is_refused(key):
 
 
 def test_proofs_do_not_depend_on_the_precision_of_the_caller():
-    bent = copy.deepcopy(PAIR)
-    bent["links"][0]["natural"] = {"gain": 0.05, "exponent": 0.25}
+    nonlinear = copy.deepcopy(PAIR)
+    nonlinear["links"][0]["natural"] = {"gain": 0.05, "exponent": 0.25}
     region = {**BOX, "ambient": {"room": [290.0, 300.0]}}
     evidence = {"rate": 0.0, "gains": {"ambients": {"room": [1.05, 1.02]}}}
-    kinds = {"gain": (bent, region, evidence), "invariance": (bent, {**region, "temperature": [250.0, 330.0]}, {}),
-             "contraction": (bent, BOX, {"method": "energy", "rate": 0.4}),
+    kinds = {"gain": (nonlinear, region, evidence),
+             "invariance": (nonlinear, {**region, "temperature": [250.0, 330.0]}, {}),
+             "contraction": (nonlinear, BOX, {"method": "energy", "rate": 0.4}),
              "loop": tuple(test_loop.document().values())}
     before = ctx.prec
     for kind, (system, box, given) in kinds.items():

@@ -42,7 +42,7 @@ def test_never_valid_where_a_face_leaks_and_sharp():
     rng = np.random.default_rng(0)
     decided = {True: 0, False: 0}
     for trial in range(60):
-        system = truth.random_system(rng, modules=1, bent=trial % 2 == 1, wild=trial % 3 == 2)
+        system = truth.random_system(rng, modules=1, nonlinear=trial % 2 == 1, wild=trial % 3 == 2)
         high, low = float(rng.uniform(310, 450)), float(rng.uniform(250, 285))
         region = {**region_for(system, rng), "temperature": [low, high]}
         certificate = make(system, region, {})
@@ -50,7 +50,7 @@ def test_never_valid_where_a_face_leaks_and_sharp():
         if certificate.holds:
             assert outflow <= 1e-9
         decided[certificate.holds] += 1
-        if trial % 3 != 2 and abs(outflow) > 1e-6:  # without a bent conductance the bound is exact
+        if trial % 3 != 2 and abs(outflow) > 1e-6:  # without a nonlinear conductance the bound is exact
             assert certificate.holds == (outflow < 0)
     assert min(decided.values()) > 8
 

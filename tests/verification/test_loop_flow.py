@@ -77,8 +77,8 @@ def test_matrices_that_prove_nothing_are_refused(found):
     assert not holds(flipped)
     fewer = changed(found, ("evidence", "start"), lambda starts: starts[:-1])
     assert "are needed" in establish("loop", **fewer, made_by={}).reason
-    bent = changed(found, ("evidence", "start", 0, 0), lambda row: [row[0], row[1] + 1e-3, *row[2:]])
-    assert "not symmetric" in establish("loop", **bent, made_by={}).reason
+    nonlinear = changed(found, ("evidence", "start", 0, 0), lambda row: [row[0], row[1] + 1e-3, *row[2:]])
+    assert "not symmetric" in establish("loop", **nonlinear, made_by={}).reason
 
 
 @pytest.mark.parametrize(("path", "value", "message"), [

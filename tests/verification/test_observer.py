@@ -48,7 +48,7 @@ def test_margin_is_proven_and_close():
 
 
 def machine(rng):
-    system = truth.random_system(rng, modules=1, bent=False, wild=True)
+    system = truth.random_system(rng, modules=1, nonlinear=False, wild=True)
     n = len(system["lumps"])
     lump = list(system["lumps"])[int(rng.integers(n))]
     gain = np.round(rng.uniform(-0.2, 0.6, (n, 1)), 3)

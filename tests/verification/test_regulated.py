@@ -119,7 +119,7 @@ def test_random_and_mutated_certificates_are_never_wrongly_accepted():
     rng = np.random.default_rng(2)
     accepted = refused = 0
     for k in range(48):
-        document = held_truth.machine(rng, bent=k % 3 == 0, extra=k % 5 == 0)
+        document = held_truth.machine(rng, nonlinear=k % 3 == 0, extra=k % 5 == 0)
         method = ("max", "sum", "energy", "lyapunov")[k % 4]
         if method == "lyapunov":
             document["system"]["links"][0].pop("natural", None)
@@ -150,7 +150,7 @@ def test_pairs_of_states_approach_each_other():
     """Not only derivatives: two states with the same loads and set-points, their currents solved from the balances."""
     rng, seen = np.random.default_rng(8), 0
     for _ in range(400):
-        document = held_truth.machine(rng, bent=True)
+        document = held_truth.machine(rng, nonlinear=True)
         document["evidence"] = candidate(document, "max", 1e-4, rng)
         if not made(document, margin={}).holds:
             continue

@@ -59,9 +59,9 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
     accepted = violated = 0
     for k in range(120):
         method = list(METHODS)[k % 4]
-        system = truth.random_system(rng, modules=1, bent=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.4))
+        system = truth.random_system(rng, modules=1, nonlinear=bool(rng.random() < 0.3), wild=bool(rng.random() < 0.4))
         names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
-        ranges = spans(system, names + 2 * names_of(system, bent=True), rng, 4)
+        ranges = spans(system, names + 2 * names_of(system, nonlinear=True), rng, 4)
         region = truth.box(system, float(rng.uniform(0.5, 6)))
         evidence = truth.evidence_for(method, system, region, float(10 ** rng.uniform(-2.5, -1.3)), rng)
         cert = establish("contraction", system=system, region={**region, "parameters": ranges}, evidence=evidence,
@@ -74,13 +74,13 @@ def test_no_machine_of_the_ranges_violates_an_accepted_claim():
     assert accepted > 20 and violated > 20
 
 
-def names_of(system, bent=False):
-    """Links and module properties that can be uncertain, with ``bent`` natural convection and radiation too."""
+def names_of(system, nonlinear=False):
+    """Links and module properties that can be uncertain, with ``nonlinear`` natural convection and radiation too."""
     links = ["-".join(link["between"]) for link in system["links"]]
     once = [(name, link) for name, link in zip(links, system["links"], strict=True) if links.count(name) == 1]
     more = [f"links.{name}.{key}" for name, link in once for key, part in (("natural.gain", "natural"),
                                                                            ("radiation", "radiation")) if part in link]
-    return [f"links.{name}.conductance" for name, _ in once] + more * bent + [
+    return [f"links.{name}.conductance" for name, _ in once] + more * nonlinear + [
         f"modules.m0.{prop}.{key}" for prop in ("seebeck", "resistance", "conductance") for key in ("value", "slope")]
 
 
@@ -121,7 +121,7 @@ def test_malformed_ranges_are_refused(parameters, message):
         rod("sum", 0.01, parameters)
 
 
-BENT = {**ROD, "links": [{"between": ["rod", "room"], "conductance": 0.5, "radiation": 2e-10,
+NONLINEAR = {**ROD, "links": [{"between": ["rod", "room"], "conductance": 0.5, "radiation": 2e-10,
                           "natural": {"gain": 0.1, "exponent": 0.0}}]}
 
 
@@ -132,7 +132,7 @@ def test_the_least_convection_and_radiation_decide(method):
     region = {"temperature": [280.0, 350.0], "current": {}, "parameters": ranges}
     exact = (0.5 + 0.05 + 4e-10 * 280.0**3) / 10.0
     for rate, holds in ((exact * (1 - 1e-9), True), (exact * (1 + 1e-9), False)):
-        cert = establish("contraction", system=BENT, region=region, made_by={}, margin={},
+        cert = establish("contraction", system=NONLINEAR, region=region, made_by={}, margin={},
                          evidence={"method": method, "rate": rate, **METHODS[method]})
         assert cert.holds is holds, cert.reason
     assert "'links.rod-room.natural.gain' in [0.05, 0.2]" in cert.claim
@@ -152,13 +152,13 @@ def test_a_box_is_never_left_whatever_convection_and_radiation():
     for _ in range(50):
         edge += left(edge) / (0.55 + 4e-10 * edge**3)
     for upper, holds in ((edge + 1e-6, True), (edge - 1e-6, False)):
-        cert = establish("invariance", system=BENT, region=region(upper, heat={"rod": [0.0, 10.0]}), made_by={},
+        cert = establish("invariance", system=NONLINEAR, region=region(upper, heat={"rod": [0.0, 10.0]}), made_by={},
                          evidence={}, margin={})
         assert cert.holds is holds, cert.reason
     inflow = (0.5 + 0.2) * 10.0 + 1e-9 * (330.0**4 - 320.0**4)  # from a room of 330 K, the upper face at 320 K
     for load, holds in ((inflow + 1e-6, True), (inflow - 1e-6, False)):
         warm = region(320.0, temperature=[200.0, 320.0], ambient={"room": [290.0, 330.0]}, heat={"rod": [-load, -load]})
-        assert establish("invariance", system=BENT, region=warm, made_by={}, evidence={}, margin={}).holds is holds
+        assert establish("invariance", system=NONLINEAR, region=warm, made_by={}, evidence={}, margin={}).holds is holds
 
 
 @pytest.mark.parametrize(("name", "pair", "message"), [
@@ -170,7 +170,8 @@ def test_a_box_is_never_left_whatever_convection_and_radiation():
 def test_ranges_of_convection_and_radiation_contain_the_number_of_the_system(name, pair, message):
     region = {"temperature": [280.0, 350.0], "current": {}, "parameters": {name: pair}}
     with pytest.raises(InputError, match=message):
-        establish("contraction", system=BENT, region=region, made_by={}, evidence={"method": "energy", "rate": 0.0})
+        establish("contraction", system=NONLINEAR, region=region, made_by={},
+                  evidence={"method": "energy", "rate": 0.0})
 
 
 def test_two_links_of_one_name_cannot_be_meant():
@@ -196,8 +197,8 @@ def test_no_machine_of_the_ranges_leaves_an_accepted_box():
     rng = np.random.default_rng(3)
     accepted = violated = 0
     for k in range(60):
-        system = truth.random_system(rng, modules=1, bent=k % 3 == 0, wild=k % 2 == 0)
-        ranges = spans(system, names_of(system, bent=True), rng, 4)
+        system = truth.random_system(rng, modules=1, nonlinear=k % 3 == 0, wild=k % 2 == 0)
+        ranges = spans(system, names_of(system, nonlinear=True), rng, 4)
         region = {**truth.box(system, float(rng.uniform(0.05, 1.5)), 265.0, 340.0), "ambient": {"room": [290.0, 300.0]}}
         cert = establish("invariance", system=system, region={**region, "parameters": ranges}, evidence={}, made_by={},
                          margin={})

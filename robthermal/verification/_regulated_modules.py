@@ -27,7 +27,7 @@ _MOST = 5_000  # vertices of modules that share lumps
 
 
 @dataclass(frozen=True)
-class HeldNetwork:
+class RegulatedNetwork:
     """A network in a box, and which module holds which lump; ``region`` has the set-points of held lumps."""
 
     system: ThermalSystem
@@ -49,15 +49,15 @@ class Alternative:
 
 
 @dataclass(frozen=True)
-class Grip:
-    """A holding module over its box: corners (a, κ) whose hull has all of them, the range of κ, the ends of k."""
+class RegulatingModule:
+    """A regulating module over its box: corners (a, κ) whose hull has all of them, the range of κ, the ends of k."""
 
     corners: tuple[_Pair, ...]
     factor: Interval
     conduction: Interval
 
 
-def lost_grip(network: HeldNetwork) -> str:
+def lost_regulation(network: RegulatedNetwork) -> str:
     """Return where S > 0 or S x_c - R I > 0 is not proven; empty if every module holds its lump over the whole box."""
     for c, k in network.holder.items():
         module, names = network.system.modules[k], network.system.lumps
@@ -73,28 +73,28 @@ def lost_grip(network: HeldNetwork) -> str:
     return ""
 
 
-def shares(network: HeldNetwork, method: str, pieces: int) -> tuple[Entries, Groups, str]:
+def shares(network: RegulatedNetwork, method: str, pieces: int) -> tuple[Entries, Groups, str]:
     """Return the reduced Jacobian: what is fixed, independent groups of alternatives, and what has no bound.
 
     The Jacobian lies in the hull of fixed part + one alternative of every group. Currents are cut in ``pieces``.
     """
-    grips = {c: grip(network, k, pieces) for c, k in network.holder.items()}
-    fixed, bent, missing = _links(network, method)
+    modules = {c: regulating_module(network, k, pieces) for c, k in network.holder.items()}
+    fixed, nonlinear, missing = _links(network, method)
     others, missing = _other_modules(network, pieces) if not missing else ([], missing)
-    if any(len(group) << len(_held(group, grips)) > 4 * _MOST for group in bent + others):
+    if any(len(group) << len(_regulated_lumps(group, modules)) > 4 * _MOST for group in nonlinear + others):
         return {}, [], "too many combinations of modules that share lumps with cold faces to check them one by one"
-    groups = [_passed_on(network, group, grips) for group in bent + others]
+    groups = [_passed_on(network, group, modules) for group in nonlinear + others]
     rows: dict[int, dict[int, fmpq]] = {c: {} for c in network.holder}
     for (i, j), value in fixed.items():
         if i in rows:
             rows[i][j] = value
-    groups += [_holding(network, k, grips[c], rows[c]) for c, k in network.holder.items()]
+    groups += [_holding(network, k, modules[c], rows[c]) for c, k in network.holder.items()]
     base = {place: value for place, value in fixed.items() if place[0] not in network.holder}
     return base, [group for group in groups if any(item.entries for item in group)], missing
 
 
-def grip(network: HeldNetwork, k: int, pieces: int) -> Grip:
-    """Return what module k does to its hot lump; `lost_grip` must have found nothing.
+def regulating_module(network: RegulatedNetwork, k: int, pieces: int) -> RegulatingModule:
+    """Return what module k does to its hot lump; `lost_regulation` must have found nothing.
 
     On each piece of its current, a = p - κ b with p, κ and b anywhere in their own ranges: the corners of these.
     """
@@ -108,10 +108,10 @@ def grip(network: HeldNetwork, k: int, pieces: int) -> Grip:
         corners += [(p - f * b, f) for p, f, b in product(own, factor, bend)]
     conduction = _range([form.conductance[0] + form.conductance[1] * (x - module.reference)
                          for form in network.system.forms(k) for x in hot])
-    return Grip(tuple(_outline(corners)), _range([factor for _, factor in corners]), conduction)
+    return RegulatingModule(tuple(_outline(corners)), _range([factor for _, factor in corners]), conduction)
 
 
-def _own_slopes(network: HeldNetwork, k: int, current: Interval) -> tuple[Interval, Interval]:
+def _own_slopes(network: RegulatedNetwork, k: int, current: Interval) -> tuple[Interval, Interval]:
     """Return the exact ranges of p = S I + S' x_h I/2 + R' I²/4 and b = S' x_c I/2 - R' I²/4 over currents.
 
     Affine in each temperature and parameter for a given current, quadratic in the current.
@@ -131,8 +131,8 @@ def _bounds(quadratic: Quadratic, currents: Interval) -> Interval:
     return -peak((-a, -b, -c), currents)[0], peak(quadratic, currents)[0]
 
 
-def _holding(network: HeldNetwork, k: int, own: Grip, slopes: Mapping[int, fmpq]) -> list[Alternative]:
-    """Return the alternatives of one holding module; ``slopes`` are the fixed r_j of its cold lump."""
+def _holding(network: RegulatedNetwork, k: int, own: RegulatingModule, slopes: Mapping[int, fmpq]) -> list[Alternative]:
+    """Return the alternatives of one regulating module; ``slopes`` are the fixed r_j of its cold lump."""
     module = network.system.modules[k]
     h, found = module.hot, []
     for (a, factor), conduction in product(own.corners, sorted(set(own.conduction))):
@@ -142,11 +142,12 @@ def _holding(network: HeldNetwork, k: int, own: Grip, slopes: Mapping[int, fmpq]
     return found
 
 
-def _passed_on(network: HeldNetwork, group: Sequence[Alternative], grips: Mapping[int, Grip]) -> list[Alternative]:
+def _passed_on(network: RegulatedNetwork, group: Sequence[Alternative],
+               modules: Mapping[int, RegulatingModule]) -> list[Alternative]:
     """Return alternatives with the rows of held lumps passed on to the hot lumps, with either end of their factors."""
-    held = _held(group, grips)
+    held = _regulated_lumps(group, modules)
     found = []
-    for item, factors in product(group, product(*(sorted(set(grips[c].factor)) for c in held))):
+    for item, factors in product(group, product(*(sorted(set(modules[c].factor)) for c in held))):
         at = dict(zip(held, factors, strict=True))
         entries: Entries = {}
         for (i, j), value in item.entries.items():
@@ -158,12 +159,12 @@ def _passed_on(network: HeldNetwork, group: Sequence[Alternative], grips: Mappin
     return found
 
 
-def _held(group: Sequence[Alternative], grips: Mapping[int, Grip]) -> list[int]:
+def _regulated_lumps(group: Sequence[Alternative], modules: Mapping[int, RegulatingModule]) -> list[int]:
     """Return the held lumps that a group touches."""
-    return sorted({i for item in group for i, _ in item.entries if i in grips})
+    return sorted({i for item in group for i, _ in item.entries if i in modules})
 
 
-def _links(network: HeldNetwork, method: str) -> tuple[Entries, Groups, str]:
+def _links(network: RegulatedNetwork, method: str) -> tuple[Entries, Groups, str]:
     """Return the links without columns of held lumps: fixed part, ends of slopes that vary, and what has no bound.
 
     Where less slope is always worse (losses to ambients unless P is full; for "energy" all links between free lumps)
@@ -181,13 +182,13 @@ def _links(network: HeldNetwork, method: str) -> tuple[Entries, Groups, str]:
             _add(fixed, _above(link, lumps[0], lumps[1], network.region))
         else:
             rest.append(link)
-    base, bent, missing = link_slopes(replace(network.system, links=tuple(rest)), network.region)
+    base, nonlinear, missing = link_slopes(replace(network.system, links=tuple(rest)), network.region)
     _add(fixed, _without(base, network))
     return fixed, [[Alternative(_without(entries, network), words) for entries, words, _ in items]
-                   for items in bent], missing
+                   for items in nonlinear], missing
 
 
-def _other_modules(network: HeldNetwork, pieces: int) -> tuple[Groups, str]:
+def _other_modules(network: RegulatedNetwork, pieces: int) -> tuple[Groups, str]:
     """Return the modules that hold nothing, with any currents of their ranges."""
     kept = [k for k in range(len(network.system.modules)) if k not in network.holder.values()]
     system = replace(network.system, modules=tuple(network.system.modules[k] for k in kept),
@@ -203,7 +204,7 @@ def _other_modules(network: HeldNetwork, pieces: int) -> tuple[Groups, str]:
     return groups, ""
 
 
-def _resistances(network: HeldNetwork, k: int) -> list[_Pair]:
+def _resistances(network: RegulatedNetwork, k: int) -> list[_Pair]:
     """Return R and S of a module at all ends of its mean temperature and parameters."""
     module, box = network.system.modules[k], network.region.temperature
     found = []
@@ -214,7 +215,7 @@ def _resistances(network: HeldNetwork, k: int) -> list[_Pair]:
     return found
 
 
-def _ratio(network: HeldNetwork, k: int) -> Interval:
+def _ratio(network: RegulatedNetwork, k: int) -> Interval:
     """Return the exact range of R/S [K/A]: monotone in the temperature and in each parameter, so at their ends."""
     return _range([resistance / seebeck for resistance, seebeck in _resistances(network, k)])
 
@@ -261,7 +262,7 @@ def _times(a: Interval, b: Interval) -> Interval:
     return _range([x * y for x, y in product(a, b)])
 
 
-def _without(entries: Entries, network: HeldNetwork) -> Entries:
+def _without(entries: Entries, network: RegulatedNetwork) -> Entries:
     """Drop the columns of held temperatures."""
     return {place: value for place, value in entries.items() if place[1] not in network.holder}
 

@@ -30,7 +30,7 @@ class _Holding:
     factor: Array
 
 
-def held_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian | None:
+def regulated_jacobian(system: System, region: Mapping[str, Any]) -> BoxJacobian | None:
     """Reduced Jacobian over the box of a "regulated" certificate's region.
 
     Parameters
