@@ -69,7 +69,7 @@ class Builder:
         self.n, self.m = len(self.eq.capacity), len(system.modules)
         self.control = controller_matrices(section["controller"], self.n, self.m)
         self.seen = "gain" in section
-        self.law = self.n if self.seen else 0  # where the temperatures begin that the law reads
+        self.law = self.n if self.seen else 0  # where the temperatures begin that the feedback law reads
         self.width = self.law + self.n + len(self.control["A"])
         self.time = region["sample_time"]
         self.links = box_jacobian(system, region).blocks[self.m:]

@@ -19,7 +19,7 @@ from ._jacobian import box_jacobian
 
 Array = NDArray[np.floating[Any]]
 Share = tuple[Array, Array, Array]  # heats, achieved - wanted, what moves the current
-_GRID = 9  # samples per temperature and current, for the range of the law's slopes
+_GRID = 9  # samples per temperature and current, for the range of the feedback law's slopes
 _WIDER = 0.015  # of a slope of the current: the checker encloses it cell by cell
 
 

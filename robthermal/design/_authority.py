@@ -26,7 +26,7 @@ def proven_currents(modules: ModuleSet, authority: Certificate | UsableCurrent) 
         return _usable(modules, authority)
     check_certificate(authority, modules.system, "contraction")
     check_box(modules.system, authority.region["current"], authority.region["temperature"], _WHERE)
-    warnings.warn("the currents of the law are a contraction limit inside the box; not a limit for use: the "
+    warnings.warn("the currents of the feedback law are a contraction limit inside the box; not a limit for use: the "
                   "certificate does not say that temperatures stay in its box. Pass what rt.certify.usable_current "
                   "returns.", UserWarning, stacklevel=3)
     return _ends(modules, authority.region["current"])

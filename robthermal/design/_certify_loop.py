@@ -75,7 +75,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     Parameters
     ----------
     system : System
-        The plant, which the law must have been built for: every module driven.
+        The plant, which the feedback law must have been built for: every module driven.
     controller : PID, StateFeedback or LinearController
         Sampled controller of the outer loop.
     law : FeedbackLinearization
@@ -188,7 +188,7 @@ def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:
         raise InputError("the law was built for another system", where="argument law", expected="the plant's own",
                          remedy="Build it with rt.design.feedback_linearization(system).")
     if set(law.names) != set(system.module_names):
-        raise InputError(f"the law drives {', '.join(law.names)}", where="argument law",
+        raise InputError(f"the feedback law drives {', '.join(law.names)}", where="argument law",
                          expected="every module: " + ", ".join(system.module_names))
     if np.isfinite([law.voltage_low, law.voltage_high]).any() or np.isfinite(law.slew).any():
         raise InputError("the law has a voltage or slew limit", where="argument law", expected="current limits only")

@@ -1,4 +1,4 @@
-"""What a plain controller does instead of the law: a constant gain from wanted heat to current."""
+"""What a plain controller does instead of the feedback law: a constant gain from wanted heat to current."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ConstantGain:
         wanted = self.law.modules.vector(v, "v", "W")
         asked = self.current - self.gain * (wanted - self.heat)
         optimum = self.law.bounds(temperatures).current
-        beyond = asked > optimum  # where the same heat has a smaller current too: the law must not mirror it
+        beyond = asked > optimum  # where the same heat has a smaller current too: the feedback law must not mirror it
         heat = self.law.heat(np.minimum(asked, optimum), temperatures)
         true = self.law.command(heat, temperatures, previous=previous, sample_time=sample_time)
         limit = np.where(beyond & (true.limit == ""), "optimum", true.limit)
@@ -58,7 +58,7 @@ class ConstantGain:
 
 def constant_gain(law: FeedbackLinearization, temperatures: Temperatures,
                   current: ArrayLike | Mapping[str, ArrayLike] = 0.0) -> ConstantGain:
-    """Plain alternative to a law, for comparison: its tangent at one operating point.
+    """Plain alternative to a feedback law, for comparison: its tangent at one operating point.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ class Bounds(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Heat that the limits of a law allow at given temperatures, each (..., n_modules) [W].
+    """Heat that the limits of a feedback law allow at given temperatures, each (..., n_modules) [W].
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Reach(NamedTuple):
 
 @dataclass(frozen=True)
 class Command:
-    """What the law sends to the modules, and what becomes of the wanted heat.
+    """What the feedback law sends to the modules, and what becomes of the wanted heat.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class Command:
 
 @dataclass(frozen=True)
 class FeedbackLinearization:
-    """The law I = Psi(v, x) for several modules at once; build it with `feedback_linearization`.
+    """The feedback law I = Psi(v, x) for several modules at once; build it with `feedback_linearization`.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class FeedbackLinearization:
         return Command(current, p.S * (p.hot - p.cold) + p.R * current, heat, np.where(heat == wanted, "", limit))
 
     def heat(self, current: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures) -> Array:
-        """Heat from the modules into their cold lumps, Evers (5.15), the inverse of the law.
+        """Heat from the modules into their cold lumps, Evers (5.15), the inverse of the feedback law.
 
         Parameters
         ----------
@@ -208,7 +208,7 @@ class FeedbackLinearization:
             np.where(np.isfinite(least), least, 0.0), p), np.inf))
 
     def gain(self, current: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures) -> Array:
-        """Slope -dI/dv = 1/(S x_c - R I) of the law; it diverges at the optimal current.
+        """Slope -dI/dv = 1/(S x_c - R I) of the feedback law; it diverges at the optimal current.
 
         Parameters
         ----------
@@ -245,7 +245,7 @@ class FeedbackLinearization:
         return (self.modules.vector(voltage, "voltage", "V") - p.S * (p.hot - p.cold)) / p.R
 
     def export(self, path: str | Path, name: str = "law") -> None:
-        """Write the law for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
+        """Write the feedback law for another program: C99 (.c, .h), MATLAB (.mat) or JSON (.json).
 
         C gets a step function in double that computes to the last bit what `command` computes, with a test vector;
         MATLAB and JSON get the numbers of the modules and the limits.
@@ -359,9 +359,9 @@ def _refuse_effects(modules: ModuleSet) -> None:
     """The law inverts S, R and K; it knows no other heat of a module, and no current but the one it commands."""
     for name in modules.system.effects:
         if name.startswith(tuple(f"modules.{module}." for module in modules.names)):
-            raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the law",
+            raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the feedback law",
                              where="argument system", expected="modules with Seebeck, Joule and conducted heat only",
-                             remedy="Set it to 0 for the law; what it adds is then a disturbance of v.")
+                             remedy="Set it to 0 for the feedback law; what it adds is then a disturbance of v.")
 
 
 def _stable_root(q: Array, p: Properties) -> Array:

@@ -44,7 +44,7 @@ class ClosedLoop:
     estimate : ndarray, shape (n, n_lumps)
         What the controller believed: the truth without an observer [K].
     current, voltage, wanted, achieved : ndarray, shape (n, n_modules)
-        [A], [V], heats v that were asked for and, in the law's view, achieved [W].
+        [A], [V], heats v that were asked for and, in the feedback law's view, achieved [W].
     limit : ndarray of str, shape (n, n_modules)
         Name of the active limit of every module; empty where none is active.
     outcome : Outcome
@@ -92,7 +92,7 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     Parameters
     ----------
     system : System
-        The plant; it may differ from the one the law was built for in everything but names.
+        The plant; it may differ from the one the feedback law was built for in everything but names.
     controller : Controller
         From `pid`, `state_feedback`, `linear_controller`, `feed_forward` or `disturbance_observer`.
     reference : array_like or mapping
@@ -159,7 +159,7 @@ class _Run:
         expect_controller(controller)
         base = _base(law)
         if not set(base.names) <= set(system.modules) or system.lump_names != base.system.lump_names:
-            raise InputError("lumps or modules differ from those of the law's system", where="argument system",
+            raise InputError("lumps or modules differ from those of the feedback law's system", where="argument system",
                              expected="the same names")
         if drive not in ("current", "voltage"):
             raise InputError(f"drive = {drive!r}", where="argument drive", expected='"current" or "voltage"')
@@ -181,7 +181,7 @@ class _Run:
         out = {}
         for name, values in given.items():
             if name in self.base.names:
-                raise InputError(f"{name!r} is driven by the law", where=f"argument {argument}",
+                raise InputError(f"{name!r} is driven by the feedback law", where=f"argument {argument}",
                                  remedy="Leave its current out.")
             array = np.asarray(values, float)
             if array.shape not in ((), (self.n,)) or not np.isfinite(array).all():

@@ -1,4 +1,4 @@
-"""The modules a law drives: their faces, and S, R, K at the mean temperature of the faces."""
+"""The modules a feedback law drives: their faces, and S, R, K at the mean temperature of the faces."""
 
 from __future__ import annotations
 
@@ -189,5 +189,5 @@ def _pair(pair: object, where: str, unit: str) -> tuple[float, float]:
     if not (low <= 0 <= high and low < high):
         raise InputError(f"{pair!r}", where=f"argument {where}",
                          expected=f"(lower, upper) [{unit}], lower <= 0 <= upper",
-                         remedy="The law must be able to switch the module off.")
+                         remedy="The feedback law must be able to switch the module off.")
     return low, high

@@ -1,4 +1,4 @@
-"""PI and PID with back-calculation from the heat that the law achieved."""
+"""PI and PID with back-calculation from the heat that the feedback law achieved."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ._sampling import check_sampling
 
 @dataclass(frozen=True)
 class PID(Controller):
-    """One PI or PID per module, anti-windup by back-calculation from the heat the law achieved.
+    """One PI or PID per module, anti-windup by back-calculation from the heat the feedback law achieved.
 
     v = Kp (r - y) + z - Kd ẏ_f, with z held exactly over a sample and the filtered derivative sampled exactly.
 

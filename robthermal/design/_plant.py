@@ -1,4 +1,4 @@
-"""The linear cold side that the law leaves to the outer loop, G_lin of Evers (5.19), sampled exactly."""
+"""The linear cold side that the feedback law leaves to the outer loop, G_lin of Evers (5.19), sampled exactly."""
 
 from __future__ import annotations
 

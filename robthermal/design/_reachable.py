@@ -1,4 +1,4 @@
-"""Which set-points can be held, with a load and within the limits of a law."""
+"""Which set-points can be held, with a load and within the limits of a feedback law."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Reachable:
 
 def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float, *,
               load: Mapping[str, float] | None = None, inputs: Mapping[str, float] | None = None) -> Reachable:
-    """Can these set-points be held, in steady state, with this load and within the law's current limits?
+    """Can these set-points be held, in steady state, with this load and within the feedback law's current limits?
 
     Parameters
     ----------
@@ -142,10 +142,10 @@ class _Search:
 
     @classmethod
     def of(cls, law: FeedbackLinearization, load: dict[str, float], inputs: dict[str, float]) -> _Search:
-        """Start at the steady state with the law's modules off and the load on."""
+        """Start at the steady state with the feedback law's modules off and the load on."""
         for name in law.names:
             if name in inputs:
-                raise InputError(f"{name!r} is driven by the law", where="argument inputs",
+                raise InputError(f"{name!r} is driven by the feedback law", where="argument inputs",
                                  remedy="Leave its current out.")
         found = steady_state(law.system, inputs, heat=load)
         if not found.equilibria or not found.equilibria[0].stable:
@@ -165,7 +165,7 @@ class _Search:
 
     @property
     def columns(self) -> list[int]:
-        """Columns of u with the currents of the law's modules."""
+        """Columns of u with the currents of the feedback law's modules."""
         return [self.law.system.exogenous_names.index(name) for name in self.law.names]
 
     def furthest(self, target: Array) -> tuple[float, Array, str]:
@@ -190,7 +190,7 @@ class _Search:
         return share, at_target, why
 
     def _limit(self, x: Array, current: Array) -> str:
-        """Limit of the law that these currents exceed."""
+        """Limit of the feedback law that these currents exceed."""
         active = self.law.command(self.law.heat(current, x), x).limit
         return next((str(name) for name in active if name), "")
 

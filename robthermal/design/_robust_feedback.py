@@ -43,7 +43,7 @@ class RobustGain:
 
 
 def corner_plants(plain: ConstantGain, *, current: Interval, temperature: Interval) -> list[control.StateSpace]:
-    """Cold sides that a constant gain leaves at the corners of a box: what the law would have made one plant.
+    """Cold sides that a constant gain leaves at the corners of a box: what the feedback law would have made one plant.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ from ._outcomes import DesignCode
 
 @dataclass(frozen=True)
 class StepResponseLinearity:
-    """Normalized step responses (y - y0)/step with the law and with its constant-gain tangent.
+    """Normalized step responses (y - y0)/step with the feedback law and with its constant-gain tangent.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ class StepResponseLinearity:
     linearized, plain : ndarray, shape (n_steps, n, n_modules)
         Normalized responses of the linearized loop and of the constant-gain loop [-].
     after, before : float
-        Largest spread between the steps at one time, with the law and without: 0 is a linear loop.
+        Largest spread between the steps at one time, with the feedback law and without: 0 is a linear loop.
     outcome : Outcome
-        "collapsed", or "limited" when a limit of the law was active in a step: a saturated loop cannot scale.
+        "collapsed", or "limited" when a limit of the feedback law was active in a step: a saturated loop cannot scale.
     """
 
     time: Array
@@ -56,7 +56,7 @@ class StepResponseLinearity:
         return self.before / self.after if self.after > 0 else np.inf
 
     def __str__(self) -> str:
-        return f"spread {self.before:.4f} without the law, {self.after:.4f} with it. {self.outcome}"
+        return f"spread {self.before:.4f} without the feedback law, {self.after:.4f} with it. {self.outcome}"
 
     def plot(self) -> Any:
         """Plot both families of normalized responses, like Evers figures 5.14-5.15; returns the matplotlib axes."""
@@ -84,7 +84,7 @@ def step_response_linearity(
     system : System
         System that is the plant of both loops.
     controller : Controller
-        Used for both; the constant gain is the tangent of the law at the base, so that small steps agree.
+        Used for both; the constant gain is the tangent of the feedback law at the base, so that small steps agree.
     law : FeedbackLinearization
         Linearizing feedback law of the first loop.
     base : float

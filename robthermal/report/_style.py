@@ -1,4 +1,4 @@
-"""House style of every drawing."""
+"""Style that all drawings share."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def establish(kind: str, *, system: Mapping[str, Any], region: Mapping[str, Any]
 
 def not_certified(kind: str, *, system: Mapping[str, Any], region: Mapping[str, Any], evidence: Mapping[str, Any],
                   reason: str, made_by: Mapping[str, Any], claim: str = "") -> Certificate:
-    """Make the certificate of an honest no, where there is no evidence that could be checked.
+    """Make the certificate of a claim that is not proven: there is no evidence that could be checked.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def test_a_wrong_model_still_settles_by_integral_action(system, law, pi):
 @pytest.mark.parametrize(("arguments", "message"), [
     ({"reference": 15.0}, "set-point is 15 K.*273.15"),
     ({"drive": "power"}, "current.*voltage"),
-    ({"inputs": {"m1": 1.0}}, "'m1' is driven by the law"),
+    ({"inputs": {"m1": 1.0}}, "'m1' is driven by the feedback law"),
     ({"load": {"x11": np.ones(3)}}, "shape \\(3,\\).*one per sample"),
     ({"law": 3}, "law is a int"),
     ({"duration": -1.0}, "duration"),

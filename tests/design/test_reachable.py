@@ -48,7 +48,7 @@ def test_reachable_set_points_give_their_currents(law, system):
     assert rt.design.reachable(law, 308.15).outcome  # heating
     with pytest.raises(rt.InputError, match="kelvin"):
         rt.design.reachable(law, 10.0)
-    with pytest.raises(rt.InputError, match="'m1' is driven by the law"):
+    with pytest.raises(rt.InputError, match="'m1' is driven by the feedback law"):
         rt.design.reachable(law, 290.0, inputs={"m1": 1.0})
 
 

@@ -1,4 +1,4 @@
-"""Files of frequency responses that somebody or something has damaged: refused in words, nothing else."""
+"""Files of frequency responses that somebody or something has damaged: rejected with a message, nothing else."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_a_damaged_index_of_an_archive(content: dict[str, Any], tmp_path: Path) 
 
 
 def test_ten_thousand_damaged_matlab_files_never_crash(content: dict[str, Any], tmp_path: Path) -> None:
-    """Bytes overwritten, cut off or doubled: loaded if it still can be, refused in words otherwise."""
+    """Bytes overwritten, cut off or doubled: loaded if it still can be, rejected with a message otherwise."""
     path, mat = tmp_path / "G.json", tmp_path / "G.mat"
     path.write_text(json.dumps(content), encoding="utf-8")
     rt.identify.FrequencyResponse.load(path).save(mat)
