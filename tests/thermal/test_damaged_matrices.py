@@ -1,4 +1,4 @@
-"""Files of matrices that somebody or something has damaged: rejected with a message; whole ones are read as scipy does."""
+"""Files of matrices that somebody or something has damaged: rejected with a message; whole ones read as by scipy."""
 
 from __future__ import annotations
 
