@@ -113,3 +113,32 @@ def positive_number(value: object, where: str, unit: str = "") -> float:
         raise InputError(f"{where} is {number!r}", where=f"argument {where}",
                          expected=f"a positive number{f' [{unit}]' if unit else ''}")
     return number
+
+
+def whole_number(value: object, where: str, least: int) -> int:
+    """`value` as an int not below `least`; fractions, text, booleans, NaN and infinity are refused.
+
+    Parameters
+    ----------
+    value : object
+        What the caller gave.
+    where : str
+        Name of the argument, for the message.
+    least : int
+        Smallest number that is accepted.
+
+    Raises
+    ------
+    InputError
+        Naming the argument and its value.
+
+    Examples
+    --------
+    >>> whole_number(3.0, "periods", 1)
+    3
+    """
+    number = finite_number(value, where)
+    if number != int(number) or number < least:
+        raise InputError(f"{where} is {quoted(value)}", where=f"argument {where}",
+                         expected=f"a whole number of at least {least}")
+    return int(number)

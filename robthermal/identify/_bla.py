@@ -11,8 +11,9 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
+from .._checks import whole_number
 from ._etfe import check_equal_lengths, least_squares_over
-from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 

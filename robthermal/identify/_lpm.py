@@ -10,9 +10,10 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
+from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalArrays, LocalEstimate
-from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 

@@ -11,10 +11,11 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
+from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, rounding_of, spectrum_of, whole_number
+from ._records import as_records, check_excitation, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 from ._threads import run_all

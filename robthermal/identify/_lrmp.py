@@ -9,10 +9,11 @@ import numpy as np
 
 from robthermal.signals import Record
 
+from .._checks import whole_number
 from ._basis import LocalBasis
 from ._lpm import estimate_locally
 from ._poles import given_poles, most_poles, poles_from_data
-from ._records import as_records, check_excitation, spectrum_of, whole_number
+from ._records import as_records, check_excitation, spectrum_of
 from ._response import FrequencyResponse
 
 

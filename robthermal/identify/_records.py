@@ -103,14 +103,6 @@ def _is_constant(column: Array) -> bool:
     return bool(column.std() <= _SILENT * np.abs(column).max())
 
 
-def whole_number(value: Any, name: str, *, least: int) -> int:
-    """`value` as an int not below `least`; fractions, text, NaN and booleans are refused by name."""
-    wrong = isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating))
-    if wrong or not np.isfinite(value) or value != int(value) or value < least:
-        raise InputError(f"{name} is {value!r}", where=name, expected=f"a whole number of at least {least}")
-    return int(value)
-
-
 @dataclass(frozen=True)
 class Spectrum:
     """DFT of one record, normalized by 1/sqrt(N), bins 1 ... (N-1)//2: Evers (4.2). Bin 0 and Nyquist are left out."""

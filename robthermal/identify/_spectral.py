@@ -11,9 +11,10 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
+from .._checks import whole_number
 from ._etfe import least_squares_over
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, rounding_level, whole_number
+from ._records import as_records, check_excitation, rounding_level
 from ._response import FrequencyResponse
 
 WINDOWS = ("hann", "rectangular")

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from .._checks import whole_number
 from ..errors import InputError
 from ._checks import Array
-from ._excitation_settings import whole_number
 
 Complex = NDArray[np.complex128]
 

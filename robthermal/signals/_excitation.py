@@ -9,20 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import dft, hadamard
 
+from .._checks import whole_number
 from ..errors import InputError
 from ._checks import Array, positive_number
 from ._crest import crest_of, schroeder_phases, wave_of
 from ._excitation_set import Excitation
-from ._excitation_settings import (
-    Lines,
-    given_lines,
-    line_amplitudes,
-    one_of,
-    per_input,
-    scaled,
-    shifted,
-    whole_number,
-)
+from ._excitation_settings import Lines, given_lines, line_amplitudes, one_of, per_input, scaled, shifted
 from ._multisine import chosen_phases
 
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
+from .._checks import whole_number
 from ..errors import InputError
 from ._checks import Array, finite_number, positive_number
-from ._excitation_settings import band_limits, held_samples, shifted, whole_number
+from ._excitation_settings import band_limits, held_samples, shifted
 
 _ORDER = 4  # of the Butterworth filter
 _SETTLED = 1e-8  # of the filter's memory that may be left at the first sample

@@ -8,18 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._checks import whole_number
 from ..errors import InputError
 from ._checks import Array, finite_number, positive_number
 
 Lines = NDArray[np.intp]
-
-
-def whole_number(value: object, where: str, least: int) -> int:
-    """`value` as an int not below `least`."""
-    number = finite_number(value, where)
-    if number != int(number) or number < least:
-        raise InputError(f"{where} is {value!r}", where=f"argument {where}", expected=f"a whole number from {least}")
-    return int(number)
 
 
 def exactly_one(first: str, a: object, second: str, b: object) -> None:

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._checks import whole_number
 from ._checks import Array, positive_number
 from ._crest import low_crest_phases, schroeder_phases, wave_of
-from ._excitation_settings import Lines, given_lines, line_amplitudes, one_of, scaled, shifted, whole_number
+from ._excitation_settings import Lines, given_lines, line_amplitudes, one_of, scaled, shifted
 
 PHASES = ("random", "schroeder", "low_crest")
 
