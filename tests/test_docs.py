@@ -34,9 +34,9 @@ def test_every_public_name_is_on_a_page(built: Path) -> None:
     inventory = InventoryFile.loads((built / "objects.inv").read_bytes(), uri="")
     on_a_page = {name for kind, entries in inventory.data.items() if kind.startswith("py:") for name in entries}
     public = {
-        f"robthermal.{room}.{name}"
-        for room in rt._PACKAGES
-        for name in getattr(import_module(f"robthermal.{room}"), "__all__", ["InputError", "Diverged", "Outcome"])
+        f"robthermal.{package}.{name}"
+        for package in rt._PACKAGES
+        for name in getattr(import_module(f"robthermal.{package}"), "__all__", ["InputError", "Diverged", "Outcome"])
     }
     assert not public - on_a_page
 

@@ -101,15 +101,15 @@ SURFACE = {
 }
 
 
-@pytest.mark.parametrize("room", SURFACE)
-def test_public_names_are_the_listed_ones(room: str) -> None:
-    found, listed = set(public_names(room)), set(SURFACE[room].split())
+@pytest.mark.parametrize("package", SURFACE)
+def test_public_names_are_the_listed_ones(package: str) -> None:
+    found, listed = set(public_names(package)), set(SURFACE[package].split())
     gone, new = sorted(listed - found), sorted(found - listed)
-    assert not gone, f"{room}: a public name went. A script may use it: keep it, or say so in the changelog: {gone}"
-    assert not new, f"{room}: list the new public names here, and in the changelog: {new}"
+    assert not gone, f"{package}: a public name went. A script may use it: keep it, or say so in the changelog: {gone}"
+    assert not new, f"{package}: list the new public names here, and in the changelog: {new}"
 
 
-def test_every_room_is_listed() -> None:
+def test_every_package_is_listed() -> None:
     assert set(SURFACE) == {"robthermal", *rt._PACKAGES, *rt._FORMER}
 
 
@@ -130,16 +130,16 @@ def test_former_name_of_the_jobs_is_imported_as_before() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def public_names(room: str) -> list[str]:
-    """What a room exports."""
-    module = rt if room == "robthermal" else import_module(f"robthermal.{room}")
-    if room == "errors":  # one file, no export list: everything it defines
+def public_names(package: str) -> list[str]:
+    """What a package exports."""
+    module = rt if package == "robthermal" else import_module(f"robthermal.{package}")
+    if package == "errors":  # one file, no export list: everything it defines
         return [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
     return list(module.__all__)
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:
-    """What makes `import robthermal` slow must wait for the room that needs it, down to single submodules."""
+    """What makes `import robthermal` slow must wait for the package that needs it, down to single submodules."""
     heavy = ("scipy", "matplotlib", "cvxpy", "clarabel", "pandas", "control", "joblib", "flint", "pydantic", "numpy")
     code = "import sys, robthermal, robthermal as rt; rt.InputError, dir(rt); print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
@@ -147,12 +147,12 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert [name for name in loaded if name.split(".")[0] in heavy] == []
 
 
-@pytest.mark.parametrize(("room", "unused"), [
+@pytest.mark.parametrize(("package", "unused"), [
     ("errors", ("numpy", "scipy", "pandas")), ("verification", ("scipy", "pandas", "control", "cvxpy", "matplotlib")),
     ("signals", ("cvxpy", "control", "matplotlib")), ("thermal", ("cvxpy", "clarabel")),
     ("identify", ("cvxpy", "clarabel"))])
-def test_rooms_load_no_more_than_they_need(room: str, unused: tuple[str, ...]) -> None:
-    code = f"import sys, robthermal.{room}; print(*sys.modules)"
+def test_packages_load_no_more_than_they_need(package: str, unused: tuple[str, ...]) -> None:
+    code = f"import sys, robthermal.{package}; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True
                                 ).stdout.split())
     assert not loaded & set(unused)

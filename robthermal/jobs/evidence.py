@@ -30,11 +30,11 @@ def write_certification(checked: Sequence[Checked], report: Report, folder: Path
     Parameters
     ----------
     checked : sequence of Checked
-        Certificates.
+        Certificates with their independent checks.
     report : Report
         What to show, as yet without evidence.
     folder : Path
-        Where.
+        Existing folder to write into.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def no_better(claim: Claim, evidence: Evidence) -> Claim:
     Parameters
     ----------
     claim : Claim
-        As found.
+        Claim as the job states it.
     evidence : Evidence
         Of its certificate.
     """
@@ -106,7 +106,7 @@ def machine_of(certificate: Certificate) -> str:
     """Short hash of the machine a certificate is about; empty where it names none."""
     try:
         return machine_hash(certificate.system)
-    except InputError:  # an honest no may come without a system
+    except InputError:  # a claim that is not proven may come without a system
         return ""
 
 
@@ -118,7 +118,7 @@ def write_report(report: Report, folder: Path) -> Report:
     report : Report
         What to show.
     folder : Path
-        Where.
+        Existing folder to write into.
     """
     write_html(report, folder / "report.html")
     write_junit(report, folder / "junit.xml")

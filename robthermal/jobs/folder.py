@@ -68,7 +68,7 @@ def check_free(target: Path) -> None:
     Parameters
     ----------
     target : Path
-        Output folder.
+        Output folder about to be written.
 
     Raises
     ------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from .._write import whole_file
 from ..errors import InputError
 from ..report import (
     Claim,
@@ -202,15 +202,10 @@ def _distrusted(report: Report, folder: Path) -> Report:
 
 
 def _write(report: Report, folder: Path) -> None:
-    """All files beside the folder first: an interrupt leaves the old ones."""
-    try:
-        partial = Path(tempfile.mkdtemp(prefix=".report.", dir=folder))
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(folder)) from None
-    try:
-        written = [write_html(report, partial / "report.html"), write_junit(report, partial / "junit.xml"),
-                   write_json(report, partial / "summary.json")]
-        for file in written:
-            os.replace(file, folder / file.name)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    """All files beside the old ones first: an interrupt leaves those."""
+    with ExitStack() as written:
+        page, junit, summary = (written.enter_context(whole_file(folder / name))
+                                for name in ("report.html", "junit.xml", "summary.json"))
+        write_html(report, page)
+        write_junit(report, junit)
+        write_json(report, summary)

@@ -198,7 +198,7 @@ def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange]
     current, measured : mapping
         Ranges of the claims and of the records, by module [A].
     rows : sequence of UsableRange
-        Usable currents.
+        Usable currents of every module.
     inside : bool
         Whether a certified box for exactly the claimed currents lies inside the stated one.
     """

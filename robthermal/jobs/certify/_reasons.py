@@ -18,7 +18,7 @@ def certification_reasons(result: Certification, measured: Mapping[str, tuple[fl
     Parameters
     ----------
     result : Certification
-        From `certify_system`.
+        Certification, as `certify_system` returns it.
     measured : mapping, optional
         Range of the currents in the records, by module [A].
     """

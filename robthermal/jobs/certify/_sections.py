@@ -7,10 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from ..._celsius import ZERO_CELSIUS
 from ...report import Figure, Section, Table, box_ranges, house_style
 from ..claims import Certification
-
-_ZERO = 273.15
 
 
 def limit_section(result: Certification) -> Section:
@@ -19,7 +18,7 @@ def limit_section(result: Certification) -> Section:
     rows = [{"direction": limit.direction, "method": limit.method, "contraction limit [A]": limit.current,
              "proven": limit.certificate.holds} for limit in result.limits]
     text = ("Contraction limit inside the box; not a limit for use: it holds only while all lumps are between "
-            f"{low - _ZERO:.6g} and {high - _ZERO:.6g} °C, and such a current may leave that box.")
+            f"{low - ZERO_CELSIUS:.6g} and {high - ZERO_CELSIUS:.6g} °C, and such a current may leave that box.")
     return Section("Contraction limits", text, tables=(Table(pd.DataFrame(rows), "Contraction limits."),),
                    anchor="limits")
 
@@ -47,7 +46,7 @@ def box_section(result: Certification) -> Section | None:
     box = result.safe.temperature
     if not box:
         return None
-    low, high = (np.array([pair[side] for pair in box.values()]) - _ZERO for side in (0, 1))
+    low, high = (np.array([pair[side] for pair in box.values()]) - ZERO_CELSIUS for side in (0, 1))
     figure = Figure.draw(box_ranges(list(box), low, high), alt="Range of every lump temperature in the box.",
                          caption="Range that each lump cannot leave, °C.")
     what = "currents, heats and ambients" if result.system.modules else "heats and ambients"

@@ -13,7 +13,7 @@ def certify_table(result: Certification) -> dict[str, Any]:
     Parameters
     ----------
     result : Certification
-        From `certify_system`.
+        Certification, as `certify_system` returns it.
     """
     calibrated = result.boxes.parameters == "calibration" and result.parameters is not None
     return {"confidence": result.boxes.confidence if calibrated else None,

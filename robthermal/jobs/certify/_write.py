@@ -21,11 +21,11 @@ def write_certify(result: Certification, files: tuple[Path, ...], out: str | Pat
     Parameters
     ----------
     result : Certification
-        From `certify_system`.
+        Certification, as `certify_system` returns it.
     files : tuple of Path
         Input files, for their hashes.
     out : str or Path
-        Output folder.
+        Output folder to create or replace.
 
     Returns
     -------

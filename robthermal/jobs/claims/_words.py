@@ -7,10 +7,10 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from math import log
 from typing import Any
 
+from ..._celsius import ZERO_CELSIUS
 from ...report import Claim, Parameters
 from ...verification import Certificate, Verdict
 
-_ZERO = 273.15
 _ENDING = "_ranges"
 _LISTED = 3  # parameters named in the box of a claim; the exact claim names all
 _TITLES = {  # by key; the first is the one of a job
@@ -100,7 +100,7 @@ def box_of(certificate: Certificate) -> str:
     parts = [f"{name}: {inward(*pair)} A" for name, pair in _pairs(region, "current")]
     box = region.get("temperature")
     if isinstance(box, Mapping):
-        ends = [float(value) - _ZERO for pair in box.values() for value in pair]
+        ends = [float(value) - ZERO_CELSIUS for pair in box.values() for value in pair]
         overall = outward if certificate.kind == "invariance" else inward
         parts.append(f"every lump in its own range, overall {overall(min(ends), max(ends), 3)} °C")
     elif isinstance(box, (list, tuple)):
@@ -125,7 +125,7 @@ def outward(low: Any, high: Any, digits: int = 6) -> str:
 
 
 def _celsius(pair: Any) -> str:
-    low, high = (float(end) - _ZERO for end in pair)
+    low, high = (float(end) - ZERO_CELSIUS for end in pair)
     return inward(low, high)
 
 

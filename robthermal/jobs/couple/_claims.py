@@ -23,7 +23,7 @@ def coupling_claims(result: Coupling) -> Iterator[Claim]:
     Parameters
     ----------
     result : Coupling
-        From `couple_subsystems`.
+        Coupling, as `couple_subsystems` returns it.
     """
     filters = result.filters
     if not filters.holds:
@@ -41,7 +41,7 @@ def coupling_assumptions(result: Coupling) -> Iterator[str]:
     Parameters
     ----------
     result : Coupling
-        From `couple_subsystems`.
+        Coupling, as `couple_subsystems` returns it.
     """
     yield "Subsystems, controllers and filters are linear and do not vary with time; no actuator saturates."
     yield ("Certificates speak of the floating-point numbers of models, controllers and filters in their files. MA, "

@@ -65,7 +65,7 @@ def couple_subsystems(job: CouplingJob, progress: Callable[[str], None] = lambda
     Parameters
     ----------
     job : CouplingJob
-        From `read_coupling`.
+        Coupling job, as `read_coupling` returns it.
     progress : callable, optional
         Called with a sentence before every stage.
 

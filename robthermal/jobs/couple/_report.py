@@ -27,7 +27,7 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
     Parameters
     ----------
     result : Coupling
-        From `couple_subsystems`.
+        Coupling, as `couple_subsystems` returns it.
     out : str or Path
         Output folder: coupling.json with the filters (coupling.c, .h, .mat if the job says so), report.html,
         junit.xml, summary.json, ``certificates/*.json``.

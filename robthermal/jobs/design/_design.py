@@ -214,8 +214,8 @@ def _certified_observer(kalman: GainObserver | None, request: DesignRequest,
         return None, None
     certificate = kalman.certify(pairs, request.temperature)
     system = kalman.model.system
-    bent = any(link.natural is not None or link.radiation is not None for link in system.links)
-    if certificate.holds or bent:  # a positive gain needs linear links
+    nonlinear = any(link.natural is not None or link.radiation is not None for link in system.links)
+    if certificate.holds or nonlinear:  # a positive gain needs linear links
         return kalman, certificate
     other = observer(system, request.sensors, sample_time=request.sample_time, method="positive", current=pairs,
                      temperature=request.temperature)

@@ -22,9 +22,9 @@ _PI = ("v = proportional (r - x_cold) + z, then the law gives I and v_achieved, 
        "z <- z + sample_time integral (r - x_cold) + (1 - exp(-sample_time/tracking_time)) (v_achieved - v). "
        "Start with z = v_achieved of the current that flows.")
 _OBSERVER = ("x <- A_d x + Gamma f + L (y - C x); y = reference + (reading - offset - reference)/gain; C x is x at the "
-             "sensors' lumps; f = B w + modules + bent links, w: heaters, then ambients. A module adds S x_hot I + "
-             "R I^2/2 - (K - conductance.value)(x_hot - x_cold) to its hot lump and -S x_cold I + R I^2/2 + "
-             "(K - conductance.value)(x_hot - x_cold) to its cold lump, S, R, K at x. A bent link takes "
+             "sensors' lumps; f = B w + modules + nonlinear links, w: heaters, then ambients. A module adds S x_hot I "
+             "+ R I^2/2 - (K - conductance.value)(x_hot - x_cold) to its hot lump and -S x_cold I + R I^2/2 + "
+             "(K - conductance.value)(x_hot - x_cold) to its cold lump, S, R, K at x. A nonlinear link takes "
              "gain |dT|^exponent dT + radiation (Ta^4 - Tb^4), dT = Ta - Tb, from its first end to its second. Once "
              "per sample, with the reading and the current of this sample; the law uses x before it.")
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..._celsius import ZERO_CELSIUS
 from ...design import ClosedLoop, GainObserver
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
@@ -22,7 +23,6 @@ from ._design import ControllerDesign
 from ._file import write_design_file
 from ._limits import BELOW_FOLD
 
-_ZERO = 273.15
 _LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
 
 
@@ -32,7 +32,7 @@ def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | P
     Parameters
     ----------
     result : ControllerDesign
-        From `design_system`.
+        Design, as `design_system` returns it.
     files : tuple of Path
         Input files, for their hashes.
     out : str or Path
@@ -93,7 +93,8 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
         lump, (_, high) = max(box.items(), key=lambda item: item[1][1])
         top = result.request.temperature[1]
         yield Reason("fail", GateCode.CURRENT_BEYOND_INVARIANCE.code, "design", lump, "With these current limits "
-                     f"{lump} may reach {high - _ZERO:.1f} °C, beyond the {top - _ZERO:.1f} °C of the stated box.",
+                     f"{lump} may reach {high - ZERO_CELSIUS:.1f} °C, beyond the {top - ZERO_CELSIUS:.1f} °C of the "
+                     "stated box.",
                      "The set-points need more than the usable current: cool the hot side better, move the "
                      "set-points, or narrow ambients and heats.", high, top)
     yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
@@ -117,7 +118,7 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
 
 def _controller_section(result: ControllerDesign) -> Section:
     c, law, fold = result.controller, result.law, result.certification.runaway
-    rows = [{"module": name, "set-point [°C]": result.request.setpoint[name] - _ZERO,
+    rows = [{"module": name, "set-point [°C]": result.request.setpoint[name] - ZERO_CELSIUS,
              "lower limit [A]": law.current_low[i], "upper limit [A]": law.current_high[i],
              "needed [A]": result.reach.current[name], "I* [A]": fold.current[name] if fold else float("nan"),
              "Kp [W/K]": c.proportional[i], "Ki [W/(K s)]": c.integral[i]}

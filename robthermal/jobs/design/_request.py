@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
 from ...thermal import System
 from ..request import Method, boxes_from_text
@@ -115,7 +116,7 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
     temperature : tuple of float, optional
         Box of all lumps [unit of the file].
     bandwidth, sample_time : float
-        [rad/s], [s].
+        Bandwidth of the closed loop [rad/s] and time between two samples [s].
     sensors : str, optional
         Names, separated by commas; default the first sensor on every lump that does not lag.
     method : str
@@ -163,4 +164,4 @@ def _sensors(system: System, text: str | None, sample_time: float) -> tuple[str,
 
 def celsius(kelvin: float) -> str:
     """For people."""
-    return f"{kelvin - 273.15:.4g} °C"
+    return f"{kelvin - ZERO_CELSIUS:.4g} °C"

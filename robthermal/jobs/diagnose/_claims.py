@@ -22,7 +22,7 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
     Parameters
     ----------
     result : Diagnosed
-        From `diagnose_records`.
+        Diagnosis, as `diagnose_records` returns it.
     """
     found = result.diagnosis
     names = ", ".join(effect.label for effect in found.effects)

@@ -31,7 +31,7 @@ class Residuals:
     name : str
         Of the record.
     time : ndarray, shape (n,)
-        Sample times [s].
+        Times of the samples [s].
     before, after : dict
         {sensor: measured − model (n,)} [K], nominal system refitted and with the effects; nan if the model runs away.
     """
@@ -116,7 +116,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     Parameters
     ----------
     system : System
-        Nominal.
+        System with nominal parameters.
     files : tuple of Path
         Input files, for their hashes.
     train, validation : sequence of Record or FrequencyResponse

@@ -31,7 +31,7 @@ def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
     Parameters
     ----------
     result : Diagnosed
-        From `diagnose_records`.
+        Diagnosis, as `diagnose_records` returns it.
     out : str or Path
         Output folder: diagnosis.json, augmented.toml, report.html, report.json, junit.xml, summary.json;
         next_experiment.csv if one was found.

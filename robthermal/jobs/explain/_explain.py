@@ -32,7 +32,7 @@ class Explanation:
     what : str
         "effect", "certificate", "outcome", "reason" or "error".
     meaning : tuple of str
-        Paragraphs.
+        Paragraphs that say what it means.
     details : dict of str to tuple of str
         By heading: assumptions, confusable partners, what separates them.
     page : str

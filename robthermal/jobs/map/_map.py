@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from joblib import cpu_count
 
+from ..._celsius import ZERO_CELSIUS
 from ...certify import LimitMap, UsableCurrent, limit_map, runaway
 from ...errors import InputError
 from ...report import Figure, Report, Section, Table, house_style
@@ -116,9 +117,9 @@ def map_system(system: System, request: MapRequest,
     Parameters
     ----------
     system : System
-        With modules.
+        System with at least one module.
     request : MapRequest
-        Conditions.
+        Conditions that the map covers.
     progress : callable, optional
         Called with how many ambients and set-points are done, and how many there are.
 
@@ -150,7 +151,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
     Parameters
     ----------
     result : LimitMap
-        From `map_system`.
+        Map, as `map_system` returns it.
     system : System
         Of the map.
     files : tuple of Path
@@ -200,7 +201,7 @@ def _conditions(result: LimitMap, system: System) -> list[tuple[UsableCurrent, s
 
 
 def _condition(ambient: float, load: float, unit: str) -> str:
-    value, name = (ambient, "K") if unit == "K" else (ambient - 273.15, "°C")
+    value, name = (ambient, "K") if unit == "K" else (ambient - ZERO_CELSIUS, "°C")
     return f"ambient {value:.4g} {name}, load {load:.4g} W"
 
 
@@ -220,7 +221,7 @@ def in_unit(data: pd.DataFrame, unit: str) -> pd.DataFrame:
     """Map with its temperatures in the unit of the system file, and said in the column names."""
     if unit == "K":
         return data
-    out = data.assign(**{name: data[name] - 273.15 for name in ("ambient [K]", "setpoint [K]")}).round(9)
+    out = data.assign(**{name: data[name] - ZERO_CELSIUS for name in ("ambient [K]", "setpoint [K]")}).round(9)
     return out.rename(columns={"ambient [K]": "ambient [degC]", "setpoint [K]": "setpoint [degC]"})
 
 

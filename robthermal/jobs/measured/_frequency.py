@@ -115,13 +115,13 @@ def design_excitation(names: Sequence[str], *, period: int, sample_time: float, 
     Parameters
     ----------
     names : sequence of str
-        Input columns.
+        Names of the input columns.
     period, periods : int
         Samples in a period, and how many periods.
     sample_time : float
-        [s].
+        Time between two samples [s].
     band : tuple of float
-        Excited frequencies [Hz].
+        Lowest and highest excited frequency [Hz].
     amplitude : float
         Largest deviation from the mean [unit of the inputs].
     nonnegative : bool
@@ -154,9 +154,9 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
     Parameters
     ----------
     u : Excitation
-        From `design_excitation`.
+        Excitation, as `design_excitation` returns it.
     names : sequence of str
-        Input columns.
+        Names of the input columns.
     path : Path
         File to write (.csv, .parquet, .mat).
 

@@ -18,7 +18,7 @@ def reading_from_text(record: Sequence[str], column: Sequence[str]) -> tuple[Rea
     Parameters
     ----------
     record, column : sequence of str
-        As typed.
+        Command-line values, each KEY=VALUE or NAME=HEADER.
 
     Returns
     -------
@@ -48,7 +48,7 @@ def read_files(paths: Sequence[Path], system: System | None = None, *, tables: S
     Parameters
     ----------
     paths : sequence of Path
-        Measured files.
+        Paths of the measured files.
     system : System, optional
         Gives the columns, and its own [record] and [columns].
     tables : sequence
@@ -84,11 +84,11 @@ def import_reports(paths: Sequence[Path], system: System | None = None, *,
     Parameters
     ----------
     paths : sequence of Path
-        Measured files.
+        Paths of the measured files.
     system : System, optional
         Gives the columns; without one every column is listed as unused.
     tables : sequence
-        From `reading_from_text`.
+        Tables [record] and [columns], as `reading_from_text` returns them.
 
     Returns
     -------

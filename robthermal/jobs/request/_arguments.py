@@ -28,7 +28,7 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     current, ambient : sequence of str
         ``NAME=LO:HI`` [A], [unit of the file].
     setpoint : sequence of str
-        ``NAME=VALUE`` [unit of the file].
+        Set-points as ``NAME=VALUE`` [unit of the file].
     method : str
         "energy", "sum", "max" or "lyapunov".
     structure : str

@@ -185,7 +185,7 @@ class Project:
     system : System
         Nominal system with its [fit] ranges.
     train, validation : tuple of Path
-        Record files.
+        Paths of the record files to fit and to validate on.
     median_filter : float or None
         Length of a median filter for the outputs [s], None for none.
     initial, loss : str
@@ -226,7 +226,7 @@ def read_project(path: str | Path) -> Project:
     Parameters
     ----------
     path : str or Path
-        PROJECT.toml.
+        Project file to read, TOML.
 
     Returns
     -------

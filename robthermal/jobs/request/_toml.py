@@ -31,7 +31,7 @@ def read_text(path: Path, kind: str, largest: int = _MAX_BYTES) -> str:
     kind : str
         What it should be, for the message.
     largest : int
-        Bytes.
+        Largest accepted size [bytes].
     """
     try:
         if path.stat().st_size > largest:
@@ -49,7 +49,7 @@ def read_toml(path: Path, schema: type[T], remedy: str) -> T:
     Parameters
     ----------
     path : Path
-        File.
+        TOML file to read.
     schema : type
         What it must look like.
     remedy : str
@@ -69,9 +69,9 @@ def refusal(error: ValidationError, path: Path, remedy: str) -> InputError:
     Parameters
     ----------
     error : ValidationError
-        From pydantic.
+        Validation error that pydantic raised.
     path : Path
-        File.
+        File that the table comes from.
     remedy : str
         Where the user finds the keys.
     """

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..._celsius import ZERO_CELSIUS
 from ...report import Reason
 from ...signals import Record
 from ..certify import certification_reasons, remark
@@ -26,7 +27,7 @@ def gate_reasons(result: JobResult) -> tuple[Reason, ...]:
     Parameters
     ----------
     result : JobResult
-        From `run_job`.
+        Result of the main job, as `run_job` returns it.
     """
     found = [*_misfits(result.misfits), *_records(result), *_diagnosis(result), *_parameters(result),
              *certification_reasons(result.certification, measured_currents(result)), *_outside(result)]
@@ -121,8 +122,9 @@ def _outside(result: JobResult) -> Iterator[Reason]:
         reach = max(low - float(ends.min()), float(ends.max()) - high)
         if reach > _FAR:
             yield remark(GateCode.OUTSIDE_DATA, "certify", "temperature",
-                          f"The claims reach from {ends.min() - 273.15:.0f} to {ends.max() - 273.15:.0f} °C; the "
-                          f"records hold {low - 273.15:.0f} to {high - 273.15:.0f} °C.", reach, _FAR)
+                         f"The claims reach from {ends.min() - ZERO_CELSIUS:.0f} to {ends.max() - ZERO_CELSIUS:.0f} "
+                         f"°C; the records hold {low - ZERO_CELSIUS:.0f} to {high - ZERO_CELSIUS:.0f} °C.",
+                         reach, _FAR)
     measured = measured_currents(result)
     for name, (least, most) in result.certification.current.items():
         largest = max(abs(end) for end in measured[name])

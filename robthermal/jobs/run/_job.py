@@ -33,7 +33,7 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
     Parameters
     ----------
     project : Project
-        From `read_project`.
+        Project, as `read_project` returns it.
     progress : callable, optional
         Called with a sentence before every stage.
 

@@ -102,7 +102,7 @@ def noise_of_readings(readings: Array) -> float:
     Parameters
     ----------
     readings : ndarray, shape (n,)
-        Measured [K].
+        Measured readings of one sensor [K].
     """
     steps = np.diff(readings[np.isfinite(readings)], n=2)
     robust = 1.4826 * float(np.median(np.abs(steps))) if steps.size else 0.0

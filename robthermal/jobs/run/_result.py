@@ -33,7 +33,7 @@ class Comparison:
     kind : str
         "train" or "validation".
     record : Record
-        Measured.
+        Measured record that both models follow.
     nominal, calibrated : Record
         The record with modelled readings in place of the measured ones.
     """

@@ -15,7 +15,7 @@ def summary_tables(result: JobResult) -> dict[str, Any]:
     Parameters
     ----------
     result : JobResult
-        From `run_job`.
+        Result of the main job, as `run_job` returns it.
     """
     tables: dict[str, Any] = {"residuals": _residuals(result), "certify": certify_table(result.certification)}
     reports = {one.record.imported.file: one.record.imported for one in result.comparisons if one.record.imported}

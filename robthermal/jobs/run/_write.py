@@ -25,9 +25,9 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     Parameters
     ----------
     result : JobResult
-        From `run_job`.
+        Result of the main job, as `run_job` returns it.
     out : str or Path
-        Output folder.
+        Output folder to create or replace.
 
     Returns
     -------

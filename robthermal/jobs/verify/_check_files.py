@@ -20,7 +20,7 @@ class FileCheck:
     Parameters
     ----------
     file : Path
-        Certificate.
+        Path of the certificate file.
     valid : bool or None
         None: the file cannot be read.
     reason : str
@@ -30,7 +30,7 @@ class FileCheck:
     margins : dict of str to float
         Found by the check.
     seconds : float
-        Duration [s].
+        Duration of the check [s].
     second : SecondVerdict or None
         What the second checker said; None where it was not asked.
     """
@@ -59,7 +59,7 @@ def verify_files(files: Sequence[Path], progress: Callable[[int, int], None] = l
     Parameters
     ----------
     files : sequence of Path
-        Certificates.
+        Paths of the certificate files.
     progress : callable, optional
         Called with how many are done, and how many there are.
     second : bool
