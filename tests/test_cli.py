@@ -176,7 +176,7 @@ def test_demo_is_quiet_in_a_pipe(demo: tuple[subprocess.CompletedProcess[str], P
     assert "\x1b" not in done.stdout and "\r" not in done.stdout
 
 
-def test_no_spinner_in_a_pipe_that_may_have_colours(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_no_spinner_in_a_pipe_that_may_have_colors(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
                                                     ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # as many CI runners set it: rich then takes a pipe for a terminal
     assert Console(stderr=True).is_terminal

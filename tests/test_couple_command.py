@@ -112,7 +112,7 @@ class TestYes:
         assert set(found["performance"]) == {"ma_before", "ma_after", "msd_before", "msd_after"}
         assert found["norms"]["robust"] <= 0.9 and found["performance"]["msd_after"] > 0
 
-    def test_what_the_file_holds_stabilises_every_measured_plant(self, robust: Done) -> None:
+    def test_what_the_file_holds_stabilizes_every_measured_plant(self, robust: Done) -> None:
         """From coupling.json alone: the controller, with the plants that the responses came from."""
         found = json.loads((robust[0] / "coupling.json").read_text(encoding="utf-8"))
         K = state_space(found["filters"]["controller"])
@@ -255,7 +255,7 @@ def test_bad_input(run: Any, tmp_path: Path, old: str, new: str, words: list[str
     ("r2.csv", "frequency,real,imag\n1.0,2.0,3.0\n2.0,x,3.0\n", ["r2.csv, line 3", "'x'"]),
     ("r2.csv", "frequency,real,imag\n1.0,2.0\n", ["r2.csv, line 2", "2 values"]),
     ("r2.csv", "frequency,real,imag\n1.0,2.0,3.0\n2.0,2.0,3.0\n", ["r2.csv", "differ from those of 'l2.csv'"]),
-    ("r2.csv", frf_text(P2, -30.0), ["[uncertainty] l2.csv, r2.csv", "do not stabilise"]),
+    ("r2.csv", frf_text(P2, -30.0), ["[uncertainty] l2.csv, r2.csv", "do not stabilize"]),
     ("noise.json", "[1, 2]", ["noise.json", "not a JSON object"]),
     ("noise.json", "{", ["noise.json", "not valid JSON"]),
     ("noise.json", '{"num": [1.0], "den": [1.0], "sample_time": 0.02}', ["noise.json", "0.02", "sample time"]),

@@ -125,7 +125,7 @@ def test_free_start_is_shown_as_computed_too() -> None:
 
 @pytest.fixture(scope="module")
 def warm() -> rt.jobs.diagnose.Diagnosed:
-    """Train and validation drift away from the model upwards, which no effect of the catalogue that is allowed does."""
+    """Train and validation drift away from the model upwards, which no effect of the catalog that is allowed does."""
     drift = np.linspace(0.0, 2.0, 300)[:, None]
     return diagnosed([record(1, drift)], [record(2, drift)])
 

@@ -323,7 +323,7 @@ def test_a_diagnosis_says_its_stages() -> None:
     noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
     said: list[str] = []
     rt.jobs.diagnose_records(bar, (), [noisy], progress=said.append)
-    order = ["refitting the nominal system", "trying every effect of the catalogue at every place",
+    order = ["refitting the nominal system", "trying every effect of the catalog at every place",
              "refitting the best candidates", "testing whether anything is left", "running both models freely"]
     assert [said.index(stage) for stage in order] == sorted(said.index(stage) for stage in order)
     assert "predicting the validation data" not in said

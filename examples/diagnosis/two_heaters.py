@@ -60,7 +60,7 @@ def means(run: rt.Record) -> rt.Record:
     """Every 5 s the mean of the readings around it, without glitches.
 
     The converter's step is 0.49 K and the sensors' own noise is larger, so the mean of some readings is finer than the
-    step, and the noise of neighbouring means is independent, as the tests assume. A running median is neither.
+    step, and the noise of neighboring means is independent, as the tests assume. A running median is neither.
     """
     every = round(SAMPLE / run.sample_time)
     smooth = median_filter(run.outputs, (9, 1), mode="nearest")

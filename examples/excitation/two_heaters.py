@@ -25,7 +25,7 @@ def excitation(phases: str) -> rt.signals.Excitation:
 
 
 def nominal() -> control.StateSpace:
-    """Linearised at rest, heaters only."""
+    """Linearized at rest, heaters only."""
     return rt.thermal.linearize(BOARD)[:, [0, 1]]
 
 

@@ -1,4 +1,4 @@
-"""Covariance of the estimates when residuals are correlated: the sandwich, initial temperatures marginalised."""
+"""Covariance of the estimates when residuals are correlated: the sandwich, initial temperatures marginalized."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Fit(Estimates):
     at_bound : ndarray of bool, shape (p,)
         Estimates that ran into a bound; their standard deviation ignores it.
     covariance : ndarray, shape (p, p)
-        Covariance of the estimates, in the order of `parameters`, initial temperatures marginalised, residuals taken as
+        Covariance of the estimates, in the order of `parameters`, initial temperatures marginalized, residuals taken as
         correlated in time. A direction the data leave open has the spread of its prior or of its bounds.
     undetermined : tuple of str
         Directions the data do not determine, in words.
@@ -47,7 +47,7 @@ class Fit(Estimates):
         Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
         for.
     iterations : int
-        Model evaluations the optimiser tried.
+        Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
     noise : dict

@@ -57,7 +57,7 @@ def has_disturbance(system: System) -> bool:
 
 
 def whitener(system: System, one: Data, noise: Floats) -> Whitener:
-    """Filter of one record, linearised at its mean simulated temperatures and mean inputs.
+    """Filter of one record, linearized at its mean simulated temperatures and mean inputs.
 
     Parameters
     ----------

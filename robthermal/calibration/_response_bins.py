@@ -11,7 +11,7 @@ from ..identify import FrequencyResponse
 from ..thermal import System
 from ._response_model import Bins
 
-_CHUNK = 100  # bins whose correlation with their neighbours is computed at once
+_CHUNK = 100  # bins whose correlation with their neighbors is computed at once
 
 
 def bins_of(system: System, G: FrequencyResponse) -> Bins:
@@ -47,7 +47,7 @@ def _independent(G: FrequencyResponse, index: NDArray[np.intp]) -> NDArray[np.in
 
 
 def independent_freedom(G: FrequencyResponse, bins: Bins) -> float:
-    """Degrees of freedom of the noise, all bins together: neighbouring bins of a local method share their windows."""
+    """Degrees of freedom of the noise, all bins together: neighboring bins of a local method share their windows."""
     q = float(G.degrees_of_freedom[bins.index].sum())
     stride = float(np.median(np.diff(bins.index))) if bins.index.size > 1 else 1.0
     return max(q / max((2 * G.half_width + 1) / stride, 1.0), 1.0)
@@ -65,7 +65,7 @@ def _inverse_roots(covariance: Complex, frequencies: Floats) -> Complex:
 
 
 def spread_of_score(G: FrequencyResponse, bins: Bins, J: Complex) -> Floats:
-    """M = 2 Re Jᴴ L⁻¹ Σ L⁻ᴴ J, (p, p), with Σ the covariance between neighbouring bins too.
+    """M = 2 Re Jᴴ L⁻¹ Σ L⁻ᴴ J, (p, p), with Σ the covariance between neighboring bins too.
 
     Each side is widened by √(q/(q - n_y - 1)): the weights are estimates themselves, with q degrees of freedom, and a
     bin whose noise happens to look small gets too much weight.

@@ -1,4 +1,4 @@
-"""The least-squares problem on a frequency response: the linearised model against it, weighted by its covariance."""
+"""The least-squares problem on a frequency response: the linearized model against it, weighted by its covariance."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class ResponseProblem:
     ranges : Ranges
         Parameters to estimate.
     operating_point : OperatingPoint
-        Where the model is linearised.
+        Where the model is linearized.
     """
 
     system: System

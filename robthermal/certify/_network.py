@@ -1,4 +1,4 @@
-"""Certificates of large sparse cooperative networks: one sparse solve, no optimisation."""
+"""Certificates of large sparse cooperative networks: one sparse solve, no optimization."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class ThesisBounds:
     """Bounds (5.31)-(5.32) of Evers (2021) for V = xᵀEx, as derived and as printed.
 
-    They are no safety limits: V is centred at 0 K and says nothing about thermal runaway.
+    They are no safety limits: V is centered at 0 K and says nothing about thermal runaway.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Currents that a linearising feedback law may take from a certificate or from a usable current."""
+"""Currents that a linearizing feedback law may take from a certificate or from a usable current."""
 
 from __future__ import annotations
 

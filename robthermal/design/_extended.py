@@ -14,7 +14,7 @@ from ._observer_model import ObserverModel
 
 @dataclass(frozen=True)
 class ExtendedKalmanFilter(Observer):
-    """Kalman filter with the model linearised at every estimate, for comparison: it comes with no guarantee.
+    """Kalman filter with the model linearized at every estimate, for comparison: it comes with no guarantee.
 
     Parameters
     ----------

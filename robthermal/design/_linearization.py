@@ -1,4 +1,4 @@
-"""Feedback linearisation, Evers (5.15)-(5.18) corrected: the current that puts a wanted heat into the cold lump."""
+"""Feedback linearization, Evers (5.15)-(5.18) corrected: the current that puts a wanted heat into the cold lump."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Bounds(NamedTuple):
     heat : ndarray
         Lower bound on v, Evers (5.17): the most it can cool [W].
     current : ndarray
-        Optimal current S x_c/R, Evers (5.18): it *maximises cooling*; more current cools less [A].
+        Optimal current S x_c/R, Evers (5.18): it *maximizes cooling*; more current cools less [A].
     """
 
     heat: Array
@@ -321,7 +321,7 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
 
     References
     ----------
-    Evers (2021), (5.15)-(5.18), with the errata: right root, mean temperature, and what (5.18) maximises.
+    Evers (2021), (5.15)-(5.18), with the errata: right root, mean temperature, and what (5.18) maximizes.
 
     Examples
     --------

@@ -80,7 +80,7 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
     Raises
     ------
     InputError
-        Wrong sizes or sample time; a controller that does not stabilise the sampled plant.
+        Wrong sizes or sample time; a controller that does not stabilize the sampled plant.
 
     Examples
     --------

@@ -112,14 +112,14 @@ class ColdSide:
 
 
 def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None) -> ColdSide:
-    """Linear plant of a feedback-linearised system, from the heats v to the cold faces.
+    """Linear plant of a feedback-linearized system, from the heats v to the cold faces.
 
     Parameters
     ----------
     law : FeedbackLinearization
         Linearizing feedback law whose modules drive the plant.
     temperatures : array_like, shape (n_lumps,), optional
-        Where natural convection and radiation are linearised [K]; default the initial temperatures. The links of
+        Where natural convection and radiation are linearized [K]; default the initial temperatures. The links of
         modules and conduction are linear: for them it does not matter.
 
     Returns
@@ -147,7 +147,7 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     for name, part in zip(law.names, law.modules.parts, strict=True):
         if part.cold in hot:
             raise InputError(f"the cold face {part.cold!r} of module {name!r} is another module's hot face",
-                             where="argument law", expected="one stage", remedy="Linearise the cold stage only, with "
+                             where="argument law", expected="one stage", remedy="Linearize the cold stage only, with "
                              "modules=[…], and let the other stage hold its own temperature.")
     x = eq.initial() if temperatures is None else numbers(temperatures, "temperatures")
     law.modules.faces(x)

@@ -51,7 +51,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     parameters : iterable or mapping, optional
         Nominal parameters to refit, as in `rt.calibrate`. Default: the fit table; without one they are taken as known.
     effects : iterable of str, optional
-        Names of the catalogue to try; default all, your own registered ones included.
+        Names of the catalog to try; default all, your own registered ones included.
     noise : mapping or float, optional
         Overrides the declared noise of the sensors [K].
     operating_point : mapping, optional
@@ -99,7 +99,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("refitting the nominal system")
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
-    progress("trying every effect of the catalogue at every place")
+    progress("trying every effect of the catalog at every place")
     state = revised_search(accepted_effects(begin(nominal, names), progress), progress)
     if state.rounds and validation is not None and not state.misfit_left:
         progress("testing on the validation data whether any effect is contradicted")

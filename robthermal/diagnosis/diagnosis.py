@@ -27,7 +27,7 @@ class Found:
     Parameters
     ----------
     effect : str
-        Name in the catalogue.
+        Name in the catalog.
     where : tuple of str
         Parts of the system it acts on.
     values : dict

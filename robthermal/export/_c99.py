@@ -53,7 +53,7 @@ def number(value: float) -> str:
 
 
 def doubles(values: Iterable[float]) -> str:
-    """Initialiser of an array of doubles.
+    """Initializer of an array of doubles.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def doubles(values: Iterable[float]) -> str:
 
 
 def rows(table: Iterable[Sequence[float]]) -> str:
-    """Initialiser of a two-dimensional array, a row per line, without the outer braces.
+    """Initializer of a two-dimensional array, a row per line, without the outer braces.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def _given(used: list[str], noise: Mapping[str, float] | float | None) -> dict[s
 
 
 def quantum(readings: Floats) -> float:
-    """Step of a quantised reading [K], 0 if it is not quantised."""
+    """Step of a quantized reading [K], 0 if it is not quantized."""
     levels = np.unique(np.round(readings, 9))
     if levels.size < 2 or 4 * levels.size > readings.size:
         return 0.0

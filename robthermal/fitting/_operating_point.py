@@ -32,7 +32,7 @@ class OperatingPoint:
     last: Floats | None = None
 
     def temperatures(self, system: System) -> Floats | None:
-        """Of all lumps [K]; None for a linear network, whose linearisation is the same everywhere."""
+        """Of all lumps [K]; None for a linear network, whose linearization is the same everywhere."""
         eq = Equations(system)
         if not eq.terms:
             return None
@@ -41,7 +41,7 @@ class OperatingPoint:
         else:
             found = steady_state(system, self.inputs)
             if not found.equilibria:
-                raise InputError(f"no steady state to linearise at: {found.outcome}", where="argument operating_point",
+                raise InputError(f"no steady state to linearize at: {found.outcome}", where="argument operating_point",
                                  remedy="Give the mean inputs of the experiment.")
             here = np.array([found.equilibria[0].temperatures[name] for name in system.lump_names])
         self.last = here

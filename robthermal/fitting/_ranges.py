@@ -1,4 +1,4 @@
-"""Which parameters may change, within which bounds, with which prior; and the coordinates the optimiser works in."""
+"""Which parameters may change, within which bounds, with which prior; and the coordinates the optimizer works in."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Choice = Iterable[str] | Mapping[Key, Limits] | Mapping[str, Limits] | None
 
 @dataclass(frozen=True)
 class Ranges:
-    """Parameters to estimate; positive ones are optimised by their logarithm.
+    """Parameters to estimate; positive ones are optimized by their logarithm.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ class Ranges:
     logarithmic: NDArray[np.bool_]
 
     def coordinates(self, values: Floats) -> Floats:
-        """Optimiser's coordinates of parameter values."""
+        """Optimizer's coordinates of parameter values."""
         return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
 
     def values(self, coordinates: Floats) -> Floats:
-        """Parameter values at optimiser's coordinates."""
+        """Parameter values at optimizer's coordinates."""
         return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates)
 
     def slopes(self, values: Floats) -> Floats:
@@ -71,7 +71,7 @@ class Ranges:
         return sensitivity @ (owner[:, None] == np.arange(len(self.members))).astype(float)
 
     def prior(self, values: Floats) -> Floats:
-        """Distance from the priors' centres, of the parameters that have one, in standard deviations."""
+        """Distance from the priors' centers, of the parameters that have one, in standard deviations."""
         known = np.isfinite(self.sigma)
         return (values - self.start)[known] / self.sigma[known]
 

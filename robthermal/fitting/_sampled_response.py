@@ -1,4 +1,4 @@
-"""Frequency response of a system linearised at an operating point, inputs held, delays exact."""
+"""Frequency response of a system linearized at an operating point, inputs held, delays exact."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROUNDING = 1e-9  # of a sample: less of a delay is none
 
 def sampled_response(system: System, frequencies: Floats, sample_time: float, operating_point: OperatingPoint,
                      outputs: tuple[str, ...], inputs: tuple[str, ...]) -> Complex:
-    """Response (n_f, n_y, n_u) of the linearisation, inputs held over each sample, delays included.
+    """Response (n_f, n_y, n_u) of the linearization, inputs held over each sample, delays included.
 
     With x(k+1) = Φ x(k) + Γ u(k), a delay of d samples and f seconds reads y(k) = C x(t_(k-d) - f): the state between
     samples, Φ(h-f) x(k-d-1) + Γ(h-f) u(k-d-1). A factor e^(-iωf) would be that of an input that is not held.

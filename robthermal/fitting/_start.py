@@ -24,7 +24,7 @@ class Initial:
     Parameters
     ----------
     mean : ndarray, shape (n_lumps,)
-        Fixed value, or centre of the prior [K].
+        Fixed value, or center of the prior [K].
     sigma : float
         Standard deviation of the prior of every lump [K]; 0 if fixed.
     """
@@ -41,7 +41,7 @@ class Initial:
 def initial_of(system: System, one: Data, start: Start) -> Initial:
     """Initial temperatures of a record.
 
-    The centre is the nearest sensor's first reading (by thermal resistance); with "system", the file's `initial` where
+    The center is the nearest sensor's first reading (by thermal resistance); with "system", the file's `initial` where
     it has one. A free start has a prior of max(5 K, spread of the first readings): the lumps without a sensor are
     hardly determined by data, and without a prior the directions nobody can see would spoil the conditioning.
     """

@@ -11,7 +11,7 @@ from .._arrays import Array
 
 @dataclass(frozen=True)
 class LocalBasis:
-    """Functions of the offset r [bins] from the centre k of a window, 1 at r = 0 for the first, 0 there for the others.
+    """Functions of the offset r [bins] from the center k of a window, 1 at r = 0 for the first, 0 there for the others.
 
     Without poles, (r/l)^s for s = 0 ... degree: the local polynomial method, Evers (3.16).
     With n poles, x^s D(k)/D(k+r), s = 0 ... n, with x proportional to exp(j r delta) - 1, D(k) = prod(z_k - gamma_i),
@@ -35,7 +35,7 @@ class LocalBasis:
 
     @property
     def step(self) -> float:
-        """Angle between neighbouring bins [rad]."""
+        """Angle between neighboring bins [rad]."""
         return 2.0 * np.pi / self.n_samples
 
     def powers(self, offsets: Array) -> Array:
@@ -59,5 +59,5 @@ class LocalBasis:
 
 
 def window_starts(bins: Array, n_bins: int, n_points: int) -> Array:
-    """First bin (from 1) of each window: centred, shifted at the edges, never wrapped over bin 0 or Nyquist."""
+    """First bin (from 1) of each window: centered, shifted at the edges, never wrapped over bin 0 or Nyquist."""
     return np.clip(bins - n_points // 2, 1, n_bins - n_points + 1)

@@ -43,7 +43,7 @@ def closed_loop(
     degree : int
         Degree of the local polynomials [-].
     half_width : int
-        Bins on either side of the centre that a window uses [-].
+        Bins on either side of the center that a window uses [-].
     inverse : {"matrix", "elementwise"}
         "matrix" gives the plant G_yr G_ur^-1 (3.28). "elementwise" gives G_yr[i,j]/G_ur[i,j]; its diagonal is the
         equivalent plant, each loop with the other loops closed (3.27).

@@ -1,7 +1,7 @@
 """Interior windows of equal records, many at a time: modified Gram-Schmidt with the bins along the last axis.
 
 The columns of every window are [transient | U_1 x^R ... U_1 x^1 | U_2 x^R ... | U x^0 | Y]. After
-orthogonalisation, G and its block of (K^H K)^-1 follow from the last n_u columns alone, and what is left of Y is the
+orthogonalization, G and its block of (K^H K)^-1 follow from the last n_u columns alone, and what is left of Y is the
 residual: no Q, no solution with the whole triangle, and no normal equations, whose squared condition number would
 spoil the residual of clean data.
 For polynomials the transient is removed by one constant matrix, the orthonormal complement of the powers.
@@ -52,9 +52,9 @@ class Kernel:
             self.project_constant = np.ascontiguousarray(complement)
 
     def solve(self, start: int, stop: int, *, chunk: int, full_noise: bool) -> BlockFit:
-        """Windows centred at bins start ... stop-1, counted from 1; all of them must fit between the edges.
+        """Windows centered at bins start ... stop-1, counted from 1; all of them must fit between the edges.
 
-        The windows are orthogonalised `chunk` bins at a time, which stay in the cache; what follows from the last
+        The windows are orthogonalized `chunk` bins at a time, which stay in the cache; what follows from the last
         columns is small and is done for all bins at once, in calls long enough for other threads to run meanwhile.
         """
         count, n_k = stop - start, self.n_u * self.basis.size
@@ -67,7 +67,7 @@ class Kernel:
                 b = min(a + chunk, stop)
                 columns = self._rational(a, b) if self.basis.poles.size else self._polynomial(a, b)
                 part = slice(a - start, b - start)
-                self._orthogonalise(columns, triangle[..., part], remains[:, part])
+                self._orthogonalize(columns, triangle[..., part], remains[:, part])
                 _residual_power(columns[n_k:], noise[..., part])
                 remains[:, part] /= self._energy_of_columns(a, b)
             doubtful = np.logical_not((remains > _DOUBTFUL).all(axis=0))
@@ -97,7 +97,7 @@ class Kernel:
         return columns
 
     def _rational(self, start: int, stop: int) -> Array:
-        """The same with prescribed poles: the transient functions differ between bins and are orthogonalised first."""
+        """The same with prescribed poles: the transient functions differ between bins and are orthogonalized first."""
         size, degree, n_u, m = self.basis.size, self.basis.degree, self.n_u, self.basis.n_points
         part, width = self._slices(start, stop), stop - start
         # D(k)/D(k+r): the denominator of every bin once, then its windows.
@@ -137,7 +137,7 @@ class Kernel:
             energy[:, 1:] -= sums[:, :-m]
         return np.concatenate([np.repeat(energy, self.basis.degree, axis=0), energy])
 
-    def _orthogonalise(self, columns: Array, triangle: Array, remains: Array) -> None:
+    def _orthogonalize(self, columns: Array, triangle: Array, remains: Array) -> None:
         """Fill the rows of the triangular factor that belong to U x^0, and the energy left of each regressor."""
         n_u = self.n_u
         n_k = n_u * self.basis.size

@@ -119,7 +119,7 @@ class LocalEstimate:
         return np.concatenate(labels, axis=1)
 
     def offsets(self, bins: Array) -> Array:
-        """Offset of every row from the centre of its window [bins], (B, m), records one after the other."""
+        """Offset of every row from the center of its window [bins], (B, m), records one after the other."""
         return np.concatenate([rows_of(spectrum, self.basis, bins)[1] for spectrum in self.spectra], axis=1)
 
     def _parts(self, bins: Array) -> Iterator[Array]:

@@ -28,7 +28,7 @@ def lpm(record: Record | Sequence[Record], degree: int = 2, half_width: int = 8)
     degree : int
         Degree of the polynomials of plant and transient [-].
     half_width : int
-        Bins on either side of the centre that a window uses [-].
+        Bins on either side of the center that a window uses [-].
 
     Returns
     -------

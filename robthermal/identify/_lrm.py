@@ -1,4 +1,4 @@
-"""Local rational method: rational functions with unknown poles, by Levy's linearisation. Evers (4.18)-(4.21)."""
+"""Local rational method: rational functions with unknown poles, by Levy's linearization. Evers (4.18)-(4.21)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def lrm(
     degree : int
         Degree of the numerators of plant and transient [-].
     half_width : int
-        Bins on either side of the centre that a window uses [-].
+        Bins on either side of the center that a window uses [-].
     denominator : int
         Degree of the common denominator [-].
     iterations : int

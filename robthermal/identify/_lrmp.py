@@ -32,7 +32,7 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
         Continuous-time poles [rad/s], real part negative. ``"auto"`` chooses up to three real poles by held-out error.
         Of a model the slowest poles are taken, as many as leave a quarter of the points for the noise.
     half_width : int
-        Bins on either side of the centre that a window uses [-].
+        Bins on either side of the center that a window uses [-].
 
     Returns
     -------

@@ -84,8 +84,8 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
             )
     gram = np.zeros((len(names), len(names)))
     for signal in signals:
-        centred = signal - [column.mean() for column in signal.T]
-        gram += centred.T @ centred
+        centered = signal - [column.mean() for column in signal.T]
+        gram += centered.T @ centered
     scale = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     if values[0] < _COPIES:

@@ -263,7 +263,7 @@ class FrequencyResponse:
         return radius
 
     def joint_covariance(self, bins: ArrayLike) -> Array:
-        """Covariance of G at several bins together: neighbouring estimates share data and are correlated.
+        """Covariance of G at several bins together: neighboring estimates share data and are correlated.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Bins whose residual is larger than the noise of neighbouring bins explains: the local model does not fit there."""
+"""Bins whose residual is larger than the noise of neighboring bins explains: the local model does not fit there."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
 
     A residual as small as the `rounding` (n_y,) of the data is no evidence of anything.
 
-    The lower of the two medians counts, so that a hump between quiet neighbours (a resonance narrower than the window,
+    The lower of the two medians counts, so that a hump between quiet neighbors (a resonance narrower than the window,
     the slowest pole near bin 0) is found, while a slope of the noise spectrum is not. Bins share data within
     2 half_width, hence the gap. The reference has an error of its own, which the threshold allows for.
     """

@@ -29,7 +29,7 @@ class Regression:
     K: Array
     Y: Array
     n_u: int
-    first_transient: int  # column of the transient at the centre, first record
+    first_transient: int  # column of the transient at the center, first record
 
 
 def points_per_record(spectra: Sequence[Spectrum], basis: LocalBasis) -> tuple[int, ...]:
@@ -43,7 +43,7 @@ def points_per_record(spectra: Sequence[Spectrum], basis: LocalBasis) -> tuple[i
 
 
 def regression(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> Regression:
-    """Regressors and outputs of the windows centred at `bins` (B,), counted from 1 on the grid of the basis."""
+    """Regressors and outputs of the windows centered at `bins` (B,), counted from 1 on the grid of the basis."""
     n_u, rows = spectra[0].U.shape[0], points_per_record(spectra, basis)
     n_transient = basis.size * len(spectra)
     K = np.zeros((bins.size, sum(rows), n_transient + n_u * basis.size), dtype=complex)
@@ -64,7 +64,7 @@ def regression(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> R
 
 
 def rows_of(spectrum: Spectrum, basis: LocalBasis, bins: Array) -> tuple[Array, Array]:
-    """Bins of one record (from 1) in the windows centred at `bins` of the grid, and their offsets [bins], (B, m)."""
+    """Bins of one record (from 1) in the windows centered at `bins` of the grid, and their offsets [bins], (B, m)."""
     ratio, m = basis.n_samples / spectrum.n_samples, points_per_record([spectrum], basis)[0]
     start = window_starts(np.rint(bins / ratio).astype(int), spectrum.n_bins, m)
     mine = start[:, None] + np.arange(m)

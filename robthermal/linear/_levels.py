@@ -70,7 +70,7 @@ def plant_norm(plant: Plant) -> tuple[float, float]:
         crossings = _crossings(plant, (1 + _STEP) * top)
         if len(crossings) == 0:
             break
-        # every interval above the level lies between two neighbours
+        # every interval above the level lies between two neighbors
         points = np.unique(np.concatenate([crossings, (crossings[1:] + crossings[:-1]) / 2]))
         values = size(response(points), np.zeros(len(points)))
         if values.max() <= (1 + _STEP / 10) * top:

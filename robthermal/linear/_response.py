@@ -62,7 +62,7 @@ def largest(plant: Plant, edges: Array, size: Callable[[Array, Array], Array]) -
     value = size(response(omega), which)
     best = np.array([np.flatnonzero(which == k)[value[which == k].argmax()] for k in range(len(low))])
     top, where = value[best], omega[best]
-    # bracket of each best point: its neighbours in the interval
+    # bracket of each best point: its neighbors in the interval
     a, b = low.copy(), np.where(np.isfinite(high), high, np.maximum(2 * where, 1.0))
     for k in range(len(low)):
         own = omega[which == k]

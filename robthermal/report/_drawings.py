@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ._style import COLOURS, canvas, house_style, plain
+from ._style import COLORS, canvas, house_style, plain
 
 _DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 _MOST_BARS = 40  # more names than this cannot be read; a band over the index can
@@ -52,13 +52,13 @@ def current_limits(names: Sequence[str], values: ArrayLike, lines: Mapping[str, 
         figure, axes = canvas(_height(len(names)) + 0.18 * len(across))
         rows = np.arange(len(names))
         axes.barh(rows, np.where(np.isfinite(currents), currents, np.where(currents > 0, right, 0.0)), height=0.62,
-                  color=COLOURS[0], alpha=0.85)
+                  color=COLORS[0], alpha=0.85)
         for row, value in zip(rows, currents, strict=True):
             place = min(value, 0.9 * right) if np.isfinite(value) else 0.0
             axes.annotate(_amount(value), (max(place, 0.0), row), xytext=(4, 0), textcoords="offset points",
                           va="center", fontsize=8.0, bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})
         for i, (name, value) in enumerate(across.items()):
-            axes.axvline(value, color=COLOURS[1 + i % 3], linestyle=_DASHES[i % len(_DASHES)],
+            axes.axvline(value, color=COLORS[1 + i % 3], linestyle=_DASHES[i % len(_DASHES)],
                          label=plain(f"{name}: {value:.3g} A"))
         _names(axes, names)
         axes.set(xlabel="current [A]", xlim=(min(0.0, *finite, 0.0), right))
@@ -104,11 +104,11 @@ def box_ranges(names: Sequence[str], low: ArrayLike, high: ArrayLike, unit: str 
             figure, axes = canvas(3.0)
             parts = np.array_split(np.arange(len(names)), min(len(names), _MOST_STEPS))
             axes.fill_between([part[0] for part in parts], [bottom[part].min() for part in parts],
-                              [top[part].max() for part in parts], step="post", color=COLOURS[0], alpha=0.5)
+                              [top[part].max() for part in parts], step="post", color=COLORS[0], alpha=0.5)
             axes.set(xlabel="lump, in the order of the file", ylabel=f"temperature [{unit}]")
             return figure
         figure, axes = canvas(_height(len(names)))
-        axes.barh(np.arange(len(names)), top - bottom, left=bottom, height=0.5, color=COLOURS[0], alpha=0.85)
+        axes.barh(np.arange(len(names)), top - bottom, left=bottom, height=0.5, color=COLORS[0], alpha=0.85)
         for row, ends in enumerate(zip(bottom, top, strict=True)):
             for value, side, shift in zip(ends, ("right", "left"), (-3, 3), strict=True):
                 axes.annotate(f"{value:.1f}", (value, row), xytext=(shift, 0), textcoords="offset points", ha=side,
@@ -158,7 +158,7 @@ def load_curve(curves: Mapping[str, tuple[ArrayLike, ArrayLike]], folds: Mapping
                 raise InputError(f"curve {name!r} has {x.shape} currents and {y.shape} loads", where="load_curve",
                                  expected="two sequences of one length")
             fold = f": fold at I* = {folds[name][0]:.3g} A, q* = {folds[name][1]:.3g} W" if name in folds else ""
-            axes.plot(x, y, color=COLOURS[i % len(COLOURS)], label=plain(name) + fold)
+            axes.plot(x, y, color=COLORS[i % len(COLORS)], label=plain(name) + fold)
         for i, at in enumerate(folds.values()):
             axes.plot(*at, "os^Dv"[i % 5], color="black", markersize=5)
         axes.set(xlabel="current [A]", ylabel="heat from the cold face [W]")

@@ -1,4 +1,4 @@
-"""Figures as SVG that can stand in a page: no ids shared with a neighbour, no resource outside, colours of the page."""
+"""Figures as SVG that can stand in a page: no ids shared with a neighbor, no resource outside, colors of the page."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from ._usable import Bound, rounded_down, shown
 
 
 def write_html(report: Report, path: str | Path) -> Path:
-    """Write one HTML file that needs nothing else: no network, no script, no neighbouring file.
+    """Write one HTML file that needs nothing else: no network, no script, no neighboring file.
 
     Parameters
     ----------

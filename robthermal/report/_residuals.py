@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ._style import COLOURS, canvas, house_style, plain
+from ._style import COLORS, canvas, house_style, plain
 from ._traces import thin, time_unit
 
 
@@ -51,8 +51,8 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
         figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
         for ax, residuals, what in zip(axes, (before, after), ("before", "after"), strict=True):
             for i, (name, values) in enumerate(residuals.items()):
-                ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=COLOURS[i % len(COLOURS)],
-                        linestyle=("-", "--", ":")[i // len(COLOURS) % 3], linewidth=0.8, label=plain(name))
+                ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=COLORS[i % len(COLORS)],
+                        linestyle=("-", "--", ":")[i // len(COLORS) % 3], linewidth=0.8, label=plain(name))
             if noise > 0:
                 ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
             ax.set(ylabel="measured −\nmodel [K]", title=what)
@@ -101,8 +101,8 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
         figure, axes = canvas(4.8, 2, sharex=True, sharey=True)
         for ax, sizes, what in zip(axes, (before, after), ("before", "after"), strict=True):
             for i, (name, values) in enumerate(sizes.items()):
-                ax.loglog(f, np.asarray(values, dtype=float), color=COLOURS[i % len(COLOURS)],
-                          linestyle=("-", "--", ":")[i // len(COLOURS) % 3], linewidth=0.8, label=plain(name))
+                ax.loglog(f, np.asarray(values, dtype=float), color=COLORS[i % len(COLORS)],
+                          linestyle=("-", "--", ":")[i // len(COLORS) % 3], linewidth=0.8, label=plain(name))
             ax.set(ylabel=f"|measured −\nmodel| [{unit}]", title=what)
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
         axes[-1].set(xlabel="frequency [Hz]")

@@ -8,8 +8,8 @@ from typing import Any
 
 WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
 
-# Okabe and Ito (2008): told apart with every common colour vision; without the yellow, too pale on white.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Okabe and Ito (2008): told apart with every common color vision; without the yellow, too pale on white.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 # Black and white become the ink and paper of the page (see _figure.inline), so that dark mode works.
 _STYLE: Any = {  # names are checked by matplotlib when they are set
@@ -21,13 +21,13 @@ _STYLE: Any = {  # names are checked by matplotlib when they are set
     "lines.linewidth": 1.4, "figure.figsize": (WIDTH, 3.6), "figure.constrained_layout.use": True,
     "figure.facecolor": "white", "axes.facecolor": "white", "text.color": "black", "axes.labelcolor": "black",
     "xtick.color": "black", "ytick.color": "black", "axes.edgecolor": "black",
-    "axes.prop_cycle": f"cycler(color={list(COLOURS)})",
+    "axes.prop_cycle": f"cycler(color={list(COLORS)})",
 }
 
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Draw in the style of the report: sizes, grid, colours that do not rely on red and green.
+    """Draw in the style of the report: sizes, grid, colors that do not rely on red and green.
 
     Yields
     ------

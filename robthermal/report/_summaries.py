@@ -66,7 +66,7 @@ def write_json(report: Report, path: str | Path) -> Path:
     Parameters
     ----------
     report : Report
-        What to summarise.
+        What to summarize.
     path : str or Path
         File to write.
 

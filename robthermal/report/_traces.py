@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..fitting import residual as residual_of
-from ._style import COLOURS, canvas, house_style, plain
+from ._style import COLORS, canvas, house_style, plain
 
 _BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures
 
@@ -60,11 +60,11 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
                               height_ratios=(2, 1) if residual else None)
         above, below = axes[0, 0], axes[-1, 0]
         for i, (name, (data, answer)) in enumerate(pairs.items()):
-            colour, dashes = COLOURS[i % len(COLOURS)], ("-", "--", ":")[i // len(COLOURS) % 3]
-            _dots(above, *thin(t / scale, data - ZERO_CELSIUS), colour)
-            above.plot(*thin(t / scale, answer - ZERO_CELSIUS), dashes, color=colour, label=plain(name))
+            color, dashes = COLORS[i % len(COLORS)], ("-", "--", ":")[i // len(COLORS) % 3]
+            _dots(above, *thin(t / scale, data - ZERO_CELSIUS), color)
+            above.plot(*thin(t / scale, answer - ZERO_CELSIUS), dashes, color=color, label=plain(name))
             if residual:
-                below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=colour, linewidth=0.8)
+                below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=color, linewidth=0.8)
         above.set(ylabel="temperature [°C]", title=plain(title))
         _legend(above, len(pairs))
         if residual:
@@ -76,7 +76,7 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     return figure
 
 
-def _dots(axes: Any, time: Array, values: Array, colour: str) -> None:
+def _dots(axes: Any, time: Array, values: Array, color: str) -> None:
     """Dots as one path of zero-length strokes: a fifth of the size that one marker element per dot has."""
     # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
     from matplotlib.patches import PathPatch
@@ -86,7 +86,7 @@ def _dots(axes: Any, time: Array, values: Array, colour: str) -> None:
     points = np.repeat(np.column_stack([time[good], values[good]]), 2, axis=0)
     path = Path(points, np.tile([Path.MOVETO, Path.LINETO], int(good.sum())))
     path.should_simplify = False  # it would remove the strokes
-    axes.add_patch(PathPatch(path, fill=False, edgecolor=colour, linewidth=2.4, alpha=0.4, capstyle="round"))
+    axes.add_patch(PathPatch(path, fill=False, edgecolor=color, linewidth=2.4, alpha=0.4, capstyle="round"))
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
@@ -104,7 +104,7 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _legend(axes: Any, count: int) -> None:
-    # Grey stand-ins say once what dots and lines are; the colours name the sensors. Above the data, never on them.
+    # Grey stand-ins say once what dots and lines are; the colors name the sensors. Above the data, never on them.
     kinds = [axes.plot([], [], ".", color="#888888", label="measured")[0],
              axes.plot([], [], "-", color="#888888", label="model")[0]]
     lines = [line for line in axes.get_lines() if not line.get_label().startswith("_") and line not in kinds]

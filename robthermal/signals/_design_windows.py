@@ -24,7 +24,7 @@ _RANK = 1e-8  # smallest singular value of a window that counts, relative to the
 
 @dataclass(frozen=True)
 class Spectra:
-    """DFT of the inputs, normalised by 1/sqrt(N) as in Evers (4.2), bins 1 ... (N-1)//2."""
+    """DFT of the inputs, normalized by 1/sqrt(N) as in Evers (4.2), bins 1 ... (N-1)//2."""
 
     U: Complex  # (experiments, n_u, bins), exactly zero where not excited
     n_samples: int

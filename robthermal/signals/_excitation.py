@@ -33,9 +33,9 @@ def multisines(
     periods: int = 1,
     spectrum: Literal["linear", "logarithmic"] | ArrayLike = "linear",
     phases: Literal["random", "schroeder", "low_crest"] = "random",
-    realisations: int = 1,
+    realizations: int = 1,
 ) -> Excitation:
-    """Multisines for all inputs of a machine, all experiments and realisations.
+    """Multisines for all inputs of a machine, all experiments and realizations.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def multisines(
     rms : float or sequence of float, optional
         Standard deviation, for all inputs or one per input, in their units. Give this or `amplitude`.
     amplitude : float or sequence of float, optional
-        Largest deviation from the mean over all experiments and realisations, in the units of the inputs.
+        Largest deviation from the mean over all experiments and realizations, in the units of the inputs.
     offset : float or "nonnegative", or a sequence of them, optional
         Mean, in the units of the inputs; "nonnegative" is the smallest mean for which no value of the input is below
         zero in any experiment, so that all share one operating point.
@@ -67,8 +67,8 @@ def multisines(
     spectrum : {"linear", "logarithmic"} or array_like, optional
         As in `multisine`.
     phases : {"random", "schroeder", "low_crest"}, optional
-        As in `multisine`. With several inputs or realisations only "random" and "low_crest" tell them apart.
-    realisations : int, optional
+        As in `multisine`. With several inputs or realizations only "random" and "low_crest" tell them apart.
+    realizations : int, optional
         How many independent draws of the phases.
 
     Returns
@@ -79,7 +79,7 @@ def multisines(
     ------
     InputError
         As `multisine`; fewer lines than inputs when zippered; Schroeder phases for several independent inputs or
-        realisations, which would all be the same.
+        realizations, which would all be the same.
 
     References
     ----------
@@ -97,7 +97,7 @@ def multisines(
     True
     """
     n, n_u = whole_number(period, "period", 3), whole_number(inputs, "inputs", 1)
-    R, repeats = whole_number(realisations, "realisations", 1), whole_number(periods, "periods", 1)
+    R, repeats = whole_number(realizations, "realizations", 1), whole_number(periods, "periods", 1)
     h = positive_number(sample_time, "sample_time", "s")
     excited = given_lines(band, lines, n, h)
     amplitudes = line_amplitudes(spectrum, excited)
@@ -128,7 +128,7 @@ def multisines(
     )
 
 
-def _check_arrangement(arrangement: object, phases: object, n_u: int, realisations: int, lines: Lines) -> None:
+def _check_arrangement(arrangement: object, phases: object, n_u: int, realizations: int, lines: Lines) -> None:
     word = one_of(arrangement, "arrangement", ("orthogonal", "zippered", "independent"))
     if word == "zippered" and lines.size < n_u:
         raise InputError(
@@ -137,11 +137,11 @@ def _check_arrangement(arrangement: object, phases: object, n_u: int, realisatio
             expected="at least one line per input",
             remedy="Widen the band, or lengthen the period.",
         )
-    if phases == "schroeder" and (realisations > 1 or (word == "independent" and n_u > 1)):
+    if phases == "schroeder" and (realizations > 1 or (word == "independent" and n_u > 1)):
         raise InputError(
-            "Schroeder phases are the same for every input and realisation",
+            "Schroeder phases are the same for every input and realization",
             where="argument phases",
-            expected="'random' or 'low_crest' for several realisations or independent inputs",
+            expected="'random' or 'low_crest' for several realizations or independent inputs",
         )
 
 

@@ -39,11 +39,11 @@ def noise(
     seed : int
         The same seed gives the same signal.
     rms : float
-        Standard deviation of the process, in the unit of the signal; that of one realisation scatters around it.
+        Standard deviation of the process, in the unit of the signal; that of one realization scatters around it.
     band : (float, float), optional
         Lowest and highest frequency [Hz] of a Butterworth filter of order 4; lowest 0 is a low pass. Default: white.
     offset : float or "nonnegative", optional
-        Mean of the process; "nonnegative" raises this realisation until its lowest value is zero.
+        Mean of the process; "nonnegative" raises this realization until its lowest value is zero.
 
     Returns
     -------
@@ -71,8 +71,8 @@ def noise(
     impulse[0] = 1.0
     # Variance of filtered white noise: the energy of the impulse response.
     energy = float(np.sum(signal.sosfilt(sections, impulse) ** 2))
-    coloured: Array = signal.sosfilt(sections, rng.normal(size=settling + n))[settling:]
-    return shifted(level / np.sqrt(energy) * coloured, offset)
+    colored: Array = signal.sosfilt(sections, rng.normal(size=settling + n))[settling:]
+    return shifted(level / np.sqrt(energy) * colored, offset)
 
 
 def _filter(band: object, h: float) -> tuple[Array, int]:

@@ -11,19 +11,19 @@ from ..errors import InputError
 from ._checks import Array, positive_number
 from ._record import Record
 
-_NEIGHBOURS = 5  # a jump of up to two samples cannot move the median of five
+_NEIGHBORS = 5  # a jump of up to two samples cannot move the median of five
 _NOISE = 8.0  # times the noise: one false alarm in 10^15 samples of Gaussian noise
-_QUANTA = 4.0  # quantisation steps that a sound reading may jump
-_SWING = 6.0  # times the spread of the middle three of seven neighbours
+_QUANTA = 4.0  # quantization steps that a sound reading may jump
+_SWING = 6.0  # times the spread of the middle three of seven neighbors
 _MAD = 1.4826  # median absolute deviation of a Gaussian, to its standard deviation
 
 
 def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
-    """Single-sample outliers in the outputs: away from the median of five neighbours, and back after two samples.
+    """Single-sample outliers in the outputs: away from the median of five neighbors, and back after two samples.
 
     A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
-    deviations (from the median absolute deviation), by more than 4 quantisation steps, and by more than 6 times the
-    spread of its neighbours: a real swing moves them too.
+    deviations (from the median absolute deviation), by more than 4 quantization steps, and by more than 6 times the
+    spread of its neighbors: a real swing moves them too.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
 
 
 def median_filter(record: Record, window: float) -> Record:
-    """Replace the outputs by their centred running median.
+    """Replace the outputs by their centered running median.
 
     Parameters
     ----------
@@ -88,15 +88,15 @@ def median_filter(record: Record, window: float) -> Record:
 
 def glitch_rows(column: Array) -> NDArray[np.intp]:
     """Rows of the glitches of one channel."""
-    if len(column) < _NEIGHBOURS:
+    if len(column) < _NEIGHBORS:
         return np.empty(0, dtype=np.intp)
     # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
-    residual = np.abs(column - running_median(column, size=_NEIGHBOURS, mode="mirror"))
+    residual = np.abs(column - running_median(column, size=_NEIGHBORS, mode="mirror"))
     # On a steep stretch the median is the sample itself and hides the noise; second differences see it there too.
     bends = np.abs(np.diff(column, 2)) / np.sqrt(6.0)
     noise = _MAD * max(float(np.median(residual)), float(np.median(bends)))
     rounding = 1e-9 * float(np.abs(column).max())
-    # A fast but real swing bends its neighbours too; a glitch leaves them where they were.
+    # A fast but real swing bends its neighbors too; a glitch leaves them where they were.
     spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
     least = max(_NOISE * noise, _QUANTA * _quantum(column), rounding)
     return np.flatnonzero(residual > np.maximum(least, _SWING * spread))
@@ -127,7 +127,7 @@ def filter_note(window: float, samples: int) -> str:
 
 
 def _quantum(column: Array) -> float:
-    """Quantisation step: the usual distance between neighbouring values that occur."""
+    """Quantization step: the usual distance between neighboring values that occur."""
     gaps = np.diff(np.unique(column))
     return float(np.median(gaps)) if gaps.size else 0.0
 

@@ -58,7 +58,7 @@ class _Piece:
     """What a joint or the Biot number needs to know of a lump."""
 
     capacity: float
-    half: float | None = None  # from its centre to an end face [K/W]; None: unknown, the lump was given as a number
+    half: float | None = None  # from its center to an end face [K/W]; None: unknown, the lump was given as a number
     area: float | None = None  # of its end faces [m²]
     free_ends: int = 1  # faces a joint can use
     films: float = 0.0  # convection to ambients [W/K]
@@ -68,7 +68,7 @@ class _Piece:
 class Assembly:
     """Builds a `System` from bodies with dimensions.
 
-    Rods and layers are cut into lumps of equal length. Neighbouring lumps are joined from centre to centre, the two
+    Rods and layers are cut into lumps of equal length. Neighboring lumps are joined from center to center, the two
     halves in series, so that steady profiles and time constants converge with the square of the lump length.
 
     Examples
@@ -268,7 +268,7 @@ class Assembly:
 
         Heat that convection takes from a lump must first cross the lump. "along": half the lump's length, Δx/(2 k A),
         times the conductance of all its films; more lumps lower it. "across": h (A/P)/k of the section; only a thinner
-        section or a model in two dimensions lowers it. Conduction to neighbours does not count: its resistance is in
+        section or a model in two dimensions lowers it. Conduction to neighbors does not count: its resistance is in
         the model.
 
         Returns

@@ -1,6 +1,6 @@
 """Sparse implicit integration for large networks: stiffly accurate SDIRK of order 2 with an embedded error of order 3.
 
-One sparse factorisation per step length serves all steps (simplified Newton); a sample is halved while the embedded
+One sparse factorization per step length serves all steps (simplified Newton); a sample is halved while the embedded
 error exceeds the tolerance. Memory is linear in the links plus the temperatures that are kept.
 """
 
@@ -55,7 +55,7 @@ class _Stepper:
         return self._lu[level]
 
     def refresh(self) -> None:
-        """Forget all factorisations: the network has changed too much."""
+        """Forget all factorizations: the network has changed too much."""
         self._lu.clear()
 
     def step(self, x: Array, u: Array, level: int) -> tuple[Array, list[Array], float] | None:

@@ -1,4 +1,4 @@
-"""Linearisation to python-control, with the names of the system; time constants."""
+"""Linearization to python-control, with the names of the system; time constants."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ._terms import Array
 
 def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
               inputs: Mapping[str, float] | None = None, *, sample_time: float = 0.0) -> control.StateSpace:
-    """Linearise a system to a python-control state space.
+    """Linearize a system to a python-control state space.
 
     Parameters
     ----------

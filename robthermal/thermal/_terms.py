@@ -1,7 +1,7 @@
 """Heat that is not linear in temperature, and its simplest kinds: natural convection and radiation.
 
 Every term acts between two nodes a and b (lumps or ambients) and returns the heat that flows *into* each of them. It
-may be driven by one column of w (`_drives.py`): a current, a heater, a step. All functions are vectorised: temperatures
+may be driven by one column of w (`_drives.py`): a current, a heater, a step. All functions are vectorized: temperatures
 (..., n_pairs), and analytic, so that a complex step differentiates them.
 """
 

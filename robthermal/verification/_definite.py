@@ -18,7 +18,7 @@ _MOST_ENTRIES = 3_000_000  # of its rows at one time, some 500 MB
 
 
 def eliminate(rows: Rows, keep: set[int]) -> int | None:
-    """Eliminate all rows but ``keep`` from a sparse symmetric matrix, in place, fewest neighbours first.
+    """Eliminate all rows but ``keep`` from a sparse symmetric matrix, in place, fewest neighbors first.
 
     The matrix is positive definite if and only if every pivot and the Schur complement left in ``keep`` are. Returns
     None when every pivot is proven positive, else the row whose pivot is not (or where it would take too long).
@@ -100,12 +100,12 @@ def approximate(matrix: arb_mat) -> NDArray[np.float64]:
 
 def _update(rows: Rows, k: int, pivot: arb) -> None:
     row = rows[k]
-    neighbours = sorted(row)
-    for j in neighbours:
+    neighbors = sorted(row)
+    for j in neighbors:
         rows[j].pop(k, None)
-    for position, i in enumerate(neighbours):
+    for position, i in enumerate(neighbors):
         factor = row[i] / pivot
-        for j in neighbours[position:]:
+        for j in neighbors[position:]:
             value = rows[i].get(j, arb(0)) - factor * row[j]
             rows[i][j] = value
             rows[j][i] = value

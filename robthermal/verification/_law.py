@@ -1,4 +1,4 @@
-"""The feedback-linearising law and its limiter over a box: slopes of the heats that the modules bring.
+"""The feedback-linearizing law and its limiter over a box: slopes of the heats that the modules bring.
 
 v = K (x_h - x_c) + R I²/2 - S x_c I is solved for the current I and limited to [low, high]. Per module a small change
 of temperatures and of v changes the heats into the two faces. Between the limits (the cold face gets v, Evers (5.15))

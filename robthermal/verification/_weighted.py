@@ -2,8 +2,8 @@
 
 For lump j with weight w_j, "sum" needs w_j J_jj + sum_i w_i |J_ij| <= -rate w_j E_j and "max" the same with J_ji.
 For fixed current every entry is affine in the temperatures, for fixed temperatures it is a quadratic in the current,
-and |a| = max(a, -a): the largest value lies at temperature vertices, where the quadratics are maximised exactly.
-Given x_j, the terms of different partners are independent, so partners are maximised one by one (proof note, 2).
+and |a| = max(a, -a): the largest value lies at temperature vertices, where the quadratics are maximized exactly.
+Given x_j, the terms of different partners are independent, so partners are maximized one by one (proof note, 2).
 """
 
 from __future__ import annotations

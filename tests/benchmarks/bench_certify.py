@@ -108,7 +108,7 @@ def modes(count: int) -> control.StateSpace:
 
 
 def grid(k: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Neighbours in a k by k grid, and their conductances."""
+    """Neighbors in a k by k grid, and their conductances."""
     at = np.arange(k * k).reshape(k, k)
     a = np.concatenate([at[:, :-1].ravel(), at[:-1].ravel()])
     b = np.concatenate([at[:, 1:].ravel(), at[1:].ravel()])

@@ -37,7 +37,7 @@ def shaping(machine: rt.systems.Scanner, coefficients: int, frequencies: int) ->
 
 
 def at_once(responses: Responses, demands: Demands) -> float:
-    """Vectorised, every frequency in one program; the robust ellipses fixed at |X| = |Y|, as the naive one has them."""
+    """Vectorized, every frequency in one program; the robust ellipses fixed at |X| = |Y|, as the naive one has them."""
     every = np.ones(responses.basis.shape[1], bool)
     start = Touching.at(responses, demands, None)
     return smallest_bound(cones(responses, demands, start, every), 2 * len(responses.basis)).value
@@ -69,14 +69,14 @@ def main() -> None:
     for frequencies in SIZES:
         problem = shaping(machine, 60, frequencies)
         ours, found = best_of(lambda problem=problem: at_once(*problem), repeats=3)
-        row(f"vectorised, {frequencies} frequencies", ours, f"peak {found:.5f}")
+        row(f"vectorized, {frequencies} frequencies", ours, f"peak {found:.5f}")
         theirs, peak = best_of(lambda problem=problem: naive(*problem), repeats=1)
         row(f"constraint by constraint, {frequencies} frequencies", theirs, f"peak {peak:.5f}, x {theirs / ours:.0f}")
     problem = shaping(machine, 60, 4000)
     theirs *= 4000 / SIZES[-1]
     row("constraint by constraint, 4000 frequencies", theirs, "not run: extrapolated, linear in the frequencies")
     ours, found = best_of(lambda: at_once(*problem), repeats=1)
-    row("vectorised, 4000 frequencies, all at once", ours, f"peak {found:.5f}, x {theirs / ours:.0f}")
+    row("vectorized, 4000 frequencies, all at once", ours, f"peak {found:.5f}, x {theirs / ours:.0f}")
     ours, solution = best_of(lambda: solve(*problem), repeats=1)
     note = f"peak {solution.value:.5f}, x {theirs / ours:.0f}, every bound met at all of them: {solution.feasible}"
     row("as synthesize does it: as needed, ellipses refitted", ours, note)

@@ -41,7 +41,7 @@ def free_runs(board: ModuleType, system: rt.System, training: rt.Record, unseen:
 
 
 def two_heaters() -> None:
-    """The São Paulo board: window of the example, whole catalogue, whole record, no random heat, and the steps."""
+    """The São Paulo board: window of the example, whole catalog, whole record, no random heat, and the steps."""
     board = example("two_heaters")
     training, unseen = board.runs(DATA)
     seconds, found = best_of(lambda: board.diagnose(training, unseen), repeats=1)
@@ -58,7 +58,7 @@ def two_heaters() -> None:
     train, other = board.means(training), board.means(unseen)
     window = train.between(*board.WINDOW)
     seconds, found = best_of(lambda: rt.diagnose(board.nominal(room), window, validation=other), repeats=1)
-    row("  the same window, whole catalogue", seconds, one_line(found))
+    row("  the same window, whole catalog", seconds, one_line(found))
     again = board.read_run(DATA, board.REPEATED)
     seconds, found = best_of(lambda: board.diagnose(again, unseen), repeats=1)
     row("  the same inputs on another day, 10 effects", seconds, one_line(found))

@@ -39,8 +39,8 @@ CLEAN = rt.thermal.simulate(bar(**{OFFSET: TRUTH[OFFSET]}), rt.Record(
 
 def noisy(seed: int, pole: float = 0.0, clean: rt.Record = CLEAN) -> rt.Record:
     white = np.random.default_rng(seed).standard_normal(len(clean) + 200)
-    coloured = lfilter([math.sqrt(1 - pole**2)], [1.0, -pole], white)[200:]
-    return clean.with_outputs(clean.outputs + NOISE * coloured[:, None])
+    colored = lfilter([math.sqrt(1 - pole**2)], [1.0, -pole], white)[200:]
+    return clean.with_outputs(clean.outputs + NOISE * colored[:, None])
 
 
 def calibrated(seed: int, pole: float = 0.0, **options: object) -> rt.calibration.Fit:
@@ -61,7 +61,7 @@ def test_white_noise() -> None:
     assert sum(fit.covariance_scale > 1.5 for fit in fits) <= 8  # blocks of white noise: 1 % of repetitions, if that
 
 
-def test_coloured_noise() -> None:
+def test_colored_noise() -> None:
     """Pole 0.8: a hundred readings are eleven independent ones, and 1.96 deviations cover far less often."""
     fits = [calibrated(seed, 0.8) for seed in range(REPEATS)]
     single = sum(all(abs(fit.parameters[name] - TRUTH[name]) < 1.96 * std for name, std in fit.std.items())
@@ -91,7 +91,7 @@ def test_one_undetermined_direction() -> None:
 
 
 def test_a_prior_closes_the_direction() -> None:
-    """The prior is what is known before: its centre scatters about the truth with its standard deviation."""
+    """The prior is what is known before: its center scatters about the truth with its standard deviation."""
     sigma = 0.05
 
     def fit(seed: int) -> rt.calibration.Fit:

@@ -142,7 +142,7 @@ def test_bad_input_is_refused(call, words):
         call(control.ss(-1.0, 1.0, 1.0, 0.0))
 
 
-def test_linearised_two_module_system():
+def test_linearized_two_module_system():
     G = rt.thermal.linearize(rt.systems.two_module(), inputs={"m1": 0.5, "m2": 0.5})
     assert rt.certify.stability(G).holds
     one = control.ss(G.A, G.B[:, :1], G.C[:1], G.D[:1, :1])

@@ -71,7 +71,7 @@ def random_pair() -> Callable[[int], Pair]:
 
 
 def make_random_pair(seed: int) -> Pair:
-    """Stable random plants with one wrong-side zero each and small stabilising controllers."""
+    """Stable random plants with one wrong-side zero each and small stabilizing controllers."""
     rng = np.random.default_rng(seed)
     plants, controllers = [], []
     for _ in range(2):

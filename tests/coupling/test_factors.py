@@ -59,7 +59,7 @@ def test_continuous_relative_degree_needs_a_lowpass() -> None:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_cascade_realises_what_it_is_given(seed: int) -> None:
+def test_cascade_realizes_what_it_is_given(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pairs = rng.uniform(0.2, 0.99, 3) * np.exp(1j * rng.uniform(0.1, 3.0, 3))
     zeros = np.concatenate([pairs[:2] * 1.3, pairs[:2].conj() * 1.3, rng.uniform(-2, 2, seed % 4)])

@@ -87,14 +87,14 @@ def test_bases_that_cannot_be(name, pole, dt, word):
 # Variances
 
 
-def coloured(dt: float) -> control.StateSpace:
+def colored(dt: float) -> control.StateSpace:
     return control.ss([[0.9, 0.2], [-0.1, 0.8]], [[1.0], [0.5]], [[0.3, 1.0]], [[0.7]], dt)
 
 
 def test_variance_of_the_moving_average_equals_that_of_a_long_impulse_response():
     basis, delay, N = make_basis("laguerre", 5, 0.5, DT), control.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]], DT), 7
-    total, average = moments(coloured(DT), delay, basis, N)
-    signal = impulse(coloured(DT), 4000)[0]
+    total, average = moments(colored(DT), delay, basis, N)
+    signal = impulse(colored(DT), 4000)[0]
     shaped = np.vstack([signal] + [np.convolve(signal, np.concatenate([[0.0], h]))[:4000]
                                    for h in impulse(basis.all(), 3999)])
     averaged = np.array([np.convolve(row, np.full(N, 1 / N)) for row in shaped])
@@ -201,10 +201,10 @@ def test_least_peak_is_the_flat_prediction_error():
 
 
 def test_mixed_objective_keeps_the_peak_and_pays_in_variance():
-    coloured = control.tf([1, 0.9], [1, 0], DT)
-    free = simple(weight=coloured, order=8)
+    colored = control.tf([1, 0.9], [1, 0], DT)
+    free = simple(weight=colored, order=8)
     limit = 0.9 * free.norms["hinf"]
-    bound = simple(weight=coloured, order=8, objective="mixed", hinf_limit=limit)
+    bound = simple(weight=colored, order=8, objective="mixed", hinf_limit=limit)
     assert bound.holds and bound.norms["hinf"] <= limit
     assert free.norms["h2"] <= bound.norms["h2"] <= bound.norms["h2_uncoupled"]
 
@@ -334,7 +334,7 @@ def closed_loop(P1: control.StateSpace, P2: control.StateSpace, K: control.State
     return np.linalg.eigvals(loop.A - loop.B @ np.linalg.solve(np.eye(2) + loop.D, loop.C))
 
 
-def test_robust_filters_stabilise_every_pair_of_measured_plants(machine, robust):
+def test_robust_filters_stabilize_every_pair_of_measured_plants(machine, robust):
     # Reticle at one position and wafer at another are under the envelope too.
     assert len(machine.plants) > 1
     for P1, _ in machine.plants:

@@ -101,7 +101,7 @@ def made_up(response: Array, hertz: Array, deviation: float) -> rt.identify.Freq
         input_names=["u1", "u2"], output_names=["y1", "y2"], sample_time=0.01, n_samples=4000, method="made up")
 
 
-def test_large_circles_are_bounded_not_linearised() -> None:
+def test_large_circles_are_bounded_not_linearized() -> None:
     """The worst phase moves Delta_p a third more than first order says; the bound holds for it."""
     P, C = control.tf([0.1], [1, -0.9], 0.01), control.tf([2.0], [1.0], 0.01)
     w = np.array([30.0, 60.0, 200.0])
@@ -176,7 +176,7 @@ def test_grid_too_coarse_for_a_resonance(pair: Pair) -> None:
         rt.coupling.dual_youla(control.FRD(frf[:, :, low], w[low]), (pair.P1, pair.P2), (pair.C1, pair.C2))
 
 
-def test_a_plant_the_controllers_do_not_stabilise(pair: Pair) -> None:
+def test_a_plant_the_controllers_do_not_stabilize(pair: Pair) -> None:
     w = grid_of(pair)
     frf = np.zeros((2, 2, len(w)), dtype=complex)
     frf[0, 0], frf[1, 1] = at(pair.P1, w), at(pair.P2, w)

@@ -60,7 +60,7 @@ def test_runaway_in_heating_ends_the_run(system, pi):
     assert 3 < len(loop.time) < 4000 and loop.cold.shape == loop.current.shape
 
 
-def test_normalised_steps_collapse(system, pi, law):
+def test_normalized_steps_collapse(system, pi, law):
     found = rt.design.step_response_linearity(system, pi, law=law, base=308.15,
                                               steps=(-30.0, -10.0, 10.0, 30.0), duration=250.0)
     assert found.outcome.code == "collapsed"

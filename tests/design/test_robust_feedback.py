@@ -62,7 +62,7 @@ def test_corner_plants_are_the_derivatives_of_what_the_constant_gain_does(plain,
     assert any(np.isclose(p.B[0, 0], gain, rtol=1e-6) and np.isclose(p.B[0, 2], touch, rtol=1e-5) for p in at)
 
 
-def test_it_stabilises_every_corner_and_switching_between_them(plant, corners):
+def test_it_stabilizes_every_corner_and_switching_between_them(plant, corners):
     loop = rt.design.state_feedback(plant, bandwidth=0.05, sample_time=1.0, method="lmi", plants=corners)
     assert loop.outcome
     matrices = [closed(loop, ss, 1.0) for ss in corners]
@@ -73,7 +73,7 @@ def test_it_stabilises_every_corner_and_switching_between_them(plant, corners):
     assert np.abs(left).max() < 1e-6
 
 
-def test_plants_that_no_gain_stabilises_are_refused(plant):
+def test_plants_that_no_gain_stabilizes_are_refused(plant):
     """Heat that acts one way in one plant and the other way in the next."""
     turned = replace(plant, B=np.hstack([-plant.B[:, :2], plant.B[:, 2:]]))
     loop = rt.design.state_feedback(plant, bandwidth=0.05, sample_time=1.0, method="lmi", plants=[turned])

@@ -19,7 +19,7 @@ from blind.integrate import Hidden, integrate  # noqa: E402
 from blind.judge import all_named, answer, has_truth, same, stray, wrong  # noqa: E402
 from blind.plants import PLANTS, H, excitation, nominal  # noqa: E402
 from blind.rates import interval, print_matrix, print_rates  # noqa: E402
-from blind.run import judged, rows_in, run, short_catalogue  # noqa: E402
+from blind.run import judged, rows_in, run, short_catalog  # noqa: E402
 from blind.sizes import SIZES, drawn  # noqa: E402
 
 KINDS = {effect: topology for topology in "BAC" for effect in SIZES[topology]}  # each once, in the quickest plant
@@ -66,7 +66,7 @@ def _readings(true, plant, hidden, U, T0):
 @pytest.mark.parametrize("case", [Case("A", "hidden", "sensor_gain", 5), Case("B", "nothing", "nothing", 0),
                                   Case("C", "nothing", "nothing", 0)], ids=lambda case: case.topology)
 def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
-    """Short records and a short catalogue: the suite's own take minutes."""
+    """Short records and a short catalog: the suite's own take minutes."""
     monkeypatch.setattr(rt, "diagnose", partial(rt.diagnose, effects=["sensor_gain", "sensor_lag", "heat_source"]))
     monkeypatch.setattr("blind.cases.N_TRAIN", 150)
     monkeypatch.setattr("blind.cases.N_UNSEEN", 100)
@@ -79,7 +79,7 @@ def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
 
 
 def test_a_small_mass_in_a_bent_valley_is_found():
-    """Beside a capacity that gives way no step from nothing along the tangent survives: the neighbour got the name."""
+    """Beside a capacity that gives way no step from nothing along the tangent survives: the neighbor got the name."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 12))
     found = rt.diagnose(given.system, given.train, validation=given.unseen, effects=["hidden_mass", "sensor_lag"])
     assert [effect.effect for effect in found.effects] == ["hidden_mass"] and found.effects[0].where == ("left",)
@@ -89,7 +89,7 @@ def test_a_small_mass_in_a_bent_valley_is_found():
 
 @pytest.mark.parametrize("seed", [49, 95])  # 95: only with the parameters as they were before the mass
 def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
-    """The refit of the right mass ends in the lesser of two minima; a mass in the neighbouring lump got the name."""
+    """The refit of the right mass ends in the lesser of two minima; a mass in the neighboring lump got the name."""
     given, truth = made(Case("C", "hidden", "hidden_mass", seed))
     fit = rt.diagnosis.refit(given.system, given.train)
     scores = rt.diagnosis.score(fit, ["hidden_mass"])
@@ -102,7 +102,7 @@ def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
 
 
 def test_an_effect_that_shrinks_to_nothing_is_no_name():
-    """The neighbour is accepted first; once the right mass is found, nothing is left of it."""
+    """The neighbor is accepted first; once the right mass is found, nothing is left of it."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 78))
     found = rt.diagnose(given.system, given.train, validation=given.unseen,
                         effects=["hidden_mass", "missing_ambient_link"])
@@ -160,10 +160,10 @@ def test_interval_is_clopper_and_pearsons():
     assert interval(100, 100) == (pytest.approx(0.025 ** (1 / 100)), 1.0)
 
 
-def test_a_short_catalogue_holds_the_truth():
+def test_a_short_catalog_holds_the_truth():
     for case in (Case("B", "hidden", "input_lag", 20), Case("A", "outside", "fan", 40)):
         given, truth = made(case)
-        names = short_catalogue(given.system, truth, 40, case.seed)
+        names = short_catalog(given.system, truth, 40, case.seed)
         assert 35 <= len(rt.diagnosis.candidates(given.system, names)) <= 40
         assert ("input_lag" in names) or case.group == "outside"
 

@@ -1,4 +1,4 @@
-"""The catalogue page shows every effect, and the documented examples run."""
+"""The catalog page shows every effect, and the documented examples run."""
 
 from __future__ import annotations
 

@@ -227,7 +227,7 @@ def test_steps_of_a_converter_make_no_name(plant: rt.System, hide: Hide) -> None
     found = rt.diagnose(plant, train, validation=unseen)
     assert found.verdict == "consistent"
     assert found.noise_floor.noise["Tp"] == pytest.approx(0.25 / 12**0.5, rel=1e-6)
-    assert found.noise_floor.quantised == ("Tp", "Tb")
+    assert found.noise_floor.quantized == ("Tp", "Tb")
 
 
 def test_an_effect_is_named_through_the_steps_of_a_converter(plant: rt.System, hide: Hide, rate: Callable) -> None:

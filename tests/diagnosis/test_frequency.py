@@ -108,7 +108,7 @@ def test_missing_link_is_found_with_what_one_operating_point_cannot_exclude(plan
     assert {"missing_ambient_link(block, room)", "natural_convection(block, room)"} == {*labels(found), *others}
 
 
-def test_outside_the_catalogue_is_not_named(plant: rt.System, response: Measure, rate: Callable) -> None:
+def test_outside_the_catalog_is_not_named(plant: rt.System, response: Measure, rate: Callable) -> None:
     def diffusive(t: float, x: Array, u: Array) -> Array:  # a semi-infinite rod on the block, ten cells
         rod = x[2:]
         into = 3.0 * np.diff(np.concatenate([[x[1]], rod]))

@@ -91,7 +91,7 @@ def test_constant_source_is_a_declared_alias(plant: rt.System, hide: Hide, rate:
     assert {"heat_source(plate)", "ambient_gradient(plate)", "sensor_self_heating(Tp)"} <= names(found)
 
 
-def test_physics_outside_the_catalogue_is_not_named(plant: rt.System, hide: Hide, rate: Callable) -> None:
+def test_physics_outside_the_catalog_is_not_named(plant: rt.System, hide: Hide, rate: Callable) -> None:
     def melting(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
         slow = 1.0 + 4.0 * np.exp(-(((T[0] - 303.0) / 1.0) ** 2))  # heat of fusion about 303 K
         return rate(T, u) / np.array([slow, 1.0])
@@ -103,7 +103,7 @@ def test_physics_outside_the_catalogue_is_not_named(plant: rt.System, hide: Hide
     assert min(found.located.lumps.values()) < 1e-6
 
 
-def test_own_effect_joins_the_catalogue(plant: rt.System, hide: Hide) -> None:
+def test_own_effect_joins_the_catalog(plant: rt.System, hide: Hide) -> None:
     # A reading in the wrong place between the lumps: T = (1 - s) T_block + s T_plate, known to nobody but the user.
     def placed(system: rt.System, where: tuple[str, ...], q: dict[str, float]) -> rt.System:
         return system.with_parameters({f"sensors.{where[0]}.delay": q["delay"]})

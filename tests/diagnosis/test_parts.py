@@ -56,7 +56,7 @@ def with_gaps() -> LinearizedRecord:
     return linearized(machine(plate=True))
 
 
-def test_catalogue_is_the_contract() -> None:
+def test_catalog_is_the_contract() -> None:
     known = rt.thermal.effects()
     assert set(known) == set(rt.diagnosis.effects())
     for name, effect in rt.diagnosis.effects().items():

@@ -87,7 +87,7 @@ def test_radiation_and_a_power_slope_look_alike_and_are_below_what_could_be_seen
     assert scores.limit[i] > 3.0e-11  # W/K⁴; the published value is 5.1e-11, fits to other runs say 3.4e-11
 
 
-def test_without_the_missing_effects_in_the_catalogue_nothing_is_named(
+def test_without_the_missing_effects_in_the_catalog_nothing_is_named(
         records: tuple[rt.Record, rt.Record], room: float) -> None:
     train, unseen = records
     found = rt.diagnose(two_heaters.nominal(room), train, validation=unseen, effects=["sensor_offset", "radiation"])

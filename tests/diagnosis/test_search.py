@@ -102,7 +102,7 @@ def test_the_phase_of_a_load_is_that_of_least_squares(plant: rt.System, convecte
         assert scores.identifiability[i] == pytest.approx(np.linalg.norm(left) / whole, rel=1e-6)
 
 
-def test_exact_aliases_stand_in_the_order_of_the_catalogue(plant: rt.System, convected: rt.Record) -> None:
+def test_exact_aliases_stand_in_the_order_of_the_catalog(plant: rt.System, convected: rt.Record) -> None:
     scores = rt.diagnosis.score(rt.diagnosis.refit(plant, convected),
                                 ["heat_source", "ambient_gradient", "sensor_self_heating"])
     first = labels(scores).index("heat_source(plate)")

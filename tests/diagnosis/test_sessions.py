@@ -78,7 +78,7 @@ def test_bad_session_gain_is_refused(plant: rt.System, day: Callable, wrong: obj
 
 
 def closed_loop(seed: int, mass: float = 0.0, n: int = 150) -> rt.Record:
-    """A PI controller holds the block on set-points; random heat acts on both lumps. Exact discretisation by Van Loan.
+    """A PI controller holds the block on set-points; random heat acts on both lumps. Exact discretization by Van Loan.
 
     A hidden mass [J/K] sits behind the plate with a time constant of 60 s.
     """

@@ -12,7 +12,7 @@ L, R = 8, 2
 
 
 def dft(x: np.ndarray) -> np.ndarray:
-    """(channels, bins 0 ... ) normalised by 1/sqrt(N), by the plain definition."""
+    """(channels, bins 0 ... ) normalized by 1/sqrt(N), by the plain definition."""
     n = len(x)
     return np.exp(-2j * np.pi * np.outer(np.arange((n - 1) // 2 + 1), np.arange(n)) / n) @ (x - x.mean(axis=0)) / n**0.5
 
@@ -132,7 +132,7 @@ def test_joint_region_of_a_row_needs_the_gram_block_unconjugated() -> None:
     assert np.mean(bad) < 0.93
 
 
-def test_joint_covariance_of_neighbouring_bins_equals_the_scatter() -> None:
+def test_joint_covariance_of_neighboring_bins_equals_the_scatter() -> None:
     rng, bins = np.random.default_rng(5), np.array([100, 102, 105, 117])
     u, samples, predicted = rng.normal(size=400), [], []
     for _ in range(1000):

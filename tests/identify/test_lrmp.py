@@ -46,11 +46,11 @@ def test_lowest_bins_equal_least_squares_on_the_functions_of_the_thesis() -> Non
         rows = np.arange(max(k - 8, 1), max(k - 8, 1) + 17)
         omega = 2 * np.pi * rows / (n * 0.1)
         basis = np.stack([np.ones(17), *(1 / (1j * omega - p) for p in poles)], axis=1)
-        centre = np.array([1, *(1 / (2j * np.pi * k / (n * 0.1) - p) for p in poles)])
+        center = np.array([1, *(1 / (2j * np.pi * k / (n * 0.1) - p) for p in poles)])
         K = np.hstack([basis * U[rows, None], basis])
         scale = np.linalg.norm(K, axis=0)
         theta = np.linalg.lstsq(K / scale, Y[rows], rcond=1e-14)[0] / scale
-        np.testing.assert_allclose(G.response[0, 0, k - 1], centre @ theta[:3], rtol=1e-3)
+        np.testing.assert_allclose(G.response[0, 0, k - 1], center @ theta[:3], rtol=1e-3)
 
 
 @pytest.mark.parametrize("n_channels", [1, 2])

@@ -103,7 +103,7 @@ def test_ids_are_unique_and_every_reference_leads_somewhere(page: Page, path: Pa
     text = path.read_text(encoding="utf-8")
     wanted = set(re.findall(r"url\(#([^)]+)\)", text))
     wanted |= {a["href"][1:] for _, a in page.tags if a.get("href", "").startswith("#")}
-    wanted |= {a["aria-labelledby"] for _, a in page.tags if "aria-labelledby" in a}
+    wanted |= {a["aria-labeledby"] for _, a in page.tags if "aria-labeledby" in a}
     assert len(wanted) > 20 and wanted <= set(ids)
 
 
@@ -122,23 +122,23 @@ def test_page_is_accessible(page: Page) -> None:
     assert [a["href"] for a in page.all("a")][0] == "#claims", "skip link comes first"
 
 
-def luminance(colour: str) -> float:
-    parts = np.array([int(colour[i:i + 2], 16) / 255 for i in (1, 3, 5)])
+def luminance(color: str) -> float:
+    parts = np.array([int(color[i:i + 2], 16) / 255 for i in (1, 3, 5)])
     linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
     return float(linear @ (0.2126, 0.7152, 0.0722))
 
 
-def test_contrast_of_every_text_colour(path: Path) -> None:
+def test_contrast_of_every_text_color(path: Path) -> None:
     # WCAG 2.1, 1.4.3: at least 4.5:1. Blocks in their order: light, dark, print.
     blocks = re.findall(r":root \{(.*?)\}", path.read_text(encoding="utf-8"), re.DOTALL)
     assert len(blocks) == 3
     light = dict(re.findall(r"--([\w-]+): (#\w{6})", blocks[0]))
     for block in blocks:
-        colours = light | dict(re.findall(r"--([\w-]+): (#\w{6})", block))
+        colors = light | dict(re.findall(r"--([\w-]+): (#\w{6})", block))
         inks = ("ink", "quiet", "link", "yes-text", "no-text", "remarks-text")
         pairs = [(ink, ground) for ink in inks for ground in ("paper", "card")]
-        values = [(colours[a], colours[b]) for a, b in [*pairs, ("banner-ink", "banner")]]
-        for a, b in [*values, *(("#ffffff", colours[name]) for name in ("yes", "no", "remarks"))]:
+        values = [(colors[a], colors[b]) for a, b in [*pairs, ("banner-ink", "banner")]]
+        for a, b in [*values, *(("#ffffff", colors[name]) for name in ("yes", "no", "remarks"))]:
             low, high = sorted((luminance(a), luminance(b)))
             assert (high + 0.05) / (low + 0.05) >= 4.5, (a, b)
 

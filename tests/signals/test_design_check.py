@@ -197,7 +197,7 @@ def test_heat_rise_and_relative_deviation() -> None:
     np.testing.assert_allclose(sampled.response, check.response, rtol=1e-9)
 
 
-def test_a_system_tells_its_poles_and_its_linearisation_its_response() -> None:
+def test_a_system_tells_its_poles_and_its_linearization_its_response() -> None:
     system = rt.systems.two_module()
     heat = multisines(1200, inputs=2, sample_time=1.0, band=(0.004, 0.05), amplitude=0.3, seed=1)
     with_poles = design_check(heat, sample_time=1.0, model=system, noise=0.01)

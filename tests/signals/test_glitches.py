@@ -23,7 +23,7 @@ def heating(n: int = 2000) -> np.ndarray:
     return 300.0 + 40.0 * (1.0 - np.exp(-np.arange(n) / 400.0))
 
 
-def test_planted_glitches_are_found_in_quantised_readings() -> None:
+def test_planted_glitches_are_found_in_quantized_readings() -> None:
     sound = np.round(heating() / 0.489) * 0.489
     spoilt = sound.copy()
     rows = [0, 57, 400, 401, 1999]

@@ -35,8 +35,8 @@ def test_zippered_lines_excite_one_input_each() -> None:
         np.testing.assert_array_equal(heat.lines[i], np.arange(2 + i, 40, 3))
 
 
-def test_independent_inputs_and_realisations_differ_in_phase_only() -> None:
-    heat = multisines(200, inputs=2, arrangement="independent", realisations=3, periods=2, **COMMON)
+def test_independent_inputs_and_realizations_differ_in_phase_only() -> None:
+    heat = multisines(200, inputs=2, arrangement="independent", realizations=3, periods=2, **COMMON)
     assert heat.signals.shape == (3, 1, 400, 2)
     assert len(heat.experiments) == 3
     np.testing.assert_array_equal(heat.signals[:, :, :200], heat.signals[:, :, 200:])
@@ -49,7 +49,7 @@ def test_independent_inputs_and_realisations_differ_in_phase_only() -> None:
 
 def test_all_experiments_share_level_and_operating_point() -> None:
     heat = multisines(
-        200, inputs=3, realisations=2, offset="nonnegative", **{**COMMON, "rms": None}, amplitude=[5.0, 1.0, 2.0]
+        200, inputs=3, realizations=2, offset="nonnegative", **{**COMMON, "rms": None}, amplitude=[5.0, 1.0, 2.0]
     )
     peaks = np.abs(heat.signals - heat.signals.mean(axis=2, keepdims=True)).max(axis=(0, 1, 2))
     np.testing.assert_allclose(peaks, [5.0, 1.0, 2.0])
@@ -69,8 +69,8 @@ def test_low_crest_holds_in_every_experiment(n_u: int) -> None:
     np.testing.assert_allclose(heat.schroeder_crest_factors, crest_factor(schroeder))
 
 
-def test_optimised_realisations_say_that_their_phases_are_not_random() -> None:
-    heat = multisines(200, inputs=1, phases="low_crest", realisations=2, **COMMON)
+def test_optimized_realizations_say_that_their_phases_are_not_random() -> None:
+    heat = multisines(200, inputs=1, phases="low_crest", realizations=2, **COMMON)
     assert not np.allclose(heat.signals[0], heat.signals[1])
     assert "assumes random phases" in heat.outcome.text
 
@@ -88,12 +88,12 @@ def test_printed_and_drawn() -> None:
     [
         ({"inputs": 0}, "inputs is 0"),
         ({"inputs": 1.5}, "inputs is 1.5"),
-        ({"realisations": 0}, "realisations is 0"),
+        ({"realizations": 0}, "realizations is 0"),
         ({"periods": -1}, "periods is -1"),
         ({"arrangement": "zipper"}, "arrangement is 'zipper'.*'zippered'"),
         ({"arrangement": "zippered", "lines": [3]}, "1 lines for 2 zippered inputs"),
-        ({"phases": "schroeder", "realisations": 2}, "same for every input and realisation"),
-        ({"phases": "schroeder", "arrangement": "independent"}, "same for every input and realisation"),
+        ({"phases": "schroeder", "realizations": 2}, "same for every input and realization"),
+        ({"phases": "schroeder", "arrangement": "independent"}, "same for every input and realization"),
         ({"rms": [1.0]}, "rms has 1 values for 2 inputs"),
         ({"rms": [1.0, -1.0]}, "rms is -1.0"),
         ({"rms": None}, "neither of rms and amplitude"),

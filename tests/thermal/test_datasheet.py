@@ -38,7 +38,7 @@ def test_published_inversions(name: str) -> None:
 @pytest.mark.parametrize("basis", ["voltage", "heat"])
 @pytest.mark.parametrize("name", GOLDEN)
 def test_the_module_equations_give_the_sheet_back(name: str, basis: str) -> None:
-    """Maximise the temperature difference of the module equations over the current, numerically."""
+    """Maximize the temperature difference of the module equations over the current, numerically."""
     sheet = fit(name)
     module = sheet.module("h", "c", basis=basis)
     S, R, K = module.seebeck.value, module.resistance.value, module.conductance.value

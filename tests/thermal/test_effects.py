@@ -1,4 +1,4 @@
-"""Every effect of the catalogue against balances written by hand and integrated by scipy, and its sensitivities."""
+"""Every effect of the catalog against balances written by hand and integrated by scipy, and its sensitivities."""
 
 from collections.abc import Sequence
 
@@ -296,7 +296,7 @@ def test_large_networks_refuse_what_needs_memory(monkeypatch):
         rt.thermal.trajectory(system, record())
 
 
-def test_linearisation_follows_a_lagged_input():
+def test_linearization_follows_a_lagged_input():
     system = rt.thermal.add_effect(bench(), "input_lag", ["q"], {"time_constant": 6.0}).system
     lagged, plain = rt.thermal.linearize(system), rt.thermal.linearize(bench())
     s = 0.11j

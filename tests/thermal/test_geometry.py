@@ -36,7 +36,7 @@ def steady(system: System) -> np.ndarray:
     return np.linalg.solve(A, -B @ [ambient.temperature for ambient in system.ambients.values()])
 
 
-def centres(n: int, length: float = LENGTH) -> np.ndarray:
+def centers(n: int, length: float = LENGTH) -> np.ndarray:
     return (np.arange(n) + 0.5) * length / n
 
 
@@ -61,7 +61,7 @@ def test_fin_with_insulated_tip_converges_with_second_order() -> None:
     errors, heats = [], []
     for n in (8, 16, 32, 64):
         T = steady(fin(n))
-        exact = 300.0 + 50.0 * np.cosh(m * (LENGTH - centres(n))) / np.cosh(m * LENGTH)
+        exact = 300.0 + 50.0 * np.cosh(m * (LENGTH - centers(n))) / np.cosh(m * LENGTH)
         errors.append(np.abs(T - exact).max())
         base = next(link for link in fin(n).links if "base" in link.between)
         exact_heat = np.sqrt(FILM * PERIMETER * 20.0 * AREA) * 50.0 * np.tanh(m * LENGTH)
@@ -120,7 +120,7 @@ def test_composite_wall_is_exact_for_any_cut(lumps: int) -> None:
     per_area = 1e-4 + 0.02 / 20.0 + 2e-4 + 0.005 / k["POM"] + 0.003 / k["copper"] + 1 / 80.0
     out = next(link for link in system.links if link.between == (wall[-1], "air"))
     assert out.conductance * (T[-1] - 300.0) == pytest.approx(100.0 * 2e-3 / per_area, rel=1e-12)
-    slope = (20.0 * 2e-3) / 0.02 * lumps  # of the steel, between neighbouring centres [W/K]
+    slope = (20.0 * 2e-3) / 0.02 * lumps  # of the steel, between neighboring centers [W/K]
     if lumps > 1:
         np.testing.assert_allclose(slope * -np.diff(T[:lumps]), 100.0 * 2e-3 / per_area, rtol=1e-10)
 

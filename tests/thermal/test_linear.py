@@ -1,4 +1,4 @@
-"""Linearisation against simulation, reduction against brute force."""
+"""Linearization against simulation, reduction against brute force."""
 
 import control
 import numpy as np

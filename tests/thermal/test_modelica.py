@@ -70,7 +70,7 @@ def test_simulation_of_the_text_is_ours(effects, full, drive):
     compare(system, drive(n=8, seed=3), 2e-4)
 
 
-def test_every_effect_of_the_catalogue_is_tested():
+def test_every_effect_of_the_catalog_is_tested():
     assert set(EFFECTS) == {effect for group in GROUPS for effect in group}
     assert set(EFFECTS) | {"missing_ambient_link"} == set(rt.thermal.effects())
 

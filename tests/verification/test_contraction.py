@@ -89,7 +89,7 @@ def test_eighteen_lumps_are_verified_in_a_blink(shared, tmp_path, capsys):
 
 
 def test_decay_of_reference(shared):
-    """The largest proven rate is that of the generalised eigenvalues at the vertices of the box, and below it."""
+    """The largest proven rate is that of the generalized eigenvalues at the vertices of the box, and below it."""
     system = two_module(shared)
     E = np.diag([lump["capacity"] for lump in system["lumps"].values()])
     for low, high in ((0.0, 3.3), (-1.5, 1.5)):
@@ -198,7 +198,7 @@ def test_opposite_modules_and_negative_off_diagonals():
 
 @pytest.mark.parametrize("nonlinear", [{"natural": {"gain": 5.0, "exponent": 0.25}}, {"radiation": 1e-7}])
 def test_links_that_are_not_linear(nonlinear):
-    """Strong convection or radiation helps a lump and feeds its neighbour: the sum must notice unequal weights."""
+    """Strong convection or radiation helps a lump and feeds its neighbor: the sum must notice unequal weights."""
     system = rod()
     system["links"][0] = {**system["links"][0], **nonlinear}
     evidence = {"method": "sum", "rate": 0.0, "weights": [1.0, 1.2]}

@@ -56,7 +56,7 @@ def test_other_keys_are_free(place):
     part = document
     for name in place:
         part = part[name]
-    part.update(note="measured in May", source=None, batch=7, colour=[1.0, 2.0], shop={"row": 3})
+    part.update(note="measured in May", source=None, batch=7, color=[1.0, 2.0], shop={"row": 3})
     assert contraction(**document).holds
 
 

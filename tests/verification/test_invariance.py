@@ -85,7 +85,7 @@ def test_margin_is_the_least_inward_flow():
 
 
 def test_box_that_only_touches_is_invariant():
-    """A passive lump between neighbours with the same box: zero flow at the face is allowed (Nagumo)."""
+    """A passive lump between neighbors with the same box: zero flow at the face is allowed (Nagumo)."""
     system = {"lumps": {"a": {"capacity": 1.0}, "b": {"capacity": 1.0}}, "ambients": [], "modules": {},
               "links": [{"between": ["a", "b"], "conductance": 0.5, "natural": {"gain": 0.1, "exponent": 0.25},
                          "radiation": 1e-10}]}

@@ -51,7 +51,7 @@ def test_one_module_is_certified_up_to_its_runaway_current(method):
     assert not refused.holds and method in refused.reason
 
 
-def test_the_rate_is_that_of_the_linearised_hot_side():
+def test_the_rate_is_that_of_the_linearized_hot_side():
     """-g + φ over E, φ of the errata at the ends of the box."""
     top, hot = 1.0, 330.0
     phi = -K + S * top + (R * top + S * hot) * K / (S * COLD - R * top)

@@ -29,7 +29,7 @@ class Destabilizing:
     delta : ndarray, shape (2, 2)
         Delta_p there (complex).
     scale : float
-        Its size relative to the envelope: below 1, a plant inside the stated uncertainty is not stabilised.
+        Its size relative to the envelope: below 1, a plant inside the stated uncertainty is not stabilized.
     system : StateSpace
         Stable 2x2 Delta_p with that value at that frequency and smaller away from it (a narrow band-pass).
     """
@@ -66,7 +66,7 @@ def destabilizing(filters: Filters, width: float = 1e-3) -> Destabilizing:
     >>> filters = rt.coupling.evaluate(machine.P1, machine.P2, machine.C1, machine.C2, X_hat=-1, Y_hat=1,
     ...                                uncertainty=list(machine.frf))
     >>> found = rt.coupling.destabilizing(filters)
-    >>> filters.robustly_stable, found.scale < 1  # not robust: a plant inside the envelope is not stabilised
+    >>> filters.robustly_stable, found.scale < 1  # not robust: a plant inside the envelope is not stabilized
     (False, True)
     """
     problem, omega = filters.problem, _worst_frequency(filters)

@@ -155,7 +155,7 @@ def simulate(filters: Filters, samples: int | None = None, seed: int = 0, *, dis
     problem = filters.problem
     if not problem.dt:
         raise InputError("continuous-time filters", where="simulate", expected="discrete time (dt > 0)",
-                         remedy="Discretise plants and controllers first.")
+                         remedy="Discretize plants and controllers first.")
     v, dropped = _disturbances(problem, samples, seed, disturbances)
     n = v.shape[1] - dropped
     if n < max(problem.samples, 1):

@@ -126,7 +126,7 @@ def coprime(P0: Any, K0: Any, cutoff: float | None = None) -> CoprimeFactors:
     Parameters
     ----------
     P0, K0 : 2x2 StateSpace or TransferFunction, or pairs
-        Plants and controllers, diagonal. K0 must stabilise P0 (negative feedback).
+        Plants and controllers, diagonal. K0 must stabilize P0 (negative feedback).
     cutoff : float, optional
         Continuous time: corner of the low-pass in Z, as :func:`inner_factor` [rad/s].
 

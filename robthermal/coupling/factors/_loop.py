@@ -73,7 +73,7 @@ def _closed_loop_poles(plant: Zpk, controller: Zpk, names: tuple[str, str, str])
                          expected="a well-posed loop", remedy="Add a delay or a low-pass filter to the controller.")
     poles = paired(np.linalg.eigvals(feedback_matrix(realize(plant), realize(controller))))
     expect_stable(poles, where, plant.dt, "the loop of plant and controller is unstable",
-                  "The controllers must stabilise their own plants (negative feedback, e = r - y).")
+                  "The controllers must stabilize their own plants (negative feedback, e = r - y).")
     return _polished(poles, plant, controller)
 
 
@@ -110,7 +110,7 @@ def _polished(poles: Array, plant: Zpk, controller: Zpk) -> Array:
 
 
 def _spread(roots: Array) -> Array:
-    """Distance of each root to its nearest neighbour."""
+    """Distance of each root to its nearest neighbor."""
     gaps = np.abs(roots[:, None] - roots[None, :]) + np.diag(np.full(len(roots), np.inf))
     return gaps.min(axis=1, initial=1.0)
 

@@ -77,7 +77,7 @@ def normalized(P: Any, side: Literal["right", "left"] = "right") -> NormalizedFa
     try:
         F, root = _gain(A, B, C, D, discrete=control.isdtime(plant, strict=True))
     except np.linalg.LinAlgError:
-        raise InputError("the Riccati equation has no stabilising solution", where="argument P",
+        raise InputError("the Riccati equation has no stabilizing solution", where="argument P",
                          expected="a plant whose unstable modes and modes on the boundary are all reached and seen",
                          remedy="Take a minimal realization (control.minreal).") from None
     rows = {"N": (C + D @ F, D @ root), "M": (F, root)}

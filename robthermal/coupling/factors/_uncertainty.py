@@ -38,7 +38,7 @@ class Uncertainty:
         Of the model and the controllers.
     radius : ndarray, shape (n_plants, 2, 2, n_f), optional
         What Delta_p can move by when the measured plant moves within its 95 % circles, each entry and frequency by
-        itself; infinite where a circle holds plants that K0 does not stabilise. None without covariance.
+        itself; infinite where a circle holds plants that K0 does not stabilize. None without covariance.
 
     Examples
     --------
@@ -61,7 +61,7 @@ class Uncertainty:
     radius: Array | None = None
 
     def at(self, omega: ArrayLike) -> Array:
-        """Envelope as the proofs use it: the larger of the two neighbours.
+        """Envelope as the proofs use it: the larger of the two neighbors.
 
         Parameters
         ----------
@@ -92,7 +92,7 @@ class Uncertainty:
         Raises
         ------
         InputError
-            Where a circle is infinite, or so large that some plant in it is not stabilised.
+            Where a circle is infinite, or so large that some plant in it is not stabilized.
         """
         if self.radius is None:
             return self
@@ -101,7 +101,7 @@ class Uncertainty:
             plant, index = np.argwhere(bad)[0]
             raise InputError(f"the confidence circle of plant {plant + 1} at {self.omega[index]:.6g} rad/s is unknown "
                              "or too large for the controllers", where="with_confidence",
-                             expected="a plant that K0 stabilises wherever it is in its circle",
+                             expected="a plant that K0 stabilizes wherever it is in its circle",
                              remedy="Measure longer, or leave that frequency out.")
         return replace(self, envelope=np.max(np.abs(self.samples) + self.radius, axis=0))
 
@@ -146,7 +146,7 @@ def dual_youla(P_frf: Measured, P0: Any, K0: Any) -> Uncertainty:
     ------
     InputError
         For an unstable nominal loop, a grid too coarse for a resonance of P0 or not covering it, a measured plant
-        that K0 does not stabilise, NaN or wrong shapes.
+        that K0 does not stabilize, NaN or wrong shapes.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str) -> Uncer
     diag = {name: np.moveaxis(value[:, None, :] * np.eye(size)[:, :, None], -1, 0) for name, value in f.items()}
     P = np.moveaxis(measured, -1, 1)  # (n_plants, n_f, 2, 2)
     for index in range(len(P)):
-        _expect_stabilised(P[index], diag, where if len(P) == 1 else f"{where}[{index}]")
+        _expect_stabilized(P[index], diag, where if len(P) == 1 else f"{where}[{index}]")
     left = np.linalg.inv(diag["Dk"] + P @ diag["Nk"])
     samples = left @ (P - diag["P0"]) @ diag["Dp"]
     circles = None
@@ -228,7 +228,7 @@ def _expect_resolved(omega: Array, loop: Loop, number: int, where: str) -> None:
                              remedy="Measure with a finer grid there (a longer record).")
 
 
-def _expect_stabilised(P: Array, diag: dict[str, Array], where: str) -> None:
+def _expect_stabilized(P: Array, diag: dict[str, Array], where: str) -> None:
     """Refuse a measured plant whose loop with K0 winds otherwise round the origin than that of the model."""
     ratio = np.linalg.det(diag["Dk"] + P @ diag["Nk"]) / np.linalg.det(diag["Dk"] + diag["P0"] @ diag["Nk"])
     closed = np.concatenate([ratio, ratio[::-1].conj()])  # negative frequencies, joined by straight lines at the ends
@@ -236,9 +236,9 @@ def _expect_stabilised(P: Array, diag: dict[str, Array], where: str) -> None:
     inner = np.abs(np.angle(ratio[1:] / ratio[:-1]))
     turns = round(float(np.sum(steps)) / (2 * np.pi))
     if turns:
-        raise InputError(f"the controllers do not stabilise this measured plant: det(I + P_frf K0) encircles the "
+        raise InputError(f"the controllers do not stabilize this measured plant: det(I + P_frf K0) encircles the "
                          f"origin {abs(turns)} more time{'s' * (abs(turns) > 1)} than det(I + P0 K0)", where=where,
-                         expected="a plant that K0 stabilises (it was measured in closed loop)",
+                         expected="a plant that K0 stabilizes (it was measured in closed loop)",
                          remedy="Check sign, units (rad/s, Hz) and the order of inputs and outputs.")
     if np.max(inner, initial=0.0) > _TURN:
         raise InputError("the phase of det(I + P_frf K0) jumps by more than 160 degrees between two frequencies",

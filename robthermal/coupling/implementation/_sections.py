@@ -29,7 +29,7 @@ def sections(filters: Filters) -> dict[str, Array]:
     """
     if not filters.problem.dt:
         raise InputError("continuous-time filters have no sections", where="sections", expected="discrete time",
-                         remedy="Discretise plants and controllers first.")
+                         remedy="Discretize plants and controllers first.")
     result = {}
     for name, (free, fixed) in paths(filters).items():
         rows = np.vstack([fixed, free]) if np.any(free[0, :3]) else free

@@ -137,7 +137,7 @@ def cover(samples: Samples, factor: float) -> Partition:
     Parameters
     ----------
     samples : Samples
-        Of the system; every centre of an interval is added, so that a peak found late raises the bound.
+        Of the system; every center of an interval is added, so that a peak found late raises the bound.
     factor : float
         Growth of the bound, above 1.
 
@@ -173,11 +173,11 @@ def _split(samples: Samples, edges: Real, left: Complex, right: Complex, bad: ND
 
 def _scalings(samples: Samples, edges: Real, factor: float, which: NDArray[np.intp] | None = None
               ) -> tuple[Complex, Complex]:
-    """Best scalings at the centres of intervals; parts of M that lie in no cycle of blocks are scaled away."""
+    """Best scalings at the centers of intervals; parts of M that lie in no cycle of blocks are scaled away."""
     chosen = np.arange(len(edges) - 1) if which is None else which
-    centres = np.array([between(edges[k], edges[k + 1], np.array([0.5]))[0] for k in chosen])
-    samples.add(centres)
-    M = samples.at(centres)
+    centers = np.array([between(edges[k], edges[k + 1], np.array([0.5]))[0] for k in chosen])
+    samples.add(centers)
+    M = samples.at(centers)
     scaling = best_scaling(M * samples.kept, samples.structure, enough=factor**0.75 * samples.largest)
     across = largest_gain(scaled(scaling.left, M * ~samples.kept, scaling.right))
     small = 1e-3 * samples.largest / np.maximum(across, 1e-3 * samples.largest)  # 1 where nothing was dropped

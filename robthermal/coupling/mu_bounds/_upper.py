@@ -2,9 +2,9 @@
 
     min sigma_max(D_L M D_R⁻¹)   =   min gamma :  F = gamma² X_R − Mᴴ X_L M > 0,   X_L = D_Lᴴ D_L, X_R = D_Rᴴ D_R
 
-is a generalised eigenvalue problem, quasi-convex in X, solved by the method of centres (Boyd and El Ghaoui, 1993):
-Newton's method to the analytic centre of F > 0, lower gamma towards sigma_max there, repeat. The dual matrix Z = F⁻¹ of
-the last centre shows in which directions no scaling helps: there the worst Delta is found.
+is a generalized eigenvalue problem, quasi-convex in X, solved by the method of centers (Boyd and El Ghaoui, 1993):
+Newton's method to the analytic center of F > 0, lower gamma towards sigma_max there, repeat. The dual matrix Z = F⁻¹ of
+the last center shows in which directions no scaling helps: there the worst Delta is found.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ import numpy as np
 
 from ._blocks import Complex, Real, Structure
 
-_STALLED = 1e-6  # relative distance of gamma² to the centre's sigma_max² at which it ends: it falls linearly
+_STALLED = 1e-6  # relative distance of gamma² to the center's sigma_max² at which it ends: it falls linearly
 _SMALLEST = 1e-10  # smallest gamma² of interest, of the balanced matrix: mu = 0 is approached and never met
-_BACK_OFF = 0.1  # where gamma² is put, between sigma_max² of the centre (0) and the last gamma² (1)
+_BACK_OFF = 0.1  # where gamma² is put, between sigma_max² of the center (0) and the last gamma² (1)
 _LOST = 1e-14  # condition beyond which an eigenvalue is rounding
-_CENTRES = 60
+_CENTERS = 60
 _NEWTON_STEPS = 30
-_NEAR_CENTRE = 0.3  # Newton decrement at which a centre is good enough
+_NEAR_CENTER = 0.3  # Newton decrement at which a center is good enough
 _MEMORY = 4_000_000  # complex numbers held at once
 
 
@@ -55,7 +55,7 @@ def best_scaling(M: Complex, structure: Structure, enough: float = 0.0) -> Scali
     structure : Structure
         Blocks of Delta.
     enough : float
-        Value to be content with: the centre there is far from every limit, and serves the longest interval.
+        Value to be content with: the center there is far from every limit, and serves the longest interval.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def _best_scaling(M: Complex, structure: Structure, enough: float) -> Scaling:
     balanced = left[:, :, None] * M / right[:, None, :]
     gain = largest_gain(balanced)
     size = np.where(gain > 0, gain, 1.0)
-    x, Z = _centre(balanced / size[:, None, None], structure, (enough / size) ** 2)
+    x, Z = _center(balanced / size[:, None, None], structure, (enough / size) ** 2)
     D_L, D_R = _factors(x, structure)
     D_L, D_R = D_L * left[:, None, :], D_R * right[:, None, :]
     return Scaling(largest_gain(scaled(D_L, M, D_R)), D_L, D_R, Z / (right[:, :, None] * right[:, None, :]))
@@ -117,7 +117,7 @@ def _groups(structure: Structure) -> tuple[Real, Real]:
     return np.array(rows_L), np.array(rows_R)
 
 
-def _centre(M: Complex, structure: Structure, enough2: Real) -> tuple[Real, Complex]:
+def _center(M: Complex, structure: Structure, enough2: Real) -> tuple[Real, Complex]:
     """Coordinates of the best X in the basis (n_f, k), and its dual matrix; sigma_max(M) is 1, or M is zero."""
     E_L, E_R = structure.basis
     Q = M.mT.conj()[:, None] @ E_L @ M[:, None]
@@ -127,7 +127,7 @@ def _centre(M: Complex, structure: Structure, enough2: Real) -> tuple[Real, Comp
     best, Z = x.copy(), np.tile(np.eye(M.shape[2], dtype=complex), (len(M), 1, 1))
     gain2 = _gain2(x, Q, E_R)
     gamma2, todo = np.maximum(1.5 * gain2, enough2), np.flatnonzero(gain2 > _SMALLEST)
-    for _ in range(_CENTRES):
+    for _ in range(_CENTERS):
         if not len(todo):
             break
         G = gamma2[todo, None, None, None] * E_R - Q[todo]
@@ -146,7 +146,7 @@ def _centre(M: Complex, structure: Structure, enough2: Real) -> tuple[Real, Comp
 
 
 def _newton(x: Real, G: Complex, weight: Real) -> Real:
-    """Centre of F = sum x G > 0: minimize −log det F + weight x (the weight fixes the free size of X)."""
+    """Center of F = sum x G > 0: minimize −log det F + weight x (the weight fixes the free size of X)."""
     n_f, count = x.shape
     for _ in range(_NEWTON_STEPS):
         s, U = np.linalg.eigh(_sum(x, G))
@@ -160,7 +160,7 @@ def _newton(x: Real, G: Complex, weight: Real) -> Real:
         step = -np.linalg.solve(hessian, gradient[:, :, None])[:, :, 0]
         decrement = np.sqrt(np.maximum(-(gradient * step).sum(1), 0.0))
         x = x + _length(np.linalg.eigvalsh(_sum(step, W)), step @ weight, decrement)[:, None] * step
-        if decrement.max() < _NEAR_CENTRE:
+        if decrement.max() < _NEAR_CENTER:
             break
     return x
 
@@ -181,7 +181,7 @@ def _sum(x: Real, G: Complex) -> Complex:
 
 
 def _gain2(x: Real, Q: Complex, E_R: Complex) -> Real:
-    """Largest generalised eigenvalue of (Mᴴ X_L M, X_R): sigma_max² of the scaled matrix; inf where X_R is lost."""
+    """Largest generalized eigenvalue of (Mᴴ X_L M, X_R): sigma_max² of the scaled matrix; inf where X_R is lost."""
     s, U = np.linalg.eigh(np.tensordot(x, E_R, 1))
     half = U / np.sqrt(np.maximum(s, _LOST * s[:, -1:]))[:, None, :]
     gain2 = np.linalg.eigvalsh(half.mT.conj() @ _sum(x, Q) @ half)[:, -1]

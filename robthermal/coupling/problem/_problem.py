@@ -151,7 +151,7 @@ def _window_samples(window: float | None, dt: float) -> int:
         return 0
     if not dt:
         raise InputError("a window in continuous time", where="window", expected="discrete-time systems (dt > 0)",
-                         remedy="Discretise the systems, or use weight.")
+                         remedy="Discretize the systems, or use weight.")
     if not (np.isfinite(window) and window > 0) or round(window / dt) < 1:
         raise InputError(f"window of {window} s", where="window", expected=f"at least one sample, {dt:g} s")
     return round(window / dt)

@@ -71,14 +71,14 @@ class Design:
         return np.union1d(0.0, self.problem.grid(_GRID_POINTS))
 
     @cached_property
-    def coloured(self) -> tuple[Zpk, Zpk]:
+    def colored(self) -> tuple[Zpk, Zpk]:
         """weight S2 W2, which 1 + X multiplies, and weight S1 W1, which 1 + Y multiplies."""
         return self.problem.two.signal, self.problem.one.signal
 
     @cached_property
     def size(self) -> float:
         """Largest uncoupled gain [m]: the unit in which the program counts."""
-        return float(np.abs(np.array([signal.at(self.omega) for signal in self.coloured])).max()) or 1.0
+        return float(np.abs(np.array([signal.at(self.omega) for signal in self.colored])).max()) or 1.0
 
     @cached_property
     def responses(self) -> Responses:
@@ -91,7 +91,7 @@ class Design:
         return Responses(
             basis=Response(self.basis.all())(omega)[:, 0],
             factor=np.array([problem.one.Z.at(omega), problem.two.Z.at(omega)]),
-            signal=np.array([signal.at(omega) for signal in self.coloured]) / self.size,
+            signal=np.array([signal.at(omega) for signal in self.colored]) / self.size,
             block=np.abs([problem.two.Dk.at(omega), problem.one.Dk.at(omega)]),
             envelope=problem.envelope(omega))
 
@@ -99,7 +99,7 @@ class Design:
     def grams(self) -> list[tuple[Array, Array]]:
         """Whole and averaged second moments of both regressors, in units of `size`²."""
         samples = max(self.problem.samples, 1)
-        scaled = (Zpk(s.zeros, s.poles, s.gain / self.size, s.dt) for s in self.coloured)
+        scaled = (Zpk(s.zeros, s.poles, s.gain / self.size, s.dt) for s in self.colored)
         factors = (self.problem.one.Z, self.problem.two.Z)
         return [moments(realize(signal), realize(Z), self.basis, samples)
                 for signal, Z in zip(scaled, factors, strict=True)]

@@ -1,6 +1,6 @@
-"""Exact variances of the synchronisation error as quadratic forms in the coefficients.
+"""Exact variances of the synchronization error as quadratic forms in the coefficients.
 
-The error that one filter shapes is (1 + Z Σ c_k f_k) applied to a coloured noise: affine in the coefficients, so its
+The error that one filter shapes is (1 + Z Σ c_k f_k) applied to a colored noise: affine in the coefficients, so its
 variance is [1, c] G [1, c]ᵀ. G comes from one Lyapunov equation, not from a frequency grid.
 """
 
@@ -22,7 +22,7 @@ def moments(signal: control.StateSpace, factor: control.StateSpace, basis: Basis
     Parameters
     ----------
     signal : StateSpace
-        Coloured noise of one subsystem in e12, SISO, stable.
+        Colored noise of one subsystem in e12, SISO, stable.
     factor : StateSpace
         Z of that filter.
     basis : Basis

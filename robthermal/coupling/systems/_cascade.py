@@ -49,7 +49,7 @@ def _no_states() -> Matrices:
 
 
 def _pole_groups(poles: Array) -> list[list[complex]]:
-    """Conjugate pairs, pairs of neighbouring real poles, and at most one single real pole."""
+    """Conjugate pairs, pairs of neighboring real poles, and at most one single real pole."""
     groups = [[p, p.conjugate()] for p in poles if p.imag > 0]
     real = sorted((p for p in poles if p.imag == 0), key=lambda p: p.real)
     groups += [real[k : k + 2] for k in range(0, len(real), 2)]

@@ -34,7 +34,7 @@ def sample_time_of(systems: dict[str, LTI]) -> float:
     if len(times) > 1:
         listed = ", ".join(f"{name} has dt = {dt:g} s" for name, dt in given.items())
         raise InputError(f"different sample times: {listed}", where=", ".join(given),
-                         expected="one dt for all (0: continuous)", remedy="Discretise all systems alike.")
+                         expected="one dt for all (0: continuous)", remedy="Discretize all systems alike.")
     return times.pop()
 
 
@@ -212,7 +212,7 @@ def _expect_siso(system: LTI, where: str, dt: float) -> None:
     own = _dt(system, where)
     if own is not None and own != dt:
         raise InputError(f"sample time {own:g} s, the others have {dt:g} s", where=where,
-                         expected=f"dt = {dt:g}", remedy="Discretise all systems alike.")
+                         expected=f"dt = {dt:g}", remedy="Discretize all systems alike.")
     if isinstance(system, control.StateSpace) and not all(
             np.all(np.isfinite(M)) for M in (system.A, system.B, system.C, system.D)):
         raise InputError("NaN or infinite entries", where=where, expected="finite matrices A, B, C, D")

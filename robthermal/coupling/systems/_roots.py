@@ -11,7 +11,7 @@ _ROUNDING = 1e-13  # relative size below which a Markov parameter is none
 # A k-fold root scatters by about rounding**(1/k), evenly round its place: nearest roots at most this far from 1 (or,
 # relative to the largest, from 0) whose mean is much nearer are one multiple root. Slow poles lie on one side of it.
 _SCATTER = {True: (1e-10, 1e-6, 3e-5), False: (1e-12, 1e-6, 3e-5)}  # discrete, continuous
-_CENTRED = 1e-2
+_CENTERED = 1e-2
 
 
 def snapped(roots: Array, dt: float) -> Array:
@@ -31,7 +31,7 @@ def snapped(roots: Array, dt: float) -> Array:
     result = np.array(roots, dtype=complex)
     for k in range(min(3, len(roots)), 0, -1):
         mean = abs(np.mean(roots[order[:k]] - origin))
-        if distance[k - 1] <= _SCATTER[dt > 0][k - 1] * size and (k == 1 or mean <= _CENTRED * distance[k - 1]):
+        if distance[k - 1] <= _SCATTER[dt > 0][k - 1] * size and (k == 1 or mean <= _CENTERED * distance[k - 1]):
             result[order[:k]] = origin
             break
     return result

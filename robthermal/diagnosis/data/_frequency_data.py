@@ -193,8 +193,8 @@ def response_data(system: System, G: FrequencyResponse, where: str, operating_po
                          expected="some of " + ", ".join(system.exogenous_names))
     spare = G.degrees_of_freedom - len(G.output_names) - 1
     # the lowest windows are shifted: what the local model extrapolates there is biased long before it is suspect
-    centred = G.frequencies * G.n_samples * G.sample_time > G.half_width + 0.5
-    good = np.flatnonzero(~np.isnan(G.response).any(axis=(0, 1)) & ~G.suspect & (spare > 0) & centred)
+    centered = G.frequencies * G.n_samples * G.sample_time > G.half_width + 0.5
+    good = np.flatnonzero(~np.isnan(G.response).any(axis=(0, 1)) & ~G.suspect & (spare > 0) & centered)
     if not good.size:
         raise InputError("no bin of the frequency response can be used: all are undetermined, suspect or short of "
                          "degrees of freedom, so that their covariance is not known", where=f"argument {where}",

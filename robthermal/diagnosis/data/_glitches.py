@@ -1,6 +1,6 @@
 """Isolated outliers among the readings: found on the record, and left out of every fit.
 
-A spike of a thousand standard deviations would decide any sum of squares. It is told from physics by its neighbours:
+A spike of a thousand standard deviations would decide any sum of squares. It is told from physics by its neighbors:
 heat cannot make a reading leave and come back within three samples, and where the model itself bends as fast, nothing
 is called a spike.
 """
@@ -82,7 +82,7 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
 
 
 def outliers(r: Array, allowed: Array) -> Mask:
-    """Where residuals (n, n_sensors) leave the median of their neighbours by more than is allowed."""
+    """Where residuals (n, n_sensors) leave the median of their neighbors by more than is allowed."""
     window = np.sort(_windows(r), axis=2)
     middle, half = window[..., _WIDTH // 2], _WIDTH // 2
     return np.asarray(np.abs(r - middle) > allowed + _STEEP * (window[..., half + 1] - window[..., half - 1]))
@@ -95,6 +95,6 @@ def _curvature(model: Array) -> Array:
 
 
 def _windows(signal: Array) -> Array:
-    """Neighbours of every sample, (n, n_sensors, width)."""
+    """Neighbors of every sample, (n, n_sensors, width)."""
     half = _WIDTH // 2
     return np.asarray(sliding_window_view(np.pad(signal, ((half, half), (0, 0)), mode="reflect"), _WIDTH, axis=0))

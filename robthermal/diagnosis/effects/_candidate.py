@@ -1,4 +1,4 @@
-"""Candidates: every effect of the catalogue at every place of a system where it is possible."""
+"""Candidates: every effect of the catalog at every place of a system where it is possible."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Candidate:
     Parameters
     ----------
     effect : Effect
-        Effect of the catalogue.
+        Effect of the catalog.
     where : tuple of str
         Parts of the system it acts on.
     shape : dict

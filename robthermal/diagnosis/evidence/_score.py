@@ -73,7 +73,7 @@ class Scores:
 
     @property
     def order(self) -> list[int]:
-        """Possible candidates, the best first; exact aliases as in the catalogue, whatever their rounding."""
+        """Possible candidates, the best first; exact aliases as in the catalog, whatever their rounding."""
         height = np.round(np.log(np.maximum(self.statistic, 1e-300)), _DIGITS)
         best_first = np.argsort(-height, kind="stable")
         return [int(i) for i in best_first if self.possible[i] and self.statistic[i] > 0]
@@ -129,8 +129,8 @@ class Scores:
 
         best = np.argsort(self.statistic)[-10:]
         _, ax = plt.subplots(layout="constrained")
-        colours = ["C0" if self.possible[i] else "0.7" for i in best]
-        ax.barh([self.candidates[i].label for i in best], np.maximum(self.statistic[best], 1e-3), color=colours)
+        colors = ["C0" if self.possible[i] else "0.7" for i in best]
+        ax.barh([self.candidates[i].label for i in best], np.maximum(self.statistic[best], 1e-3), color=colors)
         ax.set(xscale="log", xlabel="F statistic after the nominal parameters [-]")
         return ax
 
@@ -143,7 +143,7 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     fit : Refit
         Fit without the candidates, from `refit`.
     effects : iterable of str, optional
-        Names; default the whole catalogue.
+        Names; default the whole catalog.
 
     Returns
     -------

@@ -20,7 +20,7 @@ _DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squa
 
 
 class Problem(Protocol):
-    """What is minimised."""
+    """What is minimized."""
 
     def residual(self, v: Array) -> Array:
         """Weighted residuals, (m,)."""
@@ -36,7 +36,7 @@ class Point:
     Parameters
     ----------
     problem : Problem
-        What is minimised.
+        What is minimized.
     v : ndarray, shape (p,)
         Values of the unknowns.
     """
@@ -66,7 +66,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Where a minimisation ended.
+    """Where a minimization ended.
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ class Descent:
 
 
 def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int, enough: float) -> Descent:
-    """Minimise |z(v)|² from v.
+    """Minimize |z(v)|² from v.
 
     Parameters
     ----------
     problem : Problem
-        What to minimise.
+        What to minimize.
     v : ndarray
         Start; moved inside the bounds.
     bounds : tuple of ndarray

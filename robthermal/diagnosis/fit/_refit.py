@@ -187,7 +187,7 @@ class Refit:
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of the unknowns, (p, p), in the optimiser's coordinates, scaled by the whitened variance."""
+        """Covariance of the unknowns, (p, p), in the optimizer's coordinates, scaled by the whitened variance."""
         scale = np.linalg.norm(self.J, axis=0)
         scale[scale == 0] = 1.0
         # of J, not of JᵀJ: its rounding would make variances negative where the data tell next to nothing

@@ -107,7 +107,7 @@ class Structure:
         return out
 
     def start(self, parameters: Array, quantities: Sequence[dict[str, float]]) -> Array:
-        """Unknowns from values; initial temperatures at the centre of their priors."""
+        """Unknowns from values; initial temperatures at the center of their priors."""
         coordinates = [np.log(q[quantity.name]) if quantity.lower > 0 else q[quantity.name]
                        for candidate, q in zip(self.effects, quantities, strict=True)
                        for quantity in candidate.effect.free]
@@ -215,7 +215,7 @@ class Structure:
                          for quantity in candidate.effect.free])
 
     def prior(self, v: Array) -> tuple[Array, Array]:
-        """Priors' centres less the unknowns, in standard deviations, and the derivatives of the unknowns."""
+        """Priors' centers less the unknowns, in standard deviations, and the derivatives of the unknowns."""
         known = np.flatnonzero(np.isfinite(self.ranges.sigma))
         n_free = self.n_own
         first = self.n_parameters + self.n_effects

@@ -59,7 +59,7 @@ def checked_jointly(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit, sc
     scores : Scores
         On the nominal fit.
     effects : iterable of str, optional
-        Effects of the catalogue to try.
+        Effects of the catalog to try.
     """
     stepwise = fit.structure.effects
     selection = select_jointly(nominal, scores, known=fit)

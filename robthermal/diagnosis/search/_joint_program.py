@@ -1,6 +1,6 @@
 """The convex program of the joint selection: columns, groups and bounds; its path, and how far from optimal a point is.
 
-    minimise ½|z' - J'β|² + λ Σ_g w_g |β_g|   with   lower <= β <= upper
+    minimize ½|z' - J'β|² + λ Σ_g w_g |β_g|   with   lower <= β <= upper
 
 over all candidates together. The columns have length 1, so that β is counted in standard deviations of a reading.
 """

@@ -30,7 +30,7 @@ def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str]
     nominal : Refit
         Without any effect.
     effects : iterable of str, optional
-        Effects of the catalogue to try.
+        Effects of the catalog to try.
     last_is_new : bool
         Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
     """

@@ -29,7 +29,7 @@ def begin(nominal: Refit, names: Sequence[str] | None = None) -> SearchState:
     nominal : Refit
         Nominal system refitted.
     names : sequence of str, optional
-        Effects to try; default the whole catalogue.
+        Effects to try; default the whole catalog.
     """
     scores = score(nominal, names)
     return SearchState(nominal=nominal, names=None if names is None else tuple(names), scores=scores, fit=nominal,

@@ -20,7 +20,7 @@ class SearchState:
     nominal : Refit
         Nominal system refitted, without any effect.
     names : tuple of str or None
-        Effects to try; None for the whole catalogue.
+        Effects to try; None for the whole catalog.
     scores : Scores
         Scores of all candidates on the nominal fit.
     fit : Refit

@@ -24,7 +24,7 @@ def with_wider_noise(nominal: Refit, effects: Iterable[str] | None, slow: bool =
     nominal : Refit
         Without any effect.
     effects : iterable of str, optional
-        Effects of the catalogue to try.
+        Effects of the catalog to try.
     slow : bool
         Whether to ask the second question too.
     """

@@ -99,7 +99,7 @@ def _performance_section(result: Coupling) -> Section:
     frame = pd.DataFrame([{"e12": name, "without coupling": before, "with coupling": after,
                            "smaller by": before / after if after else float("nan")} for name, before, after in rows])
     window = f" The exposure window is {filters.problem.window:g} s." if filters.problem.window else ""
-    text = (f"{filters.outcome.text}\n\nSynchronisation error e12 = y2 − y1 of the model.{window}"
+    text = (f"{filters.outcome.text}\n\nSynchronization error e12 = y2 − y1 of the model.{window}"
             f"{_of_measured_plants(result)}")
     return Section("Performance of the model", text, tables=(Table(frame, "Before and after."),), anchor="performance")
 
@@ -124,7 +124,7 @@ def _norm_section(result: Coupling) -> Section:
         rows.append({"number": "MSD, after over before", "value": filters.performance.msd_growth, "proven": "computed",
                      "solver's own": float("nan"), "asked at most": filters.asked["msd"]})
     text = ("Proven numbers are upper bounds at every frequency, also between grid points. The solver's own numbers "
-            "are those it optimised on its grid; they prove nothing.")
+            "are those it optimized on its grid; they prove nothing.")
     return Section("Norms", text, tables=(Table(pd.DataFrame(rows), "Norms, proven and asked for."),), anchor="norms")
 
 

@@ -60,7 +60,7 @@ def linear_system(table: SystemTable, dt: float, where: str, source: Path) -> LT
     given = [name for name in (*_MATRICES, *_POLYNOMIALS, "file") if getattr(table, name) is not None]
     if table.sample_time is not None and table.sample_time != dt:
         raise InputError(f"sample_time = {table.sample_time:g} s, [coupling] has {dt:g} s", where=place,
-                         expected="one sample time for all systems", remedy="Discretise all systems alike.")
+                         expected="one sample time for all systems", remedy="Discretize all systems alike.")
     if given == ["file"]:
         inside = _load(source.parent / str(table.file), where)
         return linear_system(inside, dt, f"{where} file = {table.file!r}", source)

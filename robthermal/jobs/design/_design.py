@@ -1,4 +1,4 @@
-"""From a system to a controller with certified limits: law, PI, observer, certificates, simulated behaviour."""
+"""From a system to a controller with certified limits: law, PI, observer, certificates, simulated behavior."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class ControllerDesign:
     loop : ClosedLoop
         Simulated step from rest to the set-points, with the observer and its sensors' noise.
     collapse : Collapse or None
-        Normalised steps with the law and without it; None where the set-points leave no room for steps.
+        Normalized steps with the law and without it; None where the set-points leave no room for steps.
     """
 
     request: DesignRequest

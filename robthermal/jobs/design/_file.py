@@ -52,7 +52,7 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
                        "modules": {name: _gains(result, i) for i, name in enumerate(result.law.names)}},
         "observer": None if result.observer is None else _observer(system, result.observer),
         "linearity": None if result.collapse is None else {
-            "meaning": "largest spread of the normalised step responses",
+            "meaning": "largest spread of the normalized step responses",
             "steps": {"value": list(result.collapse.steps), "unit": "K"}, "without_law": result.collapse.before,
             "with_law": result.collapse.after, "limit_active": not result.collapse.outcome.ok},
         "made_by": dict(versions()),

@@ -127,7 +127,7 @@ def _controller_section(result: ControllerDesign) -> Section:
         f" The upper limits are the usable ones: the smallest of {BELOW_FOLD:g} I*, the contraction limit, the file's "
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
         "lower ones are the largest with which that box is still never left.")
-    text = ("A linearising law turns the heat that the PI asks for into a current, within the limits; the PI works on "
+    text = ("A linearizing law turns the heat that the PI asks for into a current, within the limits; the PI works on "
             f"a linear cold side, every {c.sample_time:g} s, with a crossover of {result.request.bandwidth:g} rad/s. "
             f"{own}\n\ndesign.json has every number with its unit, and the equations to program.")
     table = Table(pd.DataFrame(rows), "Limits and gains.")
@@ -153,11 +153,11 @@ def _linearity_section(result: ControllerDesign) -> Section:
     found: Any = result.collapse
     with house_style():
         axes = found.plot()
-        figure = Figure.draw(axes[0].figure, alt="Normalised step responses, one curve per step size.",
+        figure = Figure.draw(axes[0].figure, alt="Normalized step responses, one curve per step size.",
                              caption="Steps of several sizes, each divided by its size. Left: the same controller with "
                              "a constant gain. Right: with the law.")
     ratio = f", {found.ratio:.3g} times less" if found.outcome and np.isfinite(found.ratio) else ""
-    text = (f"A linear loop answers steps of every size alike. The largest spread between the normalised responses is "
+    text = (f"A linear loop answers steps of every size alike. The largest spread between the normalized responses is "
             f"{found.before:.2g} with a constant gain and {found.after:.2g} with the law{ratio}. {found.outcome.text}")
     return Section("How linear the loop is", text, figures=(figure,), anchor="linearity")
 

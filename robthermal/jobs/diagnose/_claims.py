@@ -55,7 +55,7 @@ def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
     found : Diagnosis
         What was found.
     """
-    yield "A name is the best explanation among the effects of the catalogue; a cause outside it has no name here."
+    yield "A name is the best explanation among the effects of the catalog; a cause outside it has no name here."
     yield "Nothing is proven: all numbers are estimates, and all answers are tests on these records."
     yield ("Noise of the sensors and random heats are white and Gaussian, with levels near the declared ones: "
            + ", ".join(f"{name} {level:.3g} K" for name, level in found.noise_floor.noise.items()) + ".")

@@ -22,7 +22,7 @@ from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._ranking import NOT_NEEDED, ranking
 
-_DRAWN = 6  # sensors: as many as there are colours
+_DRAWN = 6  # sensors: as many as there are colors
 
 
 def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
@@ -85,7 +85,7 @@ def _sections(result: Diagnosed) -> Iterator[Section]:
     found = result.diagnosis
     yield _effect_section(found)
     yield _gap_section(result)
-    yield Section("Candidates", "Every effect of the catalogue at every place of the system, ranked by what it "
+    yield Section("Candidates", "Every effect of the catalog at every place of the system, ranked by what it "
                   "explains after the nominal parameters were refitted. The limit is the size that would have been "
                   "seen with a probability of 0.9 beside the misfit of the nominal system.",
                   tables=_candidate_tables(ranking(found)), anchor="candidates")
@@ -216,7 +216,7 @@ def _advice(found: Diagnosis) -> str:
         return "\n\n".join(["The alternatives act alike on every reading: no input separates them. What does:", *hints])
     if found.verdict == "unexplained":
         return ("Look at the lump, sensor and conditions above; repeat the experiment there, with more sensors. A "
-                "cause outside the catalogue can be added with rt.diagnosis.register_effect.")
+                "cause outside the catalog can be added with rt.diagnosis.register_effect.")
     return "There is nothing to separate. Larger or faster inputs lower the detection limits of the table above."
 
 

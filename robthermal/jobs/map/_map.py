@@ -229,7 +229,7 @@ def _section(result: LimitMap, data: pd.DataFrame) -> Section:
     with house_style():
         axes = result.plot()
         figure = Figure.draw(axes[0].figure, alt="Current needed and usable over the load, a panel per set-point, a "
-                             "colour per ambient temperature.",
+                             "color per ambient temperature.",
                              caption="Needed (line) and usable (dashed) current. A line ends where no stable "
                              "equilibrium holds more load.")
     text = (f"{result.outcome.text} The usable current is the smallest of 0.98 I*, I* the runaway limit of the "

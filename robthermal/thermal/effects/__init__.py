@@ -6,9 +6,9 @@ A new effect is one file here that defines ``EFFECT``, and its test.
 from ._adding import AddedEffect as AddedEffect
 from ._adding import add_effect as add_effect
 from ._builders import Builder as Builder
-from ._catalogue import effects as effects
-from ._catalogue import forget_effect as forget_effect
-from ._catalogue import register_effect as register_effect
+from ._catalog import effects as effects
+from ._catalog import forget_effect as forget_effect
+from ._catalog import register_effect as register_effect
 from ._effect import Effect as Effect
 from ._effect import Quantity as Quantity
 from ._response import RecordContext as RecordContext

@@ -1,4 +1,4 @@
-"""`add_effect`: one effect of the catalogue added to a system, checked."""
+"""`add_effect`: one effect of the catalog added to a system, checked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...errors import InputError
 from .._parameters import parts_of
 from .._system import System
 from ._builders import Builder
-from ._catalogue import effects
+from ._catalog import effects
 from ._effect import Effect
 from ._response import Values, Where
 

@@ -13,7 +13,7 @@ from ._response import Signature, Values, Where
 
 Add = Callable[[System, Where, Values], System]
 Grid = tuple[float, ...] | Callable[[Any, Where], Sequence[float]]  # of a `TrialContext`, or a `RecordContext`
-LAST = 10_000  # place in the catalogue of an effect that asks for none
+LAST = 10_000  # place in the catalog of an effect that asks for none
 
 
 def _visible(system: System, where: Where) -> str:
@@ -99,7 +99,7 @@ class Effect:
     forms : tuple of Effect
         Further forms of the same effect under the same name.
     rank : int
-        Place in the catalogue: of effects whose signatures are the same, the first is named.
+        Place in the catalog: of effects whose signatures are the same, the first is named.
 
     Examples
     --------

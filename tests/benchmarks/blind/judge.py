@@ -21,7 +21,7 @@ def exact_alias(topology: str, a: list[Any], b: list[Any]) -> bool:
     return lump is not None and lump == _constant_heat(topology, b)
 
 
-FAMILIES = (  # near aliases that the contract and its notes list, at the same or a neighbouring place
+FAMILIES = (  # near aliases that the contract and its notes list, at the same or a neighboring place
     {"input_lag", "input_delay", "sensor_lag"}, {"joule_split", "lead_heating"}, {"sensor_gain"},
     {"missing_ambient_link", "radiation", "natural_convection", "condensation"})
 

@@ -1,4 +1,4 @@
-"""What no effect of the catalogue describes, and noise that is not what the system file says."""
+"""What no effect of the catalog describes, and noise that is not what the system file says."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from .integrate import Hidden, Memory
 from .plants import N_TRAIN, ROOM, H, Plant
 
-NOISES = ("heat_twice", "coloured", "quantised", "noise_half_more")
+NOISES = ("heat_twice", "colored", "quantized", "noise_half_more")
 AROUND = ("sink", "sink1", "frame")  # the lump with most surface, per topology
 STAGE = ("plate", "left")
 JOINTS = (("plate", "cold"), ("left", "cold1"), ("left", "frame"))
@@ -18,13 +18,13 @@ JOINTS = (("plate", "cold"), ("left", "cold1"), ("left", "frame"))
 def readings_noise(kind: str, Y: np.ndarray, sigma: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Readings (batch, n, sensors) with white noise, or with what the file does not say."""
     white = sigma * rng.standard_normal(Y.shape)
-    if kind == "coloured":  # AR(0.9) of half the standard deviation on top
+    if kind == "colored":  # AR(0.9) of half the standard deviation on top
         slow, drive = np.zeros_like(Y), rng.standard_normal(Y.shape)
         slow[:, 0] = drive[:, 0]
         for k in range(1, Y.shape[1]):
             slow[:, k] = 0.9 * slow[:, k - 1] + np.sqrt(1 - 0.81) * drive[:, k]
         return Y + white + 0.5 * sigma * slow
-    if kind == "quantised":  # converter steps of four standard deviations
+    if kind == "quantized":  # converter steps of four standard deviations
         return np.round((Y + white) / (4 * sigma)) * (4 * sigma)
     return Y + (1.5 if kind == "noise_half_more" else 1.0) * white
 

@@ -81,7 +81,7 @@ def print_rates(rows: list[Row]) -> None:
     print_rate("names, noise other than declared", "<= 2 %", groups["noise"], lambda r: r["verdict"] in NAMES)
     print_rate("'unexplained', noise other than declared", "<= 20 %", groups["noise"],
                lambda r: r["verdict"] == "unexplained")
-    print_rate("outside the catalogue: no name", ">= 95 %", groups["outside"], lambda r: r["verdict"] in QUIET)
+    print_rate("outside the catalog: no name", ">= 95 %", groups["outside"], lambda r: r["verdict"] in QUIET)
     print_rate("  the same, of those detected", "", filter(detected, groups["outside"]),
                lambda r: r["verdict"] in QUIET)
     print("\ntwo hidden effects")

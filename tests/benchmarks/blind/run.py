@@ -42,7 +42,7 @@ def judged(case: Case, version: str, compare: bool, most: int | None = None) -> 
         warnings.simplefilter("ignore")
         given, truth = made(case)
         row["truth"] = [[name, list(where), values] for name, where, values in truth.effects]
-        short = {} if most is None else {"effects": short_catalogue(given.system, truth, most, case.seed)}
+        short = {} if most is None else {"effects": short_catalog(given.system, truth, most, case.seed)}
         start = time.process_time()
         try:
             found = rt.diagnose(given.system, given.train, validation=given.unseen, **short)
@@ -59,7 +59,7 @@ def judged(case: Case, version: str, compare: bool, most: int | None = None) -> 
     return row
 
 
-def short_catalogue(system: rt.System, truth: Truth, most: int, seed: int) -> list[str]:
+def short_catalog(system: rt.System, truth: Truth, most: int, seed: int) -> list[str]:
     """Names of the true effects and, in random order, of others, as many as fit."""
     names = list(dict.fromkeys(name for name, _, _ in truth.effects if name in rt.diagnosis.effects()))
     others = [name for name in rt.diagnosis.effects() if name not in names]

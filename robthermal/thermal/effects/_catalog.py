@@ -1,4 +1,4 @@
-"""The catalogue: every effect that a file of this package defines, and those a user registers."""
+"""The catalog: every effect that a file of this package defines, and those a user registers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _built_in_once() -> dict[str, Effect]:
 
 
 def register_effect(effect: Effect) -> None:
-    """Add an effect of your own to the catalogue of this process.
+    """Add an effect of your own to the catalog of this process.
 
     Parameters
     ----------

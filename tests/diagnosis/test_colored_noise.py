@@ -91,7 +91,7 @@ def test_settled_cost_is_the_log_likelihood(bar: rt.System, heat: Array) -> None
     assert settled_cost(path, r[:, None], NOISE, heat) > exact + 10.0
 
 
-def coloured(record: rt.Record, size: float, seed: int, pole: float = 0.9) -> rt.Record:
+def colored(record: rt.Record, size: float, seed: int, pole: float = 0.9) -> rt.Record:
     """With AR(1) noise of that standard deviation on top."""
     drive = np.sqrt(1 - pole**2) * np.random.default_rng(seed).standard_normal(record.outputs.shape)
     drive[0] /= np.sqrt(1 - pole**2)
@@ -101,7 +101,7 @@ def coloured(record: rt.Record, size: float, seed: int, pole: float = 0.9) -> rt
 def test_levels_keep_and_say_the_slow_part(bar: rt.System) -> None:
     path = at_rest(bar, 800)
     r = 0.02 * np.random.default_rng(3).standard_normal((800, 1))
-    one = coloured(path.one.record.with_outputs(path.readings + r), 0.01, 4)
+    one = colored(path.one.record.with_outputs(path.readings + r), 0.01, 4)
     path = replace(path, one=as_measured(bar, one, "records")[0])
     floor = rt.diagnosis.noise_floor(bar, one)
     floor = replace(floor, disturbance={"bar": 0.0})
@@ -126,8 +126,8 @@ def test_the_slow_part_is_never_more_than_the_declared_noise(bar: rt.System) -> 
     assert slow.pole == pytest.approx(np.exp(-3.0 / 9.0))
 
 
-def test_coloured_noise_of_three_sensors_is_consistent() -> None:
-    given, _ = made(Case("C", "noise", "coloured", 2))
+def test_colored_noise_of_three_sensors_is_consistent() -> None:
+    given, _ = made(Case("C", "noise", "colored", 2))
     found = rt.diagnose(given.system, given.train, validation=given.unseen)
     assert found.verdict == "consistent"
     assert not found.effects
@@ -140,7 +140,7 @@ def test_coloured_noise_of_three_sensors_is_consistent() -> None:
 
 @pytest.mark.parametrize("step", [0.0, 0.01])
 def test_without_random_heat_and_with_steps_and_a_spike(plant: rt.System, hide: Hide, step: float) -> None:
-    train, unseen = (coloured(record, 0.008, seed) for seed, record in enumerate(hide(), start=1))
+    train, unseen = (colored(record, 0.008, seed) for seed, record in enumerate(hide(), start=1))
     outputs = np.array(train.outputs)
     outputs[200, 0] += 1.0
     train = train.with_outputs(outputs if not step else step * np.round(outputs / step))
@@ -152,7 +152,7 @@ def test_without_random_heat_and_with_steps_and_a_spike(plant: rt.System, hide: 
 
 
 @pytest.mark.parametrize(("effect", "topology"), [("humidity", "C"), ("fan", "C"), ("melting", "C"), ("fan", "A")])
-def test_what_the_catalogue_does_not_know_is_no_noise(effect: str, topology: str) -> None:
+def test_what_the_catalog_does_not_know_is_no_noise(effect: str, topology: str) -> None:
     given, _ = made(Case(topology, "outside", effect, 0))
     assert with_wider_noise(rt.diagnosis.refit(given.system, given.train), None) is None
 
@@ -160,7 +160,7 @@ def test_what_the_catalogue_does_not_know_is_no_noise(effect: str, topology: str
 @pytest.mark.parametrize(("effect", "seed", "factor"), [("fan", 0, 8.0), ("fan", 1, 40.0), ("melting", 0, 24.0)])
 def test_weak_physics_is_no_noise_either(effect: str, seed: int, factor: float) -> None:
     # Whitened variance 1.00 to 1.04: small slow noise with a long memory would explain the second, the third if one
-    # sensor might lend its colour to the others.
+    # sensor might lend its color to the others.
     given, _ = made(Case("C", "outside", effect, seed))
     sigma = {name: sensor.noise for name, sensor in given.system.sensors.items()}
     system = given.system.with_parameters({f"sensors.{name}.noise": factor * s for name, s in sigma.items()})
@@ -173,11 +173,11 @@ def test_weak_physics_is_no_noise_either(effect: str, seed: int, factor: float) 
     assert with_wider_noise(fit, None) is None
 
 
-def test_a_hidden_effect_in_coloured_noise_is_not_called_noise(plant: rt.System, hide: Hide, rate: Callable) -> None:
+def test_a_hidden_effect_in_colored_noise_is_not_called_noise(plant: rt.System, hide: Hide, rate: Callable) -> None:
     def lagged(t: float, x: Array, u: Array) -> Array:
         return np.append(rate(x[:2], u), (x[1] - x[2]) / 25.0)
 
-    train, unseen = (coloured(record, 0.005, seed) for seed, record in enumerate(
+    train, unseen = (colored(record, 0.005, seed) for seed, record in enumerate(
         hide(lagged, extra_states=1, read=lambda T: T[:, [0, 2]]), start=1))
     found = rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag", "sensor_gain", "heat_source"])
     assert found.verdict != "consistent"

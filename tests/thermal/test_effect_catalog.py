@@ -35,7 +35,7 @@ def bar() -> rt.System:
                      sensors={"T": {"lump": "bar", "noise": 0.02}})
 
 
-def test_the_catalogue_stands_in_the_order_of_its_ranks() -> None:
+def test_the_catalog_stands_in_the_order_of_its_ranks() -> None:
     known = rt.thermal.effects()
     assert list(known) == ORDER == list(rt.diagnosis.effects())
     ranks = [effect.rank for effect in known.values()]
@@ -61,7 +61,7 @@ def test_one_file_is_a_new_effect(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     (tmp_path / "toy_draught.py").write_text(TOY)
     package = importlib.import_module("robthermal.thermal.effects")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
-    monkeypatch.setattr(sys.modules["robthermal.thermal.effects._catalogue"], "_BUILT_IN", {})
+    monkeypatch.setattr(sys.modules["robthermal.thermal.effects._catalog"], "_BUILT_IN", {})
     try:
         assert list(rt.thermal.effects())[0] == "toy_draught" and len(rt.diagnosis.effects()) == len(ORDER) + 1
         added = rt.thermal.add_effect(bar(), "toy_draught", ["bar"], {"heat": -1.0})
