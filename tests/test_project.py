@@ -26,7 +26,7 @@ import robthermal as rt
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "robthermal"
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-ROOMS = rt._PACKAGES
+PACKAGES = rt._PACKAGES
 INSIDE = {"cli", "conic", "export", "fitting", "linear"}  # what other packages use, or the command line
 FILES = sorted(PACKAGE.rglob("*.py"))
 CONTRACTS = [contract["id"] for contract in PYPROJECT["tool"]["importlinter"]["contracts"]]
@@ -61,8 +61,8 @@ def test_no_import_cycles() -> None:
     assert set(TopologicalSorter(uses).static_order()) >= set(graph.modules)  # a cycle raises and is named
 
 
-def test_no_room_goes_through_the_front_door() -> None:
-    # `import robthermal` inside a room would let it reach every other room past the contract.
+def test_no_package_goes_through_the_front_door() -> None:
+    # `import robthermal` inside a package would let it reach every other package past the contract.
     guests = import_graph().find_modules_that_directly_import("robthermal")
     assert {one for one in guests if not one.startswith("robthermal.cli.")} <= {"robthermal.__main__"}
 
@@ -116,20 +116,20 @@ def test_no_file_is_longer_than_400_lines(path: Path) -> None:
 # What is public
 
 
-def test_rooms_are_the_packages_that_exist() -> None:
+def test_listed_packages_are_those_that_exist() -> None:
     packages = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
     assert packages >= INSIDE
     public = {name for name in packages - INSIDE if not name.startswith("_")} | {"errors"}
-    assert set(ROOMS) == public, "list the package in robthermal/__init__.py"
+    assert set(PACKAGES) == public, "list the package in robthermal/__init__.py"
     pages = {path.stem for path in (ROOT / "docs" / "api").glob("*.md")} - {"index"}
     assert pages == public, "give the package a page in docs/api"
 
 
-def test_every_top_level_name_loads_and_is_the_one_of_its_room() -> None:
+def test_every_top_level_name_loads_and_is_the_one_of_its_package() -> None:
     for name in rt.__all__:
         assert getattr(rt, name) is not None
-    for name, room in rt._HOME.items():
-        assert getattr(rt, name) is getattr(import_module(f"robthermal.{room}"), name)
+    for name, package in rt._HOME.items():
+        assert getattr(rt, name) is getattr(import_module(f"robthermal.{package}"), name)
 
 
 def test_unknown_top_level_name_is_an_attribute_error() -> None:
@@ -144,18 +144,18 @@ def test_type_checkers_see_the_lazy_names() -> None:
     for node in guard.body:
         assert isinstance(node, ast.ImportFrom)
         seen |= {alias.name: node.module and node.module.split(".")[0] for alias in node.names}
-    assert seen == {**rt._HOME, **dict.fromkeys((*ROOMS, *rt._FORMER))}
+    assert seen == {**rt._HOME, **dict.fromkeys((*PACKAGES, *rt._FORMER))}
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_room_has_an_export_list_and_no_name_of_another_library(room: str) -> None:
-    module = import_module(f"robthermal.{room}")
+@pytest.mark.parametrize("package", PACKAGES)
+def test_package_has_an_export_list_and_no_name_of_another_library(package: str) -> None:
+    module = import_module(f"robthermal.{package}")
     names = public_names(module)
     assert names
     for name in names:
         value = getattr(module, name)
-        assert not inspect.ismodule(value), f"{room}.{name} is a module"
-        assert getattr(value, "__module__", "robthermal").startswith("robthermal"), f"{room}.{name} is not ours"
+        assert not inspect.ismodule(value), f"{package}.{name} is a module"
+        assert getattr(value, "__module__", "robthermal").startswith("robthermal"), f"{package}.{name} is not ours"
 
 
 def public_names(module: ModuleType) -> list[str]:
@@ -170,18 +170,18 @@ def public_names(module: ModuleType) -> list[str]:
 
 
 def public_callables() -> Iterator[tuple[str, object]]:
-    for room in ROOMS:
-        module = import_module(f"robthermal.{room}")
+    for package in PACKAGES:
+        module = import_module(f"robthermal.{package}")
         for name in public_names(module):
             value = getattr(module, name)
             if not callable(value):
                 continue
-            yield f"{room}.{name}", value
+            yield f"{package}.{name}", value
             if inspect.isclass(value):
                 for method, member in vars(value).items():
                     inner = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
                     if not method.startswith("_") and inspect.isfunction(inner):
-                        yield f"{room}.{name}.{method}", inner
+                        yield f"{package}.{name}.{method}", inner
 
 
 def described_parameters(value: object) -> set[str]:

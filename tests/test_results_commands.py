@@ -302,7 +302,7 @@ def test_every_command_has_json(run: Cli) -> None:
     assert [name for name in commands if "--json" not in run(name, "--help").out] == []
 
 
-def test_colours_stay_out_of_a_pipe_and_units_in_the_table(run: Cli, results: Path, monkeypatch: pytest.MonkeyPatch,
+def test_colors_stay_out_of_a_pipe_and_units_in_the_table(run: Cli, results: Path, monkeypatch: pytest.MonkeyPatch,
                                                            ) -> None:
     (results / "certificates" / "contraction.json").write_text("{}")
     monkeypatch.setenv("TERM", "xterm-256color")

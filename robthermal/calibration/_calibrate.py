@@ -79,7 +79,7 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
         With starting values.
     data : Record, list of Record, or FrequencyResponse
         Measured. Several records share the parameters; each has its own initial temperatures. To a frequency response
-        the linearisation is fitted, weighted by its covariance, Evers (2.12); then only `parameters`, `max_iterations`
+        the linearization is fitted, weighted by its covariance, Evers (2.12); then only `parameters`, `max_iterations`
         and `operating_point` apply.
     parameters : iterable of str or mapping, optional
         What may change: names from the system's fit table, or a mapping from name to (lower, upper) or `FitRange`, in
@@ -93,10 +93,10 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
     loss : {"linear", "soft_l1", "huber"}
         The last two resist glitches: beyond 1.345 standard deviations a residual counts linearly.
     noise : mapping or float, optional
-        Standard deviation of the sensors [K]. Default: as declared in the system, but not below step/√12 of a quantised
+        Standard deviation of the sensors [K]. Default: as declared in the system, but not below step/√12 of a quantized
         reading; where the declaration is 0 it is estimated from the residuals.
     max_iterations : int
-        Limit of the optimiser's steps.
+        Limit of the optimizer's steps.
     method : {"output_error", "prediction_error"}
         What is made small: the residuals of a free run, or the innovations of a Kalman filter, which knows the lumps'
         `disturbance` and the sensors' noise (which must then be declared). Without any disturbance both are the same.
@@ -159,7 +159,7 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the optimiser ended: unknowns, noise levels, its status and iterations."""
+    """Where the optimizer ended: unknowns, noise levels, its status and iterations."""
 
     v: Floats
     noise: dict[str, float]
@@ -168,7 +168,7 @@ class Solution:
 
 
 def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool) -> Solution:
-    """Minimise; weights that depend on the fit (an undeclared noise, a filter) are renewed and the fit repeated."""
+    """Minimize; weights that depend on the fit (an undeclared noise, a filter) are renewed and the fit repeated."""
     unknown = [name for name, level in declared.items() if not level]
     v = problem.v0
     noise = dict(declared) | _levels(problem, v, unknown, loss)

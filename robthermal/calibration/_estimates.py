@@ -48,7 +48,7 @@ class Estimates:
         Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
         for.
     iterations : int
-        Model evaluations the optimiser tried.
+        Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
     """

@@ -39,7 +39,7 @@ class ResponseFit(Estimates):
         Estimates that ran into a bound; their standard deviation ignores it.
     covariance : ndarray, shape (p, p)
         Covariance of the estimates, in the order of `parameters`, from the covariance of the response, that between
-        neighbouring bins included. A direction the data leave open has the spread of its prior or of its bounds.
+        neighboring bins included. A direction the data leave open has the spread of its prior or of its bounds.
     undetermined : tuple of str
         Directions the data do not determine, in words.
     undetermined_parameters : tuple of str
@@ -54,7 +54,7 @@ class ResponseFit(Estimates):
         Factor on `covariance` in `ranges`, at least 1: residuals larger or more correlated than `covariance` accounts
         for.
     iterations : int
-        Model evaluations the optimiser tried.
+        Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
     response : FrequencyResponse
@@ -110,7 +110,7 @@ class ResponseFit(Estimates):
 
 def calibrate_response(system: System, response: FrequencyResponse, parameters: Choice,
                        operating_point: Mapping[str, float], max_iterations: int) -> ResponseFit:
-    """Fit the linearisation of a system to a frequency response."""
+    """Fit the linearization of a system to a frequency response."""
     ranges = chosen_ranges(system, parameters)
     problem = ResponseProblem(system, response, bins_of(system, response), ranges,
                               OperatingPoint(operating_point))
@@ -158,5 +158,5 @@ def _refuse(problem: ResponseProblem) -> None:
     idle = np.flatnonzero(reach < 1e-9)
     if idle.size:
         raise InputError(f"{names[idle[0]]!r} has no influence on the frequency response", where="argument data",
-                         expected="parameters that change the linearisation (offsets and temperatures may not)",
+                         expected="parameters that change the linearization (offsets and temperatures may not)",
                          remedy="Take it out of the parameters.")

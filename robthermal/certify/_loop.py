@@ -1,4 +1,4 @@
-"""Certificates of sampled closed loops: feedback linearisation, limits, integrators and the nonlinear plant."""
+"""Certificates of sampled closed loops: feedback linearization, limits, integrators and the nonlinear plant."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def regulated(system: System, *, setpoint: SetPoints, current: Currents, tempera
 
     References
     ----------
-    Errata of Evers (2021), "Closed loop (cold side linearised)".
+    Errata of Evers (2021), "Closed loop (cold side linearized)".
 
     Examples
     --------

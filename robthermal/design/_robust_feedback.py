@@ -103,7 +103,7 @@ def _at_corner(plain: ConstantGain, plant: ColdSide, corner: Array) -> control.S
 def robust_gain(plant: ColdSide, plants: Sequence[Any], h: float, w: float, start: tuple[Array, Array]) -> RobustGain:
     """Least bound on the LQR cost that holds for every plant: guaranteed cost, W = P⁻¹, Z = F W.
 
-    minimise tr T, [W, (AW - BZ)ᵀ, (CW)ᵀ, Zᵀ; AW - BZ, W, 0, 0; CW, 0, 1, 0; Z, 0, 0, 1] >= 0 for every plant,
+    minimize tr T, [W, (AW - BZ)ᵀ, (CW)ᵀ, Zᵀ; AW - BZ, W, 0, 0; CW, 0, 1, 0; Z, 0, 0, 1] >= 0 for every plant,
     [T, 1; 1, W] >= 0. For one plant it is the LQR. The inequality is solved for a few plants, those that break it are
     added. Where nothing is found, the gains to start with are returned.
     """

@@ -89,7 +89,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
         How a bandwidth is turned into gains: for this plant alone, or with the least bound on the same cost that holds
         for this one and all of `plants`.
     plants : sequence of control.StateSpace or ColdSide, optional
-        For "lmi": further plants the gain must stabilise, with the same lumps as states and the heats v as first
+        For "lmi": further plants the gain must stabilize, with the same lumps as states and the heats v as first
         inputs; sampled exactly. `corner_plants` makes those of a constant gain.
 
     Returns
@@ -118,7 +118,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     if method not in ("lqr", "lmi") or (method == "lmi") != bool(len(plants)) or (method == "lmi" and gain is not None):
         raise InputError(f"method = {method!r} with {len(plants)} plants{'' if gain is None else ' and a gain'}",
                          where="arguments method, plants", expected='"lqr" without plants, or "lmi" with a bandwidth '
-                         "and plants to stabilise", remedy="rt.design.corner_plants makes those of a constant gain.")
+                         "and plants to stabilize", remedy="rt.design.corner_plants makes those of a constant gain.")
     outcome = StateFeedback.outcome
     if bandwidth is not None:
         w = positive_number(bandwidth, "bandwidth", "rad/s")

@@ -16,11 +16,11 @@ from ._outcomes import SignalsCode
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Excitation:
-    """Signals of all inputs, experiments and realisations.
+    """Signals of all inputs, experiments and realizations.
 
     Parameters
     ----------
-    signals : ndarray, shape (realisations, experiments, samples, inputs)
+    signals : ndarray, shape (realizations, experiments, samples, inputs)
         In the units of the inputs.
     lines : tuple of ndarray
         Excited lines of each input; line k has the frequency k / (period * sample_time) [Hz].
@@ -49,12 +49,12 @@ class Excitation:
 
     @property
     def experiments(self) -> list[Array]:
-        """Arrays (samples, inputs), one per record to be measured: realisation after realisation."""
-        return [experiment for realisation in self.signals for experiment in realisation]
+        """Arrays (samples, inputs), one per record to be measured: realization after realization."""
+        return [experiment for realization in self.signals for experiment in realization]
 
     @property
     def crest_factors(self) -> Array:
-        """Crest factors achieved, (realisations, experiments, inputs) [-]."""
+        """Crest factors achieved, (realizations, experiments, inputs) [-]."""
         wave = self.signals[:, :, : self.period] - self.signals[:, :, : self.period].mean(axis=2, keepdims=True)
         return np.apply_along_axis(crest_of, 2, wave)
 
@@ -73,9 +73,9 @@ class Excitation:
         return SignalsCode.DESIGNED.outcome(text)
 
     def __str__(self) -> str:
-        realisations, experiments, samples, inputs = self.signals.shape
+        realizations, experiments, samples, inputs = self.signals.shape
         rows = [
-            f"{self.arrangement} multisines, {self.phases} phases: {realisations} realisation(s) of {experiments} "
+            f"{self.arrangement} multisines, {self.phases} phases: {realizations} realization(s) of {experiments} "
             f"experiment(s), {samples} samples ({samples * self.sample_time:g} s), period {self.period} samples",
             f"{'input':>5}{'lines':>8}{'lowest [Hz]':>14}{'highest [Hz]':>14}"
             f"{'min':>11}{'mean':>11}{'max':>11}{'crest':>8}",
@@ -88,7 +88,7 @@ class Excitation:
         return "\n".join([*rows, str(self.outcome)])
 
     def plot(self) -> Any:
-        """Axes with one period of the first realisation, one row per input.
+        """Axes with one period of the first realization, one row per input.
 
         Returns
         -------

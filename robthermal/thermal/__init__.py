@@ -1,4 +1,4 @@
-"""Thermal systems: lumps, links, thermoelectric modules; equations, simulation, steady state, linearisation."""
+"""Thermal systems: lumps, links, thermoelectric modules; equations, simulation, steady state, linearization."""
 
 from ._datasheet import DatasheetFit as DatasheetFit
 from ._datasheet import ModuleParameters as ModuleParameters

@@ -128,7 +128,7 @@ def _check(model: Any, order: int | None, tolerance: float | None, method: str) 
         raise InputError(f"{model.nstates} states", where="argument model", expected=f"at most {_MOST_STATES}",
                          remedy="Coarsen the network first.")
     if np.linalg.eigvals(model.A).real.max(initial=-1.0) >= 0:
-        raise InputError("the model is not stable", where="argument model", remedy="Linearise at a stable equilibrium.")
+        raise InputError("the model is not stable", where="argument model", remedy="Linearize at a stable equilibrium.")
     if (order is None) == (tolerance is None):
         raise InputError("give order or tolerance, one of them", where="arguments order, tolerance")
     if order is not None and not (isinstance(order, int) and 0 <= order < model.nstates):

@@ -189,7 +189,7 @@ def test_claims_with_other_than_truth_values_are_refused(bad: dict[str, object],
 
 
 def test_place_that_cannot_be_written_is_said(report: Report, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="missing.*cannot be written.*Choose another"):
+    with pytest.raises(InputError, match="missing.*cannot be written.*Check the folder"):
         write_html(report, tmp_path / "missing" / "report.html")
 
 

@@ -24,7 +24,7 @@ def evaluate(P1: LTI, P2: LTI, C1: LTI, C2: LTI, *, X_hat: LTI = 0, Y_hat: LTI =
     Parameters
     ----------
     P1, P2, C1, C2 : StateSpace or TransferFunction
-        Plants and stabilising controllers, one input and one output each, one sample time.
+        Plants and stabilizing controllers, one input and one output each, one sample time.
     X_hat, Y_hat : LTI or float
         Stable filters; X = Z1 X_hat acts from subsystem 2 on 1, Y = Z2 Y_hat from 1 on 2.
     Z1, Z2 : LTI or float, optional
@@ -49,7 +49,7 @@ def evaluate(P1: LTI, P2: LTI, C1: LTI, C2: LTI, *, X_hat: LTI = 0, Y_hat: LTI =
     ------
     InputError
         For an unstable nominal loop, unstable or improper filters, different sample times, zeros of a plant on the
-        boundary, a Z that does not fit, 1 - X(∞)Y(∞) = 0, or measured plants that the controllers do not stabilise.
+        boundary, a Z that does not fit, 1 - X(∞)Y(∞) = 0, or measured plants that the controllers do not stabilize.
 
     Examples
     --------

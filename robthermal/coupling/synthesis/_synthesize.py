@@ -1,4 +1,4 @@
-"""Coupling filters by convex optimisation: solve, look between the frequencies, prove, back off until it holds."""
+"""Coupling filters by convex optimization: solve, look between the frequencies, prove, back off until it holds."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def synthesize(
     couple: Sequence[str] = ("X", "Y"),
     cutoff: float | None = None,
 ) -> Filters:
-    """Design coupling filters that make the synchronisation error small, and prove what they reach.
+    """Design coupling filters that make the synchronization error small, and prove what they reach.
 
     X̂ and Ŷ are combinations of stable basis functions; every map of the coupled loop is affine in the coefficients
     (Evers 2021, Theorem 6.4 (b)), so the design is one second-order cone program. Robustness ``|X̂||Ŷ| r1 r2`` is not

@@ -39,7 +39,7 @@ class NoiseEstimate:
         Code "declared", "estimated" or "doubtful" (a declared noise far from what the record shows).
     glitches : dict
         Number of isolated outliers of every sensor that has any; no fit sees them.
-    quantised : tuple of str
+    quantized : tuple of str
         Sensors whose steps are more than two standard deviations of their noise: their errors are no white noise.
     """
 
@@ -49,14 +49,14 @@ class NoiseEstimate:
     rough: dict[str, float]
     outcome: Outcome
     glitches: dict[str, int] = field(default_factory=dict)
-    quantised: tuple[str, ...] = ()
+    quantized: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{'sensor':<12} {'noise [K]':>10} {'differences [K]':>16}"]
         lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>16.4g}" for name, level in self.noise.items()]
         lines += [f"{name}: {n} isolated outliers left out" for name, n in self.glitches.items()]
-        lines += [f"{name}: quantised; its errors count as noise of step/√12, and are not tested for whiteness"
-                  for name in self.quantised]
+        lines += [f"{name}: quantized; its errors count as noise of step/√12, and are not tested for whiteness"
+                  for name in self.quantized]
         return "\n".join([*lines, str(self.outcome)])
 
     def plot(self) -> Any:
@@ -130,7 +130,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
     return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
-                      _outcome(noise_of, rough, unknown), glitches, _quantised(data, noise_of))
+                      _outcome(noise_of, rough, unknown), glitches, _quantized(data, noise_of))
 
 
 def _refuse_short(data: Sequence[Data]) -> None:
@@ -159,7 +159,7 @@ def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[st
     return DiagnosisCode.DECLARED.outcome()
 
 
-def _quantised(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:
+def _quantized(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:
     """Sensors whose noise is nothing but their steps: q/√12 of them is most of it."""
     steps = {name: max(quantum(one.readings[:, one.sensors.index(name)]) for one in data if name in one.sensors)
              for name in noise}
@@ -167,7 +167,7 @@ def _quantised(data: list[Data], noise: dict[str, float]) -> tuple[str, ...]:
 
 
 def _rough(data: list[Data], name: str) -> float:
-    """Noise from third differences, robustly; a quantised reading has at least step/√12."""
+    """Noise from third differences, robustly; a quantized reading has at least step/√12."""
     pieces, step = [], 0.0
     for one in data:
         if name in one.sensors:

@@ -33,7 +33,7 @@ class Adequacy:
     lumps : dict
         p-value of a spline of extra heat into every lump.
     p_value : float
-        Joint: Bonferroni over the portmanteau test of all sensors together, without quantised ones, and the lumps.
+        Joint: Bonferroni over the portmanteau test of all sensors together, without quantized ones, and the lumps.
     variance : float
         Whitened variance; 1 if the noise levels are right.
     outcome : Outcome
@@ -93,7 +93,7 @@ def adequacy(fit: Refit) -> Adequacy:
     statistics = {name: _portmanteau([z[:, one.sensors.index(name)] for z, one in
                                       zip(innovations, fit.structure.data, strict=True) if name in one.sensors])
                   for name in fit.floor.noise}
-    tested = [statistics[name] for name in statistics if name not in fit.floor.quantised]  # steps are never white
+    tested = [statistics[name] for name in statistics if name not in fit.floor.quantized]  # steps are never white
     together = (sum(Q for Q, _ in tested), sum(lags for _, lags in tested))
     lumps = {name: p for name, (_, p) in spline_tests(fit).items()}
     white = float(chi2.sf(*together)) if tested else 1.0

@@ -328,7 +328,7 @@ def _own_unknowns(fit: Refit, data: Sequence[DataSet], whiteners: Sequence[White
 
 
 def _information_root(J: Array, p: int) -> Array:
-    """R with RᵀR the information on the first p unknowns, the others marginalised."""
+    """R with RᵀR the information on the first p unknowns, the others marginalized."""
     rest = J.shape[1] - p
     R: Array = np.asarray(np.linalg.qr(np.concatenate([J[:, p:], J[:, :p]], axis=1)).R, np.float64)
     return R[rest:, rest:]

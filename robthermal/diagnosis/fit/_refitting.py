@@ -93,7 +93,7 @@ def fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseSc
     """Fit from v; filter and noise levels are renewed at the estimate, and the fit repeated."""
     for _ in range(_ROUNDS):
         paths, whiteners = filters(structure, v, floor, levels)
-        found = minimised(structure, v, whiteners)
+        found = minimized(structure, v, whiteners)
         v = found.at.v
         paths = structure.paths(v)
         new = _refined(paths, floor, levels)
@@ -107,7 +107,7 @@ def fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseSc
 
 def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
     """Fit another structure with the same filters, so that sums of squares can be compared."""
-    found = minimised(structure, v, fit.whiteners, limit)
+    found = minimized(structure, v, fit.whiteners, limit)
     return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
 
 
@@ -134,7 +134,7 @@ def _refined(paths: Sequence[Linearized], floor: NoiseEstimate, levels: NoiseSca
                    levels)
 
 
-def minimised(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
+def minimized(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
     return descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH)
 

@@ -117,7 +117,7 @@ class JointSelection:
 def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit | None = None) -> JointSelection:
     """Select effects together instead of one after the other.
 
-    minimise ½‖z' - J'β‖² + λ Σ_g w_g ‖β_g‖ within the physical bounds, for λ from the smallest that selects nothing
+    minimize ½‖z' - J'β‖² + λ Σ_g w_g ‖β_g‖ within the physical bounds, for λ from the smallest that selects nothing
     down to the noise. Up to six candidates, from the best pairs and as they enter the path, are a pool; its sets of
     up to three effects are compared by the linearized ΔBIC. The best, and the best pair, are refitted with the nominal
     parameters.
