@@ -30,7 +30,7 @@ _MOST_PRUNED = 200
 _MOST_PRUNING = 1e6  # exact operations to find implied vertices
 _LONG = 400  # bits of numbers that are too long for them
 _MOST_TOGETHER = 20_000
-_MOST_WORK = 1e8  # joint vertices times (lumps of modules)³
+_MOST_WORK = 3e8  # joint vertices times (lumps of modules)³
 _PIECES = 8
 
 

@@ -26,7 +26,7 @@ from ._system import Link, Region, ThermalSystem, read_region, read_system, say_
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
 _SOURCES = ("ambients", "heat")
-_MOST_WORK = 2_000_000  # disturbances times links, modules and lumps
+_MOST_WORK = 5_000_000  # disturbances times links, modules and lumps
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from flint import arb, arb_poly, fmpq, fmpq_poly, fmpz, fmpz_mat, fmpz_poly
 from ._kind import working_precision
 from ._lti import LinearSystem, Rows
 
-_MOST_WORK = 2e12  # of an exact characteristic polynomial, some minutes
+_MOST_WORK = 1.2e12  # of an exact characteristic polynomial, some 30 s
 _BITS = (256, 1024, 4096, 16384)  # of the Routh array, more until every sign is decided
 
 
