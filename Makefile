@@ -15,7 +15,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py tests/test_project.py tests/diagnosis/test_structure.py \
 	tests/signals/test_units.py tests/signals/test_record.py tests/signals/test_read_csv.py tests/signals/test_importing.py \
 	tests/signals/test_formats.py tests/thermal/test_equations.py tests/thermal/test_datasheet.py tests/thermal/test_geometry.py \
-	tests/thermal/test_mixing.py tests/thermal/test_effect_catalogue.py tests/thermal/test_linear.py \
+	tests/thermal/test_mixing.py tests/thermal/test_effect_catalog.py tests/thermal/test_linear.py \
 	tests/thermal/test_system_file.py tests/identify/test_response.py tests/identify/test_bad_input.py \
 	tests/coupling/test_norms.py tests/coupling/test_factors.py tests/design/test_linearization.py tests/certify/test_weights.py \
 	tests/report/test_verdict.py tests/report/test_summaries.py tests/jobs/test_read_project.py \

@@ -79,6 +79,25 @@ class Outcome:
     code: str
     text: str
 
+    @classmethod
+    def restored(cls, ok: bool, code: str, text: str) -> Outcome:
+        """The outcome that a result was saved with.
+
+        Parameters
+        ----------
+        ok : bool
+            Whether the result was what was asked for.
+        code : str
+            Its word for scripts.
+        text : str
+            What was said of it.
+
+        Returns
+        -------
+        Outcome
+        """
+        return cls(ok, code, text)
+
     def __str__(self) -> str:
         return self.text
 

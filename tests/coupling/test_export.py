@@ -150,7 +150,7 @@ def test_scaled_sections_are_the_same_filters(which: str, request: pytest.Fixtur
 def test_no_bounded_input_overflows(which: str, request: pytest.FixtureRequest) -> None:
     """The worst input of every node brings it to its peak, which is at most 1; noise and square waves stay below."""
     paths = request.getfixturevalue(which).fixed_point(1.0).paths
-    assert len(paths) == 2
+    assert len(paths) >= 2  # of every filter and axis
     for path in paths.values():
         assert path.peak.max() <= 1 and np.all(path.peak.max(axis=1) > 0.5)
         pulse = np.eye(1, 3000)[0]

@@ -130,7 +130,7 @@ def test_exact_aliases_need_another_measurement(bench: rt.System) -> None:
     assert plan is not None
     pairs = {frozenset(pair) for pair in plan.inseparable}
     assert frozenset({"heat_source(plate)", "ambient_gradient(plate)"}) in pairs
-    assert "No input within the limits tells" in plan.advice
+    assert "No input within the limits separates" in plan.advice
     assert "a second ambient sensor beside plate" in plan.advice and "Tp with another excitation" in plan.advice
     assert found.to_dict()["next_experiment"]["advice"] == plan.advice
 

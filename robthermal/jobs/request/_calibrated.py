@@ -119,7 +119,8 @@ def read_calibrated(path: Path, system: System) -> Estimates:
         bounded=np.array([found.bounded[name] for name in names], bool),
         logarithmic=np.array([found.logarithmic[name] for name in names], bool),
         degrees_of_freedom=np.inf if found.degrees_of_freedom is None else found.degrees_of_freedom,
-        covariance_scale=found.covariance_scale, iterations=found.iterations, outcome=Outcome(**dict(found.outcome)))
+        covariance_scale=found.covariance_scale, iterations=found.iterations,
+        outcome=Outcome.restored(**dict(found.outcome)))
 
 
 def _square(rows: list[list[float]], n: int, path: Path) -> np.ndarray[Any, np.dtype[np.float64]]:
