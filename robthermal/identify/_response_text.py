@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robthermal.errors import Outcome
-from robthermal.identify._outcomes import IdentifyCode
+
+from ._outcomes import IdentifyCode
 
 if TYPE_CHECKING:
     from ._response import FrequencyResponse

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robthermal.coupling._outcomes import CouplingCode
 from robthermal.errors import InputError, Outcome
 
+from .._outcomes import CouplingCode
 from ._blocks import Complex, Real, Structure, read_blocks
 from ._cycles import cyclic_part
 from ._lower import worst_perturbation

@@ -8,11 +8,11 @@ from typing import Any
 import control
 import numpy as np
 
-from robthermal.coupling._outcomes import CouplingCode
 from robthermal.errors import InputError
 from robthermal.linear import frequency_norm, hinf
 from robthermal.verification import Certificate
 
+from .._outcomes import CouplingCode
 from ._blocks import Complex, Real, read_blocks
 from ._intervals import Samples, cover
 from ._mu import bounds
