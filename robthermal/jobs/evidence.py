@@ -41,13 +41,28 @@ def write_certification(checked: Sequence[Checked], report: Report, folder: Path
     Report
         As written.
     """
+    return write_report(with_evidence(checked, report, folder), folder)
+
+
+def with_evidence(checked: Sequence[Checked], report: Report, folder: Path) -> Report:
+    """Certificates into an existing folder, and the report with what their checks found, as yet not written.
+
+    Parameters
+    ----------
+    checked : sequence of Checked
+        Certificates with their independent checks.
+    report : Report
+        What to show, as yet without evidence.
+    folder : Path
+        Existing folder without certificates.
+    """
     (folder / "certificates").mkdir()
     evidence = twice_checked([_saved(one, folder) for one in checked],
                              {one.file: one.certificate for one in checked if one.required and one.good})
     by_file = {one.file: one for one in evidence}
     claims = tuple(no_better(claim, by_file[claim.file]) if claim.file in by_file else claim
                    for claim in report.claims)
-    return write_report(replace(report, claims=claims, evidence=evidence, checker=checker()), folder)
+    return replace(report, claims=claims, evidence=evidence, checker=checker())
 
 
 def twice_checked(evidence: Sequence[Evidence], certificates: Mapping[str, Certificate]) -> tuple[Evidence, ...]:

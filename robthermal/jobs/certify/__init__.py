@@ -15,8 +15,10 @@ from ._reasons import remark as remark
 from ._reasons import stays_usable as stays_usable
 from ._sections import certification_sections as certification_sections
 from ._table import certify_table as certify_table
+from ._write import certification_report as certification_report
 from ._write import write_certify as write_certify
 
-__all__ = ["CERTIFY_GATES", "CODES", "box_stays_inside", "certification_reasons", "certification_sections",
-           "certify_system", "certify_table", "claim_ranges", "claims_hold", "current_reasons", "doubted", "remark",
-           "rest_on_certificates", "stays_usable", "within_usable", "write_certify"]
+__all__ = ["CERTIFY_GATES", "CODES", "box_stays_inside", "certification_reasons", "certification_report",
+           "certification_sections", "certify_system", "certify_table", "claim_ranges", "claims_hold",
+           "current_reasons", "doubted", "remark", "rest_on_certificates", "stays_usable", "within_usable",
+           "write_certify"]

@@ -38,13 +38,25 @@ def write_certify(result: Certification, files: tuple[Path, ...], out: str | Pat
     >>> rt.jobs.write_certify(done, (), "certified").holds
     True
     """
-    report = Report(title=result.system.name, subtitle=subtitle(result.system), label="",
-                    claims=required_claims(result.checked, stays_usable(result)),
-                    sections=tuple(certification_sections(result)), provenance=provenance(files),
-                    generated=now(),
-                    assumptions=machine_assumptions(result.system, result.parameters is not None),
-                    gate=certification_reasons(result), gates=CERTIFY_GATES, usable=result.usable,
-                    data={"certify": certify_table(result)})
+    report = certification_report(result, files)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
     return report
+
+
+def certification_report(result: Certification, files: tuple[Path, ...]) -> Report:
+    """What is to be said of a certification, as yet without evidence and not written anywhere.
+
+    Parameters
+    ----------
+    result : Certification
+        Certification, as `certify_system` returns it.
+    files : tuple of Path
+        Input files, for their hashes.
+    """
+    return Report(title=result.system.name, subtitle=subtitle(result.system), label="",
+                  claims=required_claims(result.checked, stays_usable(result)),
+                  sections=tuple(certification_sections(result)), provenance=provenance(files), generated=now(),
+                  assumptions=machine_assumptions(result.system, result.parameters is not None),
+                  gate=certification_reasons(result), gates=CERTIFY_GATES, usable=result.usable,
+                  data={"certify": certify_table(result)})

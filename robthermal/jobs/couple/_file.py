@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from ..._checks import quoted
 from ...errors import InputError, Outcome
 from ...identify import FrequencyResponse
-from ..request import Number, Table, read_toml
+from ..request import Number, Table, read_toml, refusal
 from ._frf import plant_remarks, plants_from_pairs, plants_from_whole
 from ._systems import LTI, System, SystemTable, files_of, linear_system
 
@@ -162,7 +162,35 @@ def read_coupling(path: str | Path) -> CouplingJob:
     ('pair', True, 0.01)
     """
     path = Path(path)
-    data = read_toml(path, _File, _REMEDY)
+    return _job(read_toml(path, _File, _REMEDY), path)
+
+
+def coupling_from_tables(tables: Mapping[str, Any], path: Path) -> CouplingJob:
+    """A coupling from tables that stand in another file.
+
+    Parameters
+    ----------
+    tables : mapping
+        What SPEC.toml would hold.
+    path : Path
+        File they stand in; other files are relative to it.
+
+    Returns
+    -------
+    CouplingJob
+
+    Raises
+    ------
+    InputError
+        As `read_coupling`.
+    """
+    try:
+        return _job(_File(**tables), path)
+    except ValidationError as error:
+        raise refusal(error, path, _REMEDY) from None
+
+
+def _job(data: _File, path: Path) -> CouplingJob:
     dt, halves = data.coupling.sample_time, (data.subsystems.one, data.subsystems.two)
     manual = any(getattr(data.design, key) is not None for key in _MANUAL)
     plants, controllers = (tuple(linear_system(getattr(half, key), dt, f"[subsystems.{k}] {key}", path)

@@ -54,16 +54,41 @@ def write_coupling(result: Coupling, out: str | Path) -> Report:
     >>> sorted(path.name for path in Path("coupled").iterdir())
     ['certificates', 'coupling.json', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
-    job = result.job
-    report = Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
-                    claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
-                    provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now())
+    report = coupling_report(result)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
-        result.filters.save(folder / "coupling.json", job.name, remarks=job.remarks)
-        for ending in job.exports:
-            result.filters.export(folder / f"coupling.{ending}", job.name)
+        save_coupling(result, folder)
     return report
+
+
+def coupling_report(result: Coupling) -> Report:
+    """What is to be said of a coupling, as yet without evidence and not written anywhere.
+
+    Parameters
+    ----------
+    result : Coupling
+        Coupling, as `couple_subsystems` returns it.
+    """
+    job = result.job
+    return Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
+                  claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
+                  provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now())
+
+
+def save_coupling(result: Coupling, folder: Path) -> None:
+    """Write coupling.json with the filters, and what the job exports beside it.
+
+    Parameters
+    ----------
+    result : Coupling
+        Coupling, as `couple_subsystems` returns it.
+    folder : Path
+        Existing folder to write into.
+    """
+    job = result.job
+    result.filters.save(folder / "coupling.json", job.name, remarks=job.remarks)
+    for ending in job.exports:
+        result.filters.export(folder / f"coupling.{ending}", job.name)
 
 
 def _subtitle(result: Coupling) -> str:

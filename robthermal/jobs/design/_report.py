@@ -64,15 +64,41 @@ def write_design(result: ControllerDesign, files: tuple[Path, ...], out: str | P
     >>> sorted(path.name for path in Path("design").iterdir())
     ['certificates', 'design.json', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
-    system = result.certification.system
-    report = Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
-                    claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
-                    provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
-                    generated=now(), gate=tuple(_reasons(result)), gates=_GATES)
+    report = design_report(result, files)
     with output_folder(out) as folder:
         report = write_certification(result.certification.checked, report, folder)
-        write_design_file(result, folder / "design.json")
+        save_design(result, folder)
     return report
+
+
+def design_report(result: ControllerDesign, files: tuple[Path, ...]) -> Report:
+    """What is to be said of a design, as yet without evidence and not written anywhere.
+
+    Parameters
+    ----------
+    result : ControllerDesign
+        Design, as `design_system` returns it.
+    files : tuple of Path
+        Input files, for their hashes.
+    """
+    system = result.certification.system
+    return Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
+                  claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
+                  provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
+                  generated=now(), gate=tuple(_reasons(result)), gates=_GATES)
+
+
+def save_design(result: ControllerDesign, folder: Path) -> None:
+    """Write design.json, with every number of the controller.
+
+    Parameters
+    ----------
+    result : ControllerDesign
+        Design, as `design_system` returns it.
+    folder : Path
+        Existing folder to write into.
+    """
+    write_design_file(result, folder / "design.json")
 
 
 _ASSUMPTIONS = (

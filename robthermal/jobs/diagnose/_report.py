@@ -58,17 +58,41 @@ def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
     >>> rt.jobs.write_diagnosis(rt.jobs.diagnose_records(bar, (), [noisy]), "diagnosed").answer
     'CONSISTENT'
     """
-    found = result.diagnosis
-    report = Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
-                    claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)),
-                    provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
-                    generated=now(), answer=found.verdict.upper())
+    report = diagnosis_report(result)
     with output_folder(out) as folder:
-        found.save(folder / "diagnosis.json")
-        write_system(found.system, folder / "augmented.toml")
-        _write_experiment(found, folder / "next_experiment.csv")
+        save_diagnosis(result.diagnosis, folder)
         write_report(report, folder)
     return report
+
+
+def diagnosis_report(result: Diagnosed) -> Report:
+    """What is to be said of a diagnosis, as yet not written anywhere.
+
+    Parameters
+    ----------
+    result : Diagnosed
+        Diagnosis, as `diagnose_records` returns it.
+    """
+    found = result.diagnosis
+    return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
+                  claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)),
+                  provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
+                  generated=now(), answer=found.verdict.upper())
+
+
+def save_diagnosis(found: Diagnosis, folder: Path) -> None:
+    """Write diagnosis.json, augmented.toml, and next_experiment.csv if one was found.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    folder : Path
+        Existing folder to write into.
+    """
+    found.save(folder / "diagnosis.json")
+    write_system(found.system, folder / "augmented.toml")
+    _write_experiment(found, folder / "next_experiment.csv")
 
 
 def _write_experiment(found: Diagnosis, path: Path) -> None:
