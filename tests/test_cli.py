@@ -9,18 +9,15 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from commands import Run, Said
 from rich.console import Console
 
 import robthermal as rt
-from robthermal import cli
 from robthermal.cli.terminal import progress, progress_bar
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -78,32 +75,6 @@ conductance = 0.3
 """
 
 
-@dataclass(frozen=True)
-class Outcome:
-    status: int
-    out: str
-    err: str
-
-
-Cli = Callable[..., Outcome]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
-    """The command line in this process: an exception that would be a traceback fails the test."""
-
-    def call(*args: object) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, args)])
-        capsys.readouterr()
-        with warnings.catch_warnings(), pytest.raises(SystemExit) as stop:  # main() shows warnings its own way
-            cli.main()
-        said = capsys.readouterr()
-        code = stop.value.code
-        return Outcome(code if isinstance(code, int) else 0, said.out, said.err)
-
-    return call
-
-
 @pytest.fixture
 def system(tmp_path: Path) -> Path:
     return write(tmp_path / "bench.toml", SYSTEM)
@@ -146,7 +117,7 @@ def everything(folder: Path) -> set[Path]:
     return set(folder.rglob("*"))
 
 
-def refused(outcome: Outcome, *words: str) -> None:
+def refused(outcome: Said, *words: str) -> None:
     """Status 2, one line on standard error with all words, nothing on standard output."""
     assert outcome.status == 2
     assert outcome.out == ""
@@ -207,13 +178,13 @@ def test_junit_of_the_demo_is_well_formed_and_agrees_with_the_summary(
     assert not list(suite.iter("failure"))
 
 
-def test_certificates_of_the_demo_verify(demo: tuple[subprocess.CompletedProcess[str], Path], run: Cli) -> None:
+def test_certificates_of_the_demo_verify(demo: tuple[subprocess.CompletedProcess[str], Path], run: Run) -> None:
     done = run("verify", demo[1])
     assert done.status == 0
     assert done.out.count("valid  ") == len(list((demo[1] / "certificates").iterdir()))
 
 
-def test_a_changed_certificate_is_not_valid(demo: tuple[subprocess.CompletedProcess[str], Path], run: Cli,
+def test_a_changed_certificate_is_not_valid(demo: tuple[subprocess.CompletedProcess[str], Path], run: Run,
                                             tmp_path: Path) -> None:
     data = json.loads((demo[1] / "certificates" / "contraction.json").read_text(encoding="utf-8"))
     data["evidence"]["rate"] = 1.0
@@ -224,7 +195,7 @@ def test_a_changed_certificate_is_not_valid(demo: tuple[subprocess.CompletedProc
     assert run("verify", demo[1], changed).status == 1  # one bad one among good ones
 
 
-def test_demo_replaces_an_earlier_result_and_nothing_else(run: Cli, tmp_path: Path,
+def test_demo_replaces_an_earlier_result_and_nothing_else(run: Run, tmp_path: Path,
                                                           monkeypatch: pytest.MonkeyPatch) -> None:
     def never(*args: object) -> None:
         pytest.fail("the job was run although its folder was refused")
@@ -256,7 +227,7 @@ def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
     assert everything(tmp_path) == set()
 
 
-def test_interrupt_while_writing_leaves_nothing(run: Cli, system: Path, tmp_path: Path,
+def test_interrupt_while_writing_leaves_nothing(run: Run, system: Path, tmp_path: Path,
                                                 monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[set[Path]] = []
 
@@ -275,7 +246,7 @@ def test_interrupt_while_writing_leaves_nothing(run: Cli, system: Path, tmp_path
 # Certify, verify
 
 
-def test_certify_says_yes_and_its_certificates_verify(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_certify_says_yes_and_its_certificates_verify(run: Run, system: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = run("certify", system, "--current", "m1=0:1", "--ambient", "room=15:30", "--setpoint", "m1=10", "--out",
                out, "--json")
@@ -287,7 +258,7 @@ def test_certify_says_yes_and_its_certificates_verify(run: Cli, system: Path, tm
     assert run("verify", out).status == 0
 
 
-def test_certify_with_a_full_matrix(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_certify_with_a_full_matrix(run: Run, system: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = run("certify", system, "--current", "m1=0:1", "--ambient", "room=15:30", "--method", "lyapunov",
                "--structure", "block", "--out", out, "--json")
@@ -296,7 +267,7 @@ def test_certify_with_a_full_matrix(run: Cli, system: Path, tmp_path: Path) -> N
     assert claims["contraction"]["evidence"]["method"] == "lyapunov"
 
 
-def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_certify_too_large_a_current_says_no_and_why(run: Run, system: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = run("certify", system, "--current", "m1=-20:20", "--out", out)
     assert done.status == 1
@@ -325,7 +296,7 @@ def test_certify_too_large_a_current_says_no_and_why(run: Cli, system: Path, tmp
     (["--setpoint", "mx=3"], ["mx", "m1"]),
     (["--setpoint", "m1=cold"], ["--setpoint", "m1=cold"]),
 ])
-def test_certify_refuses(run: Cli, system: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
+def test_certify_refuses(run: Run, system: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
     before = everything(tmp_path)
     refused(run("certify", system, *options, "--out", tmp_path / "out"), *words)
     assert everything(tmp_path) == before
@@ -333,13 +304,13 @@ def test_certify_refuses(run: Cli, system: Path, tmp_path: Path, options: list[s
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\xfe" * 1000, b"[1, 2]", b'{"format": "other/1"}', b"[" * 100_000,
                                      b'{"format": "robthermal-certificate/1", "kind": NaN}'])
-def test_verify_cannot_read(run: Cli, tmp_path: Path, content: bytes) -> None:
+def test_verify_cannot_read(run: Run, tmp_path: Path, content: bytes) -> None:
     done = run("verify", write(tmp_path / "c.json", content))
     assert done.status == 2
     assert "unreadable" in done.out and "c.json" in done.out
 
 
-def test_verify_of_missing_files_and_folders_without_certificates(run: Cli, tmp_path: Path) -> None:
+def test_verify_of_missing_files_and_folders_without_certificates(run: Run, tmp_path: Path) -> None:
     missing = run("verify", tmp_path / "none.json")
     assert missing.status == 2 and "none.json" in missing.out
     refused(run("verify", tmp_path), str(tmp_path), "holds no certificates")
@@ -348,7 +319,7 @@ def test_verify_of_missing_files_and_folders_without_certificates(run: Cli, tmp_
 # Is the input sound
 
 
-def test_check_of_sound_input(run: Cli, system: Path, record: Path) -> None:
+def test_check_of_sound_input(run: Run, system: Path, record: Path) -> None:
     assert run("check", system, record).status == 0
     done = run("check", system, record, "--json")
     answer = json.loads(done.out)
@@ -377,7 +348,7 @@ def changed(old: str, new: str) -> str:
     (bytes(range(256)) * 100, ["text"]),
     ("[system\nname=", ["TOML"]),
 ])
-def test_check_refuses_a_system(run: Cli, tmp_path: Path, text: str | bytes, words: list[str]) -> None:
+def test_check_refuses_a_system(run: Run, tmp_path: Path, text: str | bytes, words: list[str]) -> None:
     file = write(tmp_path / "bad.toml", text)
     refused(run("check", file), "bad.toml", *words)
     assert everything(tmp_path) == {file}
@@ -399,7 +370,7 @@ RECORD = HEADER + "".join(ROWS)
     ("", ["empty"]),
     (bytes(range(256)) * 100, ["binary"]),
 ])
-def test_check_refuses_a_record(run: Cli, system: Path, tmp_path: Path, text: str | bytes, words: list[str]) -> None:
+def test_check_refuses_a_record(run: Run, system: Path, tmp_path: Path, text: str | bytes, words: list[str]) -> None:
     file = write(tmp_path / "bad.csv", text)
     refused(run("check", system, file), "bad.csv", *words)
 
@@ -408,7 +379,7 @@ def test_check_refuses_a_record(run: Cli, system: Path, tmp_path: Path, text: st
     (HEADER + "".join(ROWS[:9] + ROWS[13:]), ["line 10", "4 samples are missing"], [9, 7]),
     (RECORD.replace("22.05", "nan"), ["line 7", "T_plate", "nothing was measured"], [5, 14]),
 ])
-def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Cli, system: Path, tmp_path: Path, text: str,
+def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Run, system: Path, tmp_path: Path, text: str,
                                                                      words: list[str], parts: list[int]) -> None:
     file = write(tmp_path / "gap.csv", text)
     done = run("check", system, file, "--json")
@@ -419,14 +390,14 @@ def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Cli, s
     refused(run("check", system, file, "--record", "gaps=refuse"), "gap.csv", *words, 'gaps = "split"')
 
 
-def test_check_refuses_celsius_declared_kelvin(run: Cli, tmp_path: Path) -> None:
+def test_check_refuses_celsius_declared_kelvin(run: Run, tmp_path: Path) -> None:
     kelvin = SYSTEM.replace('"degC"', '"K"').replace("= 22.0", "= 295.15")
     kelvin = kelvin.replace("reference_temperature = 35.0", "reference_temperature = 308.15")
     file = write(tmp_path / "run.csv", RECORD)
     refused(run("check", write(tmp_path / "kelvin.toml", kelvin), file), "run.csv", "room", "22", "Celsius")
 
 
-def test_check_refuses_a_record_longer_than_memory(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_check_refuses_a_record_longer_than_memory(run: Run, system: Path, tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
     with file.open("wb") as stream:
         stream.write(RECORD.encode())
@@ -434,7 +405,7 @@ def test_check_refuses_a_record_longer_than_memory(run: Cli, system: Path, tmp_p
     refused(run("check", system, file), "long.csv", "3.221e+09 bytes", "Slice the file")
 
 
-def test_a_line_of_100_megabytes_is_refused_everywhere(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_a_line_of_100_megabytes_is_refused_everywhere(run: Run, system: Path, tmp_path: Path) -> None:
     line = b"1" * 100_000_000
     first = write(tmp_path / "first.csv", line)
     refused(run("check", system, first), "first.csv", "first line")
@@ -450,7 +421,7 @@ def test_a_line_of_100_megabytes_is_refused_everywhere(run: Cli, system: Path, t
 # The other commands
 
 
-def test_simulate_writes_a_record_that_reads_back(run: Cli, system: Path, record: Path, tmp_path: Path) -> None:
+def test_simulate_writes_a_record_that_reads_back(run: Run, system: Path, record: Path, tmp_path: Path) -> None:
     out = tmp_path / "simulated.csv"
     done = run("simulate", system, record, "--out", out, "--json")
     assert done.status == 0
@@ -461,7 +432,7 @@ def test_simulate_writes_a_record_that_reads_back(run: Cli, system: Path, record
     np.testing.assert_allclose(again.outputs, expected.outputs, atol=1e-6)
 
 
-def test_calibrate_finds_the_conductance_the_record_was_made_with(run: Cli, system: Path, record: Path,
+def test_calibrate_finds_the_conductance_the_record_was_made_with(run: Run, system: Path, record: Path,
                                                                   tmp_path: Path) -> None:
     out = tmp_path / "calibrated.toml"
     done = run("calibrate", system, record, "--out", out, "--json")
@@ -470,14 +441,14 @@ def test_calibrate_finds_the_conductance_the_record_was_made_with(run: Cli, syst
     assert rt.read_system(out).parameter("links.plate-room.conductance") == pytest.approx(1.2, rel=0.01)
 
 
-def test_calibrate_says_no_where_the_data_leave_it_open(run: Cli, system: Path, tmp_path: Path) -> None:
+def test_calibrate_says_no_where_the_data_leave_it_open(run: Run, system: Path, tmp_path: Path) -> None:
     short = write(tmp_path / "short.csv", RECORD)  # 20 s of a machine whose fastest time constant is a minute
     done = run("calibrate", system, short, "--out", tmp_path / "c.toml")
     assert done.status == 1
     assert "not determined" in done.out
 
 
-def test_simulation_that_runs_away_says_no(run: Cli, tmp_path: Path) -> None:
+def test_simulation_that_runs_away_says_no(run: Run, tmp_path: Path) -> None:
     loose = write(tmp_path / "loose.toml", changed("current_limits = [-3.3, 3.3]", ""))
     rows = HEADER + "".join(f"{i},60,22,22,22\n" for i in range(2000))
     before = everything(tmp_path) | {tmp_path / "hot.csv"}
@@ -491,13 +462,13 @@ def test_simulation_that_runs_away_says_no(run: Cli, tmp_path: Path) -> None:
                                      ["calibrate", "SYSTEM", "RECORD", "--out", "no/x.toml"],
                                      ["frf", "RECORD", "--system", "SYSTEM", "--out", "no/x.json"],
                                      ["frf", "RECORD", "--system", "SYSTEM", "--plot", "no/x.svg"]])
-def test_output_into_a_missing_folder_is_refused_before_the_work(run: Cli, system: Path, record: Path,
+def test_output_into_a_missing_folder_is_refused_before_the_work(run: Run, system: Path, record: Path,
                                                                  command: list[str]) -> None:
     here = {"SYSTEM": str(system), "RECORD": str(record)}
     refused(run(*(here.get(word, word) for word in command)), "--out" if "--out" in command else "--plot", "'no'")
 
 
-def test_plot_of_an_unknown_kind_is_refused_before_the_work(run: Cli, system: Path, record: Path,
+def test_plot_of_an_unknown_kind_is_refused_before_the_work(run: Run, system: Path, record: Path,
                                                             tmp_path: Path) -> None:
     before = everything(tmp_path)
     refused(run("frf", record, "--system", system, "--out", tmp_path / "f.json", "--plot", tmp_path / "f.xyz"),
@@ -505,7 +476,7 @@ def test_plot_of_an_unknown_kind_is_refused_before_the_work(run: Cli, system: Pa
     assert everything(tmp_path) == before
 
 
-def test_frf_and_excitation_write_what_they_say(run: Cli, tmp_path: Path) -> None:
+def test_frf_and_excitation_write_what_they_say(run: Run, tmp_path: Path) -> None:
     done = run("excitation", "q", "--period", "400", "--sample-time", "1", "--band", "0.005", "0.2", "--amplitude",
                "1", "--out", tmp_path / "u.csv", "--json")
     assert done.status == 0 and json.loads(done.out)["out"] == [str(tmp_path / "u.csv")]
@@ -525,13 +496,13 @@ def test_frf_and_excitation_write_what_they_say(run: Cli, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_of_every_command_has_an_example(run: Cli, command: str) -> None:
+def test_help_of_every_command_has_an_example(run: Run, command: str) -> None:
     done = run(command, "--help")
     assert done.status == 0
     assert f"Example: robthermal {command}" in " ".join(done.out.split())
 
 
-def test_every_command_is_tested_and_documented(run: Cli) -> None:
+def test_every_command_is_tested_and_documented(run: Run) -> None:
     listed = re.findall(r"^  ([a-z]+) ", run("--help").out.partition("Commands:")[2], re.M)
     assert sorted(listed) == sorted(COMMANDS)
     page = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
@@ -539,7 +510,7 @@ def test_every_command_is_tested_and_documented(run: Cli) -> None:
         assert f"## `{command}`" in page and f"robthermal {command} " in page
 
 
-def test_every_option_is_documented(run: Cli) -> None:
+def test_every_option_is_documented(run: Run) -> None:
     page = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
     for command in COMMANDS:
         section = page.partition(f"## `{command}`")[2].partition("\n## ")[0]
@@ -547,12 +518,12 @@ def test_every_option_is_documented(run: Cli) -> None:
         assert not {option for option in options if option not in section}, command
 
 
-def test_units_stay_in_the_help(run: Cli) -> None:
+def test_units_stay_in_the_help(run: Run) -> None:
     assert "[s]" in run("excitation", "--help").out
     assert "[fit]" in run("calibrate", "--help").out
 
 
-def test_version(run: Cli) -> None:
+def test_version(run: Run) -> None:
     done = run("--version")
     assert done.status == 0 and done.out == f"robthermal {rt.__version__}\n"
 
@@ -564,10 +535,10 @@ def test_version(run: Cli) -> None:
     (["certify", "x.toml", "--temperature", "warm", "5"], ["--temperature"]),
     (["check", "none.toml"], ["none.toml", "No such file"]),
 ])
-def test_wrong_command_lines(run: Cli, args: list[str], words: list[str]) -> None:
+def test_wrong_command_lines(run: Run, args: list[str], words: list[str]) -> None:
     refused(run(*args), *words)
 
 
-def test_no_command_shows_the_help(run: Cli) -> None:
+def test_no_command_shows_the_help(run: Run) -> None:
     done = run()
     assert done.status == 2 and "Commands:" in done.err

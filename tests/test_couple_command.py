@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +13,6 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal import cli
 
 ROOT = Path(__file__).resolve().parents[1]
 DT = 0.01
@@ -65,18 +63,6 @@ def write(folder: Path, text: str = SPEC) -> Path:
         (folder / f"r{k}.csv").write_text(frf_text(P2, factor), encoding="utf-8")
     (folder / "SPEC.toml").write_text(text, encoding="utf-8")
     return folder / "SPEC.toml"
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[int, str, str]]:
-    def command(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr("sys.argv", ["robthermal", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        said = capsys.readouterr()
-        return int(stop.value.code or 0), said.out, said.err
-
-    return command
 
 
 @pytest.fixture(scope="module")

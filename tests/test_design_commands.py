@@ -6,9 +6,7 @@ import json
 import os
 import subprocess
 import sys
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -16,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 import pytest
+from commands import Run
 
 import robthermal as rt
-from robthermal import cli
 from robthermal.errors import InputError
 from robthermal.jobs.design._file import design_numbers
 from robthermal.jobs.design._limits import check_given, contain, worst_runaway
@@ -92,31 +90,6 @@ time_constant = 20.0
 """
 
 
-@dataclass(frozen=True)
-class Said:
-    status: int
-    out: str
-    err: str
-
-
-Cli = Callable[..., Said]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
-    """The command line in this process: an exception that would be a traceback fails the test."""
-
-    def call(*args: object) -> Said:
-        monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, args)])
-        capsys.readouterr()
-        with warnings.catch_warnings(), pytest.raises(SystemExit) as stop:
-            cli.main()
-        said = capsys.readouterr()
-        return Said(stop.value.code if isinstance(stop.value.code, int) else 0, said.out, said.err)
-
-    return call
-
-
 @pytest.fixture
 def bench() -> rt.System:
     return rt.thermal.parse_system(BENCH, "bench.toml")
@@ -168,7 +141,7 @@ def two() -> rt.jobs.design.ControllerDesign:
     return rt.jobs.design_system(system, request)
 
 
-def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Cli) -> None:
+def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -> None:
     out, summary = written / "out", json.loads((written / "said.json").read_text(encoding="utf-8"))
     assert summary["holds"] and summary["controller"] == "out/design.json"
     assert {path.name for path in out.iterdir()} == {"certificates", "design.json", "junit.xml", "report.html",
@@ -327,7 +300,7 @@ def test_currents_beyond_the_usable_one_are_refused_with_it(bench: rt.System) ->
         rt.jobs.design_system(bench, request)
 
 
-def test_not_certified_is_an_answer(run: Cli, tmp_path: Path) -> None:
+def test_not_certified_is_an_answer(run: Run, tmp_path: Path) -> None:
     """A conductance that would be negative at -20 °C: nothing contracts there. Status 1, and a folder that says why."""
     (tmp_path / "steep.toml").write_text(BENCH.replace("slope = 0.0005", "slope = 0.01"), encoding="utf-8")
     said = run("design", tmp_path / "steep.toml", *FAST, "--temperature", "-20", "120", "--out", tmp_path / "out")
@@ -356,7 +329,7 @@ def test_not_certified_is_an_answer(run: Cli, tmp_path: Path) -> None:
     (["--sample-time", "200", "--bandwidth", "0.2"], ["sample_time", "unstable"]),
     (["--method", "guess"], ["--method"]),
 ])
-def test_design_refuses(run: Cli, file: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
+def test_design_refuses(run: Run, file: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
     given = options if "--setpoint" in options else ["--setpoint", "m1=12", *options]
     said = run("design", file, *given, "--out", tmp_path / "out")
     assert (said.status, said.out) == (2, "")
@@ -364,14 +337,14 @@ def test_design_refuses(run: Cli, file: Path, tmp_path: Path, options: list[str]
     assert [path.name for path in tmp_path.iterdir()] == ["bench.toml"]
 
 
-def test_sensors_that_see_too_little_are_refused_with_the_lumps(run: Cli, tmp_path: Path) -> None:
+def test_sensors_that_see_too_little_are_refused_with_the_lumps(run: Run, tmp_path: Path) -> None:
     apart = BENCH.replace('between = ["part", "box"]', 'between = ["box", "room"]\nname = "second"')
     (tmp_path / "apart.toml").write_text(apart, encoding="utf-8")
     said = run("design", tmp_path / "apart.toml", "--setpoint", "m1=12", "--out", tmp_path / "out")
     assert said.status == 2 and "do not see lumps box" in said.err and not (tmp_path / "out").exists()
 
 
-def test_design_needs_modules(run: Cli, tmp_path: Path) -> None:
+def test_design_needs_modules(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "lab.toml"
     rt.thermal.write_system(rt.systems.tclab(), file)
     for command in ("design", "map"):
@@ -379,7 +352,7 @@ def test_design_needs_modules(run: Cli, tmp_path: Path) -> None:
         assert said.status == 2 and "no thermoelectric module" in said.err
 
 
-def test_map_writes_data_plot_and_certificate(run: Cli, file: Path, bench: rt.System, tmp_path: Path,
+def test_map_writes_data_plot_and_certificate(run: Run, file: Path, bench: rt.System, tmp_path: Path,
                                               fold: rt.thermal.LoadCurve) -> None:
     said = run("map", file, "--ambient", "22", "--load", "0,9,2", "--setpoint", "12", "--json", "--out",
                tmp_path / "out")
@@ -421,7 +394,7 @@ def test_heating_conditions_are_not_allowed_by_a_cooling_certificate(bench: rt.S
     (["--ambient", "0,40,100", "--load", "0,5,100"], ["at most 2000"]),
     (["--method", "guess"], ["--method"]),
 ])
-def test_map_refuses(run: Cli, file: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
+def test_map_refuses(run: Run, file: Path, tmp_path: Path, options: list[str], words: list[str]) -> None:
     said = run("map", file, *options, "--out", tmp_path / "out")
     assert (said.status, said.out) == (2, "")
     assert all(word in said.err for word in words), said.err

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from commands import Run
 from scipy.integrate import solve_ivp
 
 import robthermal as rt
-from robthermal import cli
 
 H, DWELL = 5.0, 20
 FILES = ["augmented.toml", "diagnosis.json", "junit.xml", "report.html", "report.json", "summary.json"]
@@ -55,7 +55,6 @@ noise = 0.01
 "lumps.plate.capacity" = { lower = 30.0, upper = 480.0, sigma = 12.0 }
 "links.plate-room.conductance" = { lower = 0.15, upper = 2.4, sigma = 0.06 }
 """
-Run = Callable[..., tuple[int, str, str]]
 
 
 def nothing(t: float, T: np.ndarray) -> np.ndarray:
@@ -90,18 +89,6 @@ def measure(path: Path, hidden: Callable[[float, np.ndarray], np.ndarray], seed:
     table[:, 2:] += 0.01 * rng.standard_normal((n, 2))
     np.savetxt(path, table, delimiter=",", header="time,heater,Tp,Tb", comments="", fmt="%.9g")
     return path
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    def command(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr("sys.argv", ["robthermal", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        said = capsys.readouterr()
-        return int(stop.value.code or 0), said.out, said.err
-
-    return command
 
 
 @pytest.fixture(scope="module")

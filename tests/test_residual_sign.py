@@ -8,40 +8,11 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from heated_bar import PROJECT
 
 import robthermal as rt
 from robthermal import report
 
-SYSTEM = """[system]
-name = "bar"
-temperature_unit = "degC"
-[ambients.room]
-temperature = 20.0
-[lumps.bar]
-capacity = 50.0
-initial = 20.0
-[[links]]
-between = ["bar", "room"]
-conductance = 0.5
-[inputs.Q]
-lump = "bar"
-limits = [0.0, 10.0]
-[sensors.T]
-lump = "bar"
-noise = 0.01
-[fit]
-"links.bar-room.conductance" = { lower = 0.4999, upper = 0.5001 }
-"""
-PROJECT = """[project]
-name = "bar"
-system = "bar.toml"
-train = ["train.csv"]
-validation = ["validation.csv"]
-[calibrate]
-initial = "system"
-[certify]
-temperature = [10.0, 60.0]
-"""
 GAIN = 0.05  # of the heater in the second record
 
 
@@ -65,6 +36,12 @@ def record(seed: int, offset: float, gain: float = 1.0) -> rt.Record:
 
 def fixed_start() -> rt.System:
     return system().with_parameters({"lumps.bar.initial": 293.15})
+
+
+def narrow() -> rt.System:
+    """With a range of its conductance that says: known."""
+    return fixed_start().model_copy(update={"temperature_unit": "degC", "fit": {
+        "links.bar-room.conductance": rt.thermal.FitRange(lower=0.4999, upper=0.5001)}})
 
 
 def test_calibration_of_a_machine_one_kelvin_warmer() -> None:
@@ -100,7 +77,7 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> rt.jobs.run.JobResult:
         one = record(seed, np.linspace(0.0, 2.0, 300)[:, None])  # warms up: a mean residual near +1 K
         rows = [f"{t:g},{q:.9g},{T - 273.15:.6f}" for t, q, T in zip(one.time, one["Q"], one["T"], strict=True)]
         (folder / f"{name}.csv").write_text("\n".join(["time,Q,T", *rows]))
-    (folder / "bar.toml").write_text(SYSTEM)
+    rt.thermal.write_system(narrow(), folder / "bar.toml")
     (folder / "project.toml").write_text(PROJECT)
     return rt.jobs.run_job(rt.jobs.read_project(folder / "project.toml"))
 
@@ -131,9 +108,7 @@ def warm() -> rt.jobs.diagnose.Diagnosed:
 
 
 def diagnosed(train: list[rt.Record], validation: list[rt.Record], **options: Any) -> rt.jobs.diagnose.Diagnosed:
-    nominal = fixed_start().model_copy(update={"fit": {"links.bar-room.conductance": rt.thermal.FitRange(
-        lower=0.4999, upper=0.5001)}})
-    return rt.jobs.diagnose_records(nominal, (), train, validation, **options)
+    return rt.jobs.diagnose_records(narrow(), (), train, validation, **options)
 
 
 def test_diagnosis_of_a_machine_that_is_warmer(warm: rt.jobs.diagnose.Diagnosed) -> None:

@@ -5,50 +5,20 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import sys
-import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from commands import Run
 
 import robthermal as rt
-from robthermal import cli
 from robthermal.jobs.claims._assumptions import KIND_ASSUMPTIONS
 from robthermal.verification._kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
 MADE_AGAIN = ("report.html", "junit.xml", "summary.json")
 DATE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    status: int
-    out: str
-    err: str
-
-
-Cli = Callable[..., Outcome]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Cli:
-    """The command line in this process: an exception that would be a traceback fails the test."""
-
-    def call(*args: object) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, args)])
-        capsys.readouterr()
-        with warnings.catch_warnings(), pytest.raises(SystemExit) as stop:
-            cli.main()
-        said = capsys.readouterr()
-        code = stop.value.code
-        return Outcome(code if isinstance(code, int) else 0, said.out, said.err)
-
-    return call
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +53,7 @@ def undated(folder: Path) -> list[str]:
     return [DATE.sub("DATE", (folder / name).read_text(encoding="utf-8")) for name in MADE_AGAIN]
 
 
-def test_a_report_built_again_is_the_same_but_for_its_date(run: Cli, results: Path, done: Path) -> None:
+def test_a_report_built_again_is_the_same_but_for_its_date(run: Run, results: Path, done: Path) -> None:
     for name in MADE_AGAIN:
         (results / name).unlink()
     again = run("report", results)
@@ -93,7 +63,7 @@ def test_a_report_built_again_is_the_same_but_for_its_date(run: Cli, results: Pa
     assert not DATE.findall("".join(undated(results))) and undated(results)[0].count("DATE") == 1
 
 
-def test_a_tampered_certificate_shows_as_not_valid(run: Cli, results: Path) -> None:
+def test_a_tampered_certificate_shows_as_not_valid(run: Run, results: Path) -> None:
     edit(results / "certificates" / "contraction.json", rate=1.0)
     again = run("report", results, "--json")
     assert again.status == 1
@@ -108,7 +78,7 @@ def test_a_tampered_certificate_shows_as_not_valid(run: Cli, results: Path) -> N
     assert len(list(ElementTree.parse(results / "junit.xml").iter("failure"))) == 1
 
 
-def test_another_valid_certificate_in_its_place_is_not_taken(run: Cli, results: Path) -> None:
+def test_another_valid_certificate_in_its_place_is_not_taken(run: Run, results: Path) -> None:
     """A true but weaker claim, under the name of the stronger one."""
     folder = results / "certificates"
     shutil.copy(folder / "usable_heating_contraction.json", folder / "contraction.json")
@@ -117,7 +87,7 @@ def test_another_valid_certificate_in_its_place_is_not_taken(run: Cli, results: 
     assert "valid by itself, but not the file of this report" in (results / "summary.json").read_text(encoding="utf-8")
 
 
-def test_a_good_certificate_put_back_is_good_again(run: Cli, results: Path, done: Path) -> None:
+def test_a_good_certificate_put_back_is_good_again(run: Run, results: Path, done: Path) -> None:
     shutil.rmtree(results / "certificates")
     assert run("report", results).status == 1
     assert "No such file" in (results / "summary.json").read_text(encoding="utf-8")
@@ -128,7 +98,7 @@ def test_a_good_certificate_put_back_is_good_again(run: Cli, results: Path, done
 
 @pytest.mark.parametrize("evidence", [
     [], [{"file": "../outside.json"}], [{"file": "certificates/../../outside.json"}], [{"file": "summary.json"}]])
-def test_a_claim_without_a_certificate_in_the_folder_is_not_verified(run: Cli, results: Path,
+def test_a_claim_without_a_certificate_in_the_folder_is_not_verified(run: Run, results: Path,
                                                                      evidence: list[dict[str, str]]) -> None:
     shutil.copy(results / "certificates" / "contraction.json", results.parent / "outside.json")
     data = json.loads((results / "report.json").read_text(encoding="utf-8"))
@@ -139,7 +109,7 @@ def test_a_claim_without_a_certificate_in_the_folder_is_not_verified(run: Cli, r
     assert not json.loads((results / "summary.json").read_text(encoding="utf-8"))["claims"][0]["verified"]
 
 
-def test_an_honest_no_stays_no(run: Cli, tmp_path: Path) -> None:
+def test_an_honest_no_stays_no(run: Run, tmp_path: Path) -> None:
     """Nothing that a certificate says later turns a claim that was never proven into a proof."""
     system = rt.systems.two_module()
     boxes = rt.jobs.Boxes(current={"m1": (-20.0, 20.0), "m2": (0.0, 1.0)})
@@ -150,7 +120,7 @@ def test_an_honest_no_stays_no(run: Cli, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [None, b"{}", b"\x00"])
-def test_report_of_something_else_is_refused(run: Cli, tmp_path: Path, content: bytes | None) -> None:
+def test_report_of_something_else_is_refused(run: Run, tmp_path: Path, content: bytes | None) -> None:
     if content is not None:
         (tmp_path / "report.json").write_bytes(content)
     again = run("report", tmp_path)
@@ -162,14 +132,14 @@ def test_report_of_something_else_is_refused(run: Cli, tmp_path: Path, content: 
 # verify
 
 
-def test_verify_finds_every_certificate_below_a_folder(run: Cli, results: Path) -> None:
+def test_verify_finds_every_certificate_below_a_folder(run: Run, results: Path) -> None:
     shutil.copytree(results / "certificates", results.parent / "deep" / "down" / "certificates")
     count = len(list((results / "certificates").iterdir()))
     said = run("verify", results.parent)
     assert said.status == 0 and said.out.count("valid  ") == 2 * count
 
 
-def test_verify_writes_junit_with_one_case_per_file(run: Cli, results: Path, tmp_path: Path) -> None:
+def test_verify_writes_junit_with_one_case_per_file(run: Run, results: Path, tmp_path: Path) -> None:
     folder = results / "certificates"
     edit(folder / "contraction.json", rate=1.0)
     (folder / "broken.json").write_text("{}")
@@ -183,13 +153,13 @@ def test_verify_writes_junit_with_one_case_per_file(run: Cli, results: Path, tmp
     assert run("verify", results, "--junit", tmp_path / "none" / "j.xml").status == 2
 
 
-def test_verify_json_has_margins_and_claims(run: Cli, results: Path) -> None:
+def test_verify_json_has_margins_and_claims(run: Run, results: Path) -> None:
     rows = json.loads(run("verify", results / "certificates" / "contraction.json", "--json").out)
     assert rows[0]["valid"] and rows[0]["kind"] == "contraction" and rows[0]["margins"]["rate"] > 0
     assert rows[0]["claim"].startswith("The thermal network")
 
 
-def test_verify_prints_the_claim_that_it_has_proven_and_no_other(run: Cli, results: Path, tmp_path: Path) -> None:
+def test_verify_prints_the_claim_that_it_has_proven_and_no_other(run: Run, results: Path, tmp_path: Path) -> None:
     file = results / "certificates" / "contraction.json"
     claim = json.loads(file.read_text(encoding="utf-8"))["claim"]
     assert "machine " in claim and "nominal parameters" in claim
@@ -212,7 +182,7 @@ def test_the_starter_project_finds_what_its_records_were_made_with(done: Path) -
     assert "SIMULATED DATA" in (done / "report.html").read_text(encoding="utf-8")
 
 
-def test_new_writes_a_project_that_reads_at_once(run: Cli, tmp_path: Path) -> None:
+def test_new_writes_a_project_that_reads_at_once(run: Run, tmp_path: Path) -> None:
     made = run("new", tmp_path / "bench", "--json")
     answer = json.loads(made.out)
     assert made.status == 0 and {Path(file).name for file in answer["files"]} == {
@@ -224,7 +194,7 @@ def test_new_writes_a_project_that_reads_at_once(run: Cli, tmp_path: Path) -> No
         assert sum("#" in line for line in lines) > 0.4 * len([line for line in lines if line.strip()]), "comments"
 
 
-def test_new_overwrites_nothing(run: Cli, starter: Path, results: Path, tmp_path: Path) -> None:
+def test_new_overwrites_nothing(run: Run, starter: Path, results: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     for taken in (starter.parent, results, tmp_path / "file"):
         before = {path: path.read_bytes() for path in taken.rglob("*") if path.is_file()}
@@ -239,7 +209,7 @@ def test_new_overwrites_nothing(run: Cli, starter: Path, results: Path, tmp_path
 # explain
 
 
-def test_every_effect_kind_and_code_is_explained(run: Cli) -> None:
+def test_every_effect_kind_and_code_is_explained(run: Run) -> None:
     known = rt.jobs.explainable()
     assert set(known["effect"]) == set(rt.thermal.effects()) and len(known["effect"]) == 28
     assert set(known["certificate"]) == set(KINDS) == set(KIND_ASSUMPTIONS)
@@ -262,7 +232,7 @@ def test_every_page_that_is_named_exists_and_names_the_effect_or_kind() -> None:
         assert pages and (one.what == "error" or one.name in pages[0]), one.name
 
 
-def test_explain_says_what_an_engineer_asks(run: Cli) -> None:
+def test_explain_says_what_an_engineer_asks(run: Run) -> None:
     said = run("explain", "sensor_lag")
     assert said.status == 0
     for words in ("first-order lag", "time_constant [s]", "hidden_mass", "input_delay", "frequencies above",
@@ -275,7 +245,7 @@ def test_explain_says_what_an_engineer_asks(run: Cli) -> None:
     assert "the answer is no" in said.out and "next_experiment" in said.out
 
 
-def test_an_unknown_name_gets_the_nearest_ones(run: Cli) -> None:
+def test_an_unknown_name_gets_the_nearest_ones(run: Run) -> None:
     said = run("explain", "sensorlag")
     assert said.status == 2 and said.out == "" and "sensor_lag" in said.err
     assert run("explain", "xyzzy").status == 2
@@ -286,7 +256,7 @@ def test_an_unknown_name_gets_the_nearest_ones(run: Cli) -> None:
 # JSON for scripts
 
 
-def test_errors_are_json_too_where_json_was_asked_for(run: Cli, tmp_path: Path) -> None:
+def test_errors_are_json_too_where_json_was_asked_for(run: Run, tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("[system]\nname = 3\n")
     said = run("check", tmp_path / "bad.toml", "--json")
     error = json.loads(said.out)["error"]
@@ -296,13 +266,13 @@ def test_errors_are_json_too_where_json_was_asked_for(run: Cli, tmp_path: Path) 
     assert run("check", tmp_path / "bad.toml").out == ""
 
 
-def test_every_command_has_json(run: Cli) -> None:
+def test_every_command_has_json(run: Run) -> None:
     commands = re.findall(r"^  ([a-z]+) ", run("--help").out.partition("Commands:")[2], re.M)
     assert len(commands) >= 16
     assert [name for name in commands if "--json" not in run(name, "--help").out] == []
 
 
-def test_colors_stay_out_of_a_pipe_and_units_in_the_table(run: Cli, results: Path, monkeypatch: pytest.MonkeyPatch,
+def test_colors_stay_out_of_a_pipe_and_units_in_the_table(run: Run, results: Path, monkeypatch: pytest.MonkeyPatch,
                                                            ) -> None:
     (results / "certificates" / "contraction.json").write_text("{}")
     monkeypatch.setenv("TERM", "xterm-256color")

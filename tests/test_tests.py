@@ -119,11 +119,16 @@ def written_out(test: ast.FunctionDef) -> set[str]:
             and isinstance(value, ast.Tuple | ast.List | ast.Dict | ast.Set) and never_empty(value, set())}
 
 
+def imported(tree: ast.Module) -> set[str]:
+    """Names of modules, and what is imported from them."""
+    return {name for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)
+            for name in (getattr(node, "module", None) or "", *(alias.name for alias in node.names))}
+
+
 def helpers_of(path: Path) -> set[str]:
     """Functions that assert and that the tests of a file can call: its own, of its folders, of modules beside it."""
     tree = TREES[path]
-    modules = {name for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)
-               for name in (getattr(node, "module", None), *(alias.name for alias in node.names))}
+    modules = imported(tree)
     near = [other for other in FILES if other == path or other.stem in modules
             or other.name == "conftest.py" and other.parent in path.parents]
     functions = [node for other in near for node in ast.walk(TREES[other])
@@ -144,6 +149,18 @@ def functions_named_test(tree: ast.Module) -> Iterator[ast.FunctionDef]:
 def may_pass_without_a_check(tree: ast.Module, helpers: set[str]) -> list[str]:
     return [f"line {test.lineno}: {test.name}" for test in functions_named_test(tree)
             if not Reader(helpers, written_out(test)).always(test.body)]
+
+
+def test_no_test_imports_a_test() -> None:
+    """pytest loads its files by path; a second copy under a name of the same spelling in another folder is not it."""
+    assert [f"{path.relative_to(HERE)}: {name}" for path, tree in TREES.items() for name in imported(tree)
+            if name.startswith("test_")] == []
+
+
+def test_modules_that_tests_share_have_names_of_their_own() -> None:
+    shared = [path.stem for path in FILES if path.name != "conftest.py" and not path.name.startswith("test_")]
+    shared += [path.stem for path in (HERE / "benchmarks").glob("*.py")]
+    assert shared and len(shared) == len(set(shared))
 
 
 BAD = {

@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from module_systems import constant
 from scipy.sparse import csr_array, diags_array
 
 import robthermal as rt
@@ -17,11 +18,6 @@ TABLE = {
     ("constant", "max"): (4.10, 13.5, 4.58)}
 FROZEN = {"varying": (2.73, 5.55, 2.73), "constant": (4.94, 17.05, 4.94)}
 DIRECTIONS = ("symmetric", "cooling", "heating")
-
-
-def constant(system):
-    zero = {f"modules.{m}.{p}.slope": 0.0 for m in system.modules for p in ("seebeck", "resistance")}
-    return system.with_parameters(zero)
 
 
 @pytest.fixture(scope="module")

@@ -4,20 +4,12 @@ from itertools import product
 
 import numpy as np
 import pytest
+from module_systems import same
 from scipy.optimize import linprog
 
 import robthermal as rt
 
 BOX = (278.15, 358.15)
-
-
-@pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
-def same(system, low, high):
-    return dict.fromkeys(system.modules, (low, high))
 
 
 def jacobians(system, span):

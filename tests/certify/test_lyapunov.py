@@ -2,25 +2,12 @@
 
 import numpy as np
 import pytest
+from module_systems import constant, same
 
 import robthermal as rt
 from robthermal.conic import Form, largest_margin, strictly
 
 BOX = (278.15, 358.15)
-
-
-@pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
-def constant(system):
-    return system.with_parameters({f"modules.{m}.{p}.slope": 0.0 for m in system.modules
-                                   for p in ("seebeck", "resistance")})
-
-
-def same(system, low, high):
-    return dict.fromkeys(system.modules, (low, high))
 
 
 # errata, "Largest |I| certified", full-P LMI: symmetric 2.72; constant S, R 4.92 / 17.03 / 4.92

@@ -6,11 +6,6 @@ import pytest
 import robthermal as rt
 
 
-@pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
 # errata and research note D(ii): (T_h, T_c) to the correct interval, and the printed one
 @pytest.mark.parametrize(("hot", "cold", "lower", "upper"), [
     (298, 278, -3.80, 3.29), (298, 298, -3.39, 3.39), (298, 318, -3.06, 3.52), (298, 358, -2.58, 3.88)])

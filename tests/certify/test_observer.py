@@ -4,22 +4,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from module_systems import constant
 from scipy.integrate import quad_vec
 from scipy.linalg import expm, solve_discrete_are
 
 import robthermal as rt
 
 BOX = (278.15, 358.15)
-
-
-@pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
-def constant(system):
-    return system.with_parameters({f"modules.{m}.{p}.slope": 0.0 for m in system.modules
-                                   for p in ("seebeck", "resistance")})
 
 
 def sampled(system, Ts):

@@ -13,11 +13,6 @@ BOTH = {"m1": (0.0, 1.2), "m2": (0.0, 1.2)}
 
 
 @pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
-@pytest.fixture(scope="module")
 def at_fold(two):
     """Temperatures at the fold."""
     return rt.thermal.fold(two, HELD)

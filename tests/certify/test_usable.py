@@ -12,11 +12,6 @@ LOW, HIGH = 278.15, 358.15
 
 
 @pytest.fixture(scope="module")
-def two():
-    return rt.systems.two_module()
-
-
-@pytest.fixture(scope="module")
 def cooling(two):
     return rt.certify.usable_current(two, temperature=(LOW, HIGH), lower="reported")
 

@@ -1,5 +1,6 @@
 """The two-module setup, its law, cold side and a controller."""
 
+import module_systems
 import pytest
 
 import robthermal as rt
@@ -28,5 +29,4 @@ def pi(plant):
 @pytest.fixture(scope="session")
 def constant(system):
     """The same setup with constant S and R."""
-    return system.with_parameters({f"modules.{m}.{p}.slope": 0.0 for m in system.modules
-                                   for p in ("seebeck", "resistance")})
+    return module_systems.constant(system)

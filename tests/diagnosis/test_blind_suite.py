@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from blind.cases import Case, all_cases, made
+from blind.hidden import with_effects
+from blind.integrate import Hidden, integrate
+from blind.judge import all_named, answer, has_truth, same, stray, wrong
+from blind.plants import PLANTS, H, excitation, nominal
+from blind.rates import interval, print_matrix, print_rates
+from blind.run import judged, rows_in, run, short_catalog
+from blind.sizes import SIZES, drawn
 
 import robthermal as rt
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from blind.cases import Case, all_cases, made  # noqa: E402 - beside the benchmarks, not on the path before
-from blind.hidden import with_effects  # noqa: E402
-from blind.integrate import Hidden, integrate  # noqa: E402
-from blind.judge import all_named, answer, has_truth, same, stray, wrong  # noqa: E402
-from blind.plants import PLANTS, H, excitation, nominal  # noqa: E402
-from blind.rates import interval, print_matrix, print_rates  # noqa: E402
-from blind.run import judged, rows_in, run, short_catalog  # noqa: E402
-from blind.sizes import SIZES, drawn  # noqa: E402
 
 KINDS = {effect: topology for topology in "BAC" for effect in SIZES[topology]}  # each once, in the quickest plant
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from blind.cases import Case, made
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
@@ -19,9 +18,6 @@ from robthermal.diagnosis.fit import NoiseScaling, with_slow_part
 from robthermal.diagnosis.fit._noise_scaling import refined
 from robthermal.diagnosis.path import LinearizedRecord, SlowNoise, linearized_record, settled_cost, whitener
 from robthermal.diagnosis.search import with_wider_noise
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from blind.cases import Case, made  # noqa: E402 - beside the benchmarks, not on the path before
 
 Array = NDArray[np.float64]
 Hide = Callable[..., tuple[rt.Record, rt.Record]]

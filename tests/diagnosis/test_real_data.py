@@ -2,47 +2,29 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
+from example_files import example
 
 import robthermal as rt
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "diagnosis"
 SHORT = (700.0, 2400.0)  # s, a part of the example's window: the test is to be quick
 LAGS = {("sensor_lag", ("T2",)), ("input_lag", ("Q2",))}
 
 
-def example(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"diagnosis_{name}", EXAMPLES / f"{name}.py")
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-two_heaters, second_mass = example("two_heaters"), example("second_mass")
+two_heaters, second_mass = example("diagnosis", "two_heaters"), example("diagnosis", "second_mass")
 
 
 @pytest.fixture(scope="module")
-def measured(shared: Path) -> Path:
-    folder = shared / "data"
-    if not (folder / "tclab_dowling").is_dir() or not (folder / "tclab_saopaulo").is_dir():
-        pytest.skip("no measured data of the Temperature Control Lab boards in the folder 'shared'")
-    return folder
+def room(tclab: Path) -> float:
+    return float(np.mean([two_heaters.rest_value(run) for run in two_heaters.runs(tclab)]))
 
 
 @pytest.fixture(scope="module")
-def room(measured: Path) -> float:
-    return float(np.mean([two_heaters.rest_value(run) for run in two_heaters.runs(measured)]))
-
-
-@pytest.fixture(scope="module")
-def records(measured: Path) -> tuple[rt.Record, rt.Record]:
-    training, unseen = two_heaters.runs(measured)
+def records(tclab: Path) -> tuple[rt.Record, rt.Record]:
+    training, unseen = two_heaters.runs(tclab)
     return two_heaters.means(training).between(*SHORT), two_heaters.means(unseen).between(0.0, 2000.0)
 
 
@@ -95,15 +77,15 @@ def test_without_the_missing_effects_in_the_catalog_nothing_is_named(
     assert found.gap["validation"].after > 5.0
 
 
-def test_a_step_of_one_heater_cannot_show_a_power_slope(measured: Path, room: float) -> None:
-    step = two_heaters.means(two_heaters.read_run(measured, two_heaters.STEPS.format(100)))
+def test_a_step_of_one_heater_cannot_show_a_power_slope(tclab: Path, room: float) -> None:
+    step = two_heaters.means(two_heaters.read_run(tclab, two_heaters.STEPS.format(100)))
     scores = rt.diagnosis.score(rt.diagnosis.refit(two_heaters.nominal(room), step), ["heater_power_slope"])
     assert ("heater_power_slope", ("Q2",)) in scores.not_testable  # heater 2 is off
     assert ("heater_power_slope", ("Q1",)) in scores.not_testable  # the gain imitates it
 
 
-def test_the_mass_taken_out_of_the_published_model_is_found(measured: Path) -> None:
-    found = second_mass.diagnose(second_mass.read_run(measured), ("sensor_lag", "hidden_mass", "input_lag"))
+def test_the_mass_taken_out_of_the_published_model_is_found(tclab: Path) -> None:
+    found = second_mass.diagnose(second_mass.read_run(tclab), ("sensor_lag", "hidden_mass", "input_lag"))
     assert found.verdict in ("named", "ambiguous") and len(found.effects) == 1
     assert sets(found)[0] <= {("sensor_lag", ("T1",)), ("hidden_mass", ("heater",))}
     value, std, _ = found.effects[0].values["time_constant"]

@@ -3,90 +3,33 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import Run
+from heated_bar import NOISE, PROJECT, ROOM, closed_form, write_project
 
 import robthermal as rt
-from robthermal import cli
 
-CAPACITY, CONDUCTANCE, POWER, ROOM, LAG = 60.0, 0.4, 8.0, 20.0, 12.0  # of the machine the records come from
-SYSTEM = """
-[system]
-name = "bar"
-temperature_unit = "degC"
-[ambients.room]
-temperature = 20.0
-[lumps.bar]
-capacity = 50.0
-initial = 20.0
-[[links]]
-between = ["bar", "room"]
-conductance = 0.5
-[inputs.Q]
-lump = "bar"
-gain = 0.08
-limits = [0.0, 100.0]
-[sensors.T]
-lump = "bar"
-noise = 0.02
-[fit]
-"lumps.bar.capacity" = { lower = 10.0, upper = 200.0 }
-"links.bar-room.conductance" = { lower = 0.1, upper = 2.0 }
-"""
-PROJECT = """
-[project]
-name = "bar"
-system = "bar.toml"
-train = ["train.csv"]
-validation = ["validation.csv"]
-[calibrate]
-initial = "system"
-[certify]
-temperature = [15.0, 45.0]
-ambient = { room = [19.0, 21.0] }
-heat = { bar = [0.0, 8.0] }
-"""
-Command = Callable[..., int]
-
-
-@pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch) -> Command:
-    """Run a command line; its exit status."""
-    def run(*words: object) -> int:
-        monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return int(stop.value.code or 0)
-    return run
+LAG = 12.0  # s, of the sensor
 
 
 def write_bar(folder: Path, lag: float = 0.0, project: str = PROJECT) -> Path:
     """Project of a bar in a room, steps of its heater in closed form; the sensor lags by a time constant [s]."""
-    noise, time = np.random.default_rng(1), np.arange(900.0)
+    noise, time, records = np.random.default_rng(1), np.arange(900.0), {}
     for name, share in (("train", 1.0), ("validation", 0.5)):
-        slow, readings = CAPACITY / CONDUCTANCE, np.full(time.size, ROOM)
-        for start, step in ((0.0, share), (300.0, -share), (500.0, 0.6 * share)):
-            after = np.clip(time - start, 0.0, None)
-            rise = 1 - np.exp(-after / slow) if not lag else 1 - (
-                slow * np.exp(-after / slow) - lag * np.exp(-after / lag)) / (slow - lag)
-            readings = readings + step * POWER / CONDUCTANCE * rise
-        readings += noise.normal(0, 0.02, time.size)
+        steps = ((0.0, share), (300.0, -share), (500.0, 0.6 * share))
+        rise = sum(closed_form(time, step, start, lag) for start, step in steps)
         heater = 100 * share * np.select([time < 300, time < 500], [1.0, 0.0], 0.6)
-        rows = [f"{t:g},{q:g},{T:.4f}" for t, q, T in zip(time, heater, readings, strict=True)]
-        (folder / f"{name}.csv").write_text("\n".join(["time,Q,T", *rows]))
-    (folder / "bar.toml").write_text(SYSTEM)
-    (folder / "project.toml").write_text(project)
-    return folder / "project.toml"
+        records[name] = heater, ROOM + rise + noise.normal(0, NOISE, time.size)
+    return write_project(folder, records, project=project)
 
 
-def test_ranges_of_a_calibration_reach_certify_through_its_file(tmp_path: Path, command: Command) -> None:
+def test_ranges_of_a_calibration_reach_certify_through_its_file(tmp_path: Path, run: Run) -> None:
     write_bar(tmp_path)
     system, out = tmp_path / "calibrated.toml", tmp_path / "out"
-    assert command("calibrate", tmp_path / "bar.toml", tmp_path / "train.csv", "--out", system) == 0
+    assert run("calibrate", tmp_path / "bar.toml", tmp_path / "train.csv", "--out", system).status == 0
     file = tmp_path / "calibrated.json"
     content = json.loads(file.read_text())
     assert content["format"] == "robthermal-calibration/1"
@@ -98,16 +41,16 @@ def test_ranges_of_a_calibration_reach_certify_through_its_file(tmp_path: Path, 
         for name, pair in fit.ranges(confidence).items():
             assert stored.ranges(confidence)[name] == pytest.approx(pair, rel=1e-9)
     options = ("--temperature", 15, 45, "--ambient", "room=19:21", "--out", out)
-    assert command("certify", system, *options, "--parameters", file, "--confidence", 0.99) == 0
+    assert run("certify", system, *options, "--parameters", file, "--confidence", 0.99).status == 0
     done = json.loads((out / "summary.json").read_text())["certify"]
     assert {name: pytest.approx(pair, rel=1e-6) for name, pair in fit.ranges(0.99).items()} == {
         name: tuple(pair) for name, pair in done["parameters"].items()}
     assert done["confidence"] == 0.99 and all(done["robust"].values()) and done["robust"]
     wide = ("--parameters", file, "--parameters", "lumps.bar.capacity=20:150")
-    assert command("certify", system, *options[:-1], tmp_path / "wide", *wide) == 0
+    assert run("certify", system, *options[:-1], tmp_path / "wide", *wide).status == 0
     done = json.loads((tmp_path / "wide" / "summary.json").read_text())["certify"]["parameters"]
     assert done["lumps.bar.capacity"] == [20.0, 150.0] and set(done) == set(fit.ranges())
-    assert command("certify", tmp_path / "bar.toml", *options[:-1], tmp_path / "no", "--parameters", file) == 2
+    assert run("certify", tmp_path / "bar.toml", *options[:-1], tmp_path / "no", "--parameters", file).status == 2
     assert not (tmp_path / "no").exists()
 
 
@@ -139,16 +82,17 @@ def test_files_that_are_no_calibration_are_refused(change: dict[str, object], me
     (("--tolerance", "T9=0.1"), "--tolerance: T9=0.1"),
     (("--tolerance", "T=-1"), "--tolerance: T=-1"),
 ])
-def test_options_of_the_gate_are_checked(options: tuple[object, ...], words: str, tmp_path: Path, command: Command,
-                                         capsys: pytest.CaptureFixture[str]) -> None:
-    assert command("run", write_bar(tmp_path), "--out", tmp_path / "out", *options) == 2
-    assert words in capsys.readouterr().err and not (tmp_path / "out").exists()
+def test_options_of_the_gate_are_checked(options: tuple[object, ...], words: str, tmp_path: Path,
+                                         run: Run) -> None:
+    said = run("run", write_bar(tmp_path), "--out", tmp_path / "out", *options)
+    assert said.status == 2
+    assert words in said.err and not (tmp_path / "out").exists()
 
 
-def test_what_the_diagnosis_finds_decides_the_verdict_of_the_main_job(tmp_path: Path, command: Command) -> None:
+def test_what_the_diagnosis_finds_decides_the_verdict_of_the_main_job(tmp_path: Path, run: Run) -> None:
     """A sensor that lags behind one lump has other explanations, all said; --tolerance makes it a remark."""
     project = write_bar(tmp_path, LAG, PROJECT + "[diagnose]\n")
-    assert command("run", project, "--out", tmp_path / "strict", "--tolerance", "T=0.01") == 1
+    assert run("run", project, "--out", tmp_path / "strict", "--tolerance", "T=0.01").status == 1
     summary = json.loads((tmp_path / "strict" / "summary.json").read_text())
     failed = {one["code"] for one in summary["reasons"] if one["level"] == "fail"}
     assert summary["verdict"] == "FAIL" and "diagnosis_ambiguous" in failed
@@ -156,7 +100,7 @@ def test_what_the_diagnosis_finds_decides_the_verdict_of_the_main_job(tmp_path: 
     said = next(one["text"] for one in summary["reasons"] if one["code"] == "diagnosis_ambiguous")
     assert "sensor_lag(T) or " in said
     assert (tmp_path / "strict" / "calibrated.json").is_file()
-    assert command("run", project, "--out", tmp_path / "loose", "--tolerance", "default=5", "--confidence", 0.9) == 0
+    assert run("run", project, "--out", tmp_path / "loose", "--tolerance", "default=5", "--confidence", 0.9).status == 0
     summary = json.loads((tmp_path / "loose" / "summary.json").read_text())
     assert summary["verdict"] == "PASS WITH REMARKS" and summary["certify"]["confidence"] == 0.9
     assert "diagnosis_ambiguous" in {one["code"] for one in summary["reasons"] if one["level"] == "remark"}

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from heated_bar import NOISE, PROJECT, ROOM, SYSTEM, closed_form, write_project
 from scipy.signal import lfilter
 
 import robthermal as rt
@@ -17,57 +18,14 @@ from robthermal import cli
 from robthermal.jobs.claims._words import inward, outward
 from robthermal.jobs.run._misfit import misfit
 
-CAPACITY, CONDUCTANCE, POWER, ROOM, NOISE = 60.0, 0.4, 8.0, 20.0, 0.02  # of the machine the records come from
-SYSTEM = """
-[system]
-name = "bar"
-temperature_unit = "degC"
-[ambients.room]
-temperature = 20.0
-[lumps.bar]
-capacity = 50.0
-initial = 20.0
-[[links]]
-between = ["bar", "room"]
-conductance = 0.5
-[inputs.Q]
-lump = "bar"
-gain = 0.08
-limits = [0.0, 100.0]
-[sensors.T]
-lump = "bar"
-noise = 0.02
-[fit]
-"lumps.bar.capacity" = { lower = 10.0, upper = 200.0 }
-"links.bar-room.conductance" = { lower = 0.1, upper = 2.0 }
-"""
-PROJECT = """
-[project]
-name = "bar"
-system = "bar.toml"
-train = ["train.csv"]
-validation = ["validation.csv"]
-[calibrate]
-initial = "system"
-[certify]
-temperature = [15.0, 45.0]
-ambient = { room = [19.0, 21.0] }
-heat = { bar = [0.0, 8.0] }
-"""
-
 
 def bar(folder: Path, *, off: float = 0.0, project: str = PROJECT, system: str = SYSTEM) -> rt.jobs.run.JobResult:
     """The main job on a bar in a room, in closed form; the validation record is `off` kelvin too warm [K]."""
-    noise, time = np.random.default_rng(1), np.arange(600.0)
+    noise, time, records = np.random.default_rng(1), np.arange(600.0), {}
     for name, share, shift in (("train", 1.0, 0.0), ("validation", 0.3, off)):
-        rise = share * POWER / CONDUCTANCE * (1 - np.exp(-time * CONDUCTANCE / CAPACITY))
-        readings = ROOM + rise + shift + noise.normal(0, NOISE, time.size)
         heater = np.where(time < 300, 100 * share, 100 * share + 1e-9)
-        rows = [f"{t:g},{q:.12g},{T:.4f}" for t, q, T in zip(time, heater, readings, strict=True)]
-        (folder / f"{name}.csv").write_text("\n".join(["time,Q,T", *rows]))
-    (folder / "bar.toml").write_text(system)
-    (folder / "project.toml").write_text(project)
-    return rt.jobs.run_job(rt.jobs.read_project(folder / "project.toml"))
+        records[name] = heater, ROOM + closed_form(time, share) + shift + noise.normal(0, NOISE, time.size)
+    return rt.jobs.run_job(rt.jobs.read_project(write_project(folder, records, system=system, project=project)))
 
 
 def codes(result: rt.jobs.run.JobResult, level: str) -> set[str]:
@@ -132,8 +90,8 @@ def test_remarks_about_the_data(tmp_path: Path) -> None:
 def _still(folder: Path) -> bool:
     """A record whose heater is on all the time."""
     time, noise = np.arange(600.0), np.random.default_rng(2)
-    rise = POWER / CONDUCTANCE * (1 - np.exp(-time * CONDUCTANCE / CAPACITY))
-    rows = [f"{t:g},100,{T:.4f}" for t, T in zip(time, ROOM + rise + noise.normal(0, NOISE, 600), strict=True)]
+    readings = ROOM + closed_form(time, 1.0) + noise.normal(0, NOISE, 600)
+    rows = [f"{t:g},100,{T:.4f}" for t, T in zip(time, readings, strict=True)]
     return bool((folder / "still.csv").write_text("\n".join(["time,Q,T", *rows])))
 
 

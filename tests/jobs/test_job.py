@@ -2,70 +2,29 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from example_files import example
+from heated_bar import CAPACITY, CONDUCTANCE, NOISE, POWER, PROJECT, ROOM, SYSTEM, closed_form, write_project
 
 import robthermal as rt
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "tclab" / "main_job.py"
-CAPACITY, CONDUCTANCE, POWER, ROOM = 60.0, 0.4, 8.0, 20.0  # of the machine the records come from
-SYSTEM = """
-[system]
-name = "bar"
-temperature_unit = "degC"
-[ambients.room]
-temperature = 20.0
-[lumps.bar]
-capacity = 50.0
-initial = 20.0
-[[links]]
-between = ["bar", "room"]
-conductance = 0.5
-[inputs.Q]
-lump = "bar"
-gain = 0.08
-limits = [0.0, 100.0]
-[sensors.T]
-lump = "bar"
-noise = 0.02
-[fit]
-"lumps.bar.capacity" = { lower = 10.0, upper = 200.0 }
-"links.bar-room.conductance" = { lower = 0.1, upper = 2.0 }
-"""
-PROJECT = """
-[project]
-name = "bar"
-system = "bar.toml"
-train = ["train.csv"]
-validation = ["validation.csv"]
-[calibrate]
-initial = "system"
+BOX = """
 [certify]
 temperature = [0.0, 100.0]
 ambient = { room = [15.0, 25.0] }
 """
 
 
-def closed_form(time: np.ndarray, share: float) -> np.ndarray:
-    """Temperature [°C] of the bar after a step of the heater to a share of its power."""
-    return ROOM + share * POWER / CONDUCTANCE * (1 - np.exp(-time * CONDUCTANCE / CAPACITY))
-
-
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("bar")
     noise, time = np.random.default_rng(1), np.arange(600.0)
-    for name, share in (("train", 1.0), ("validation", 0.3)):
-        readings = closed_form(time, share) + noise.normal(0, 0.02, time.size)
-        rows = [f"{t:g},{100 * share:g},{T:.4f}" for t, T in zip(time, readings, strict=True)]
-        (folder / f"{name}.csv").write_text("\n".join(["time,Q,T", *rows]))
-    (folder / "bar.toml").write_text(SYSTEM)
-    (folder / "project.toml").write_text(PROJECT)
-    return folder / "project.toml"
+    records = {name: (np.full(time.size, 100 * share), ROOM + closed_form(time, share) + noise.normal(0, NOISE, 600))
+               for name, share in (("train", 1.0), ("validation", 0.3))}
+    return write_project(tmp_path_factory.mktemp("bar"), records, project=PROJECT.partition("[certify]")[0] + BOX)
 
 
 @pytest.fixture(scope="module")
@@ -116,9 +75,10 @@ def test_report_of_a_machine_without_modules_does_not_speak_of_them(result: rt.j
     assert "SHA-256 of train.csv" in report.provenance
 
 
-def test_a_heater_without_limits_needs_a_range(project: Path, tmp_path: Path) -> None:
+def test_a_heater_without_limits_needs_a_range(tmp_path: Path) -> None:
     (tmp_path / "bar.toml").write_text(SYSTEM.replace("limits = [0.0, 100.0]", ""))
-    text = PROJECT.replace('train = ["train.csv"]\nvalidation = ["validation.csv"]\n', "")
+    text = PROJECT.partition("[certify]")[0].replace('train = ["train.csv"]\nvalidation = ["validation.csv"]\n', "")
+    text += BOX
     (tmp_path / "project.toml").write_text(text)
     with pytest.raises(rt.InputError, match="Q"):
         rt.jobs.run_job(rt.jobs.read_project(tmp_path / "project.toml"))
@@ -140,20 +100,13 @@ def test_a_module_without_limits_needs_a_range() -> None:
 
 
 @pytest.fixture(scope="module")
-def tclab(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    data = shared / "data"
-    if not (data / "tclab_dowling").is_dir():
-        pytest.skip("no measured data of the Temperature Control Lab board in the folder 'shared'")
-    spec = importlib.util.spec_from_file_location("example_main_job", EXAMPLE)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.write_project(data, tmp_path_factory.mktemp("tclab") / "project.toml")
+def measured(tclab: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return example("tclab", "main_job").write_project(tclab, tmp_path_factory.mktemp("tclab") / "project.toml")
 
 
 @pytest.mark.filterwarnings("ignore:.*:UserWarning")
-def test_main_job_on_measured_data(tclab: Path, tmp_path: Path) -> None:
-    result = rt.jobs.run_job(rt.jobs.read_project(tclab))
+def test_main_job_on_measured_data(measured: Path, tmp_path: Path) -> None:
+    result = rt.jobs.run_job(rt.jobs.read_project(measured))
     assert result.fit is not None
     assert result.fit.rmse["T1"] <= 0.15  # the step, start temperatures free
     train, validation = result.comparisons
@@ -173,8 +126,8 @@ def test_main_job_on_measured_data(tclab: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*:UserWarning")
-def test_no_measured_temperature_leaves_the_certified_box(tclab: Path) -> None:
-    project = rt.jobs.read_project(tclab)
+def test_no_measured_temperature_leaves_the_certified_box(measured: Path) -> None:
+    project = rt.jobs.read_project(measured)
     done = rt.jobs.run_job(project)
     low, high = done.certification.safe.temperature["sensor"]
     for path in (*project.train, *project.validation):

@@ -158,3 +158,20 @@ def trajectories(document, rng, count):
             others[module] = brentq(missing, low, high, xtol=1e-14) if high > low else low
         else:
             yield x, y, currents, others
+
+
+def candidate(document, method, rate, rng):
+    """Evidence that may prove something: weights or a diagonal P from a solve with the worst sampled Jacobian."""
+    holder = held(document)
+    E = np.array([lump["capacity"] for name, lump in document["system"]["lumps"].items() if name not in holder])
+    samples = [reduced(document, *point) for point in points(document, rng, 30)
+               if grip(document, *point) > 0]
+    worst = np.max(samples, axis=0) if samples else -np.diag(E)
+    d, c = (np.linalg.solve(M + 1.1 * rate * np.diag(E), -E) for M in (worst, worst.T))
+    if min(d.min(), c.min()) <= 0:
+        d = c = np.ones(len(E))
+    if method == "energy":
+        return {"method": method, "rate": rate}
+    if method == "lyapunov":
+        return {"method": method, "rate": rate, "matrix": np.diag(np.round(E * c / d, 6)).tolist()}
+    return {"method": method, "rate": rate, "weights": np.round(d if method == "max" else c, 6).tolist()}

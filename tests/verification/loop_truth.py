@@ -10,10 +10,10 @@ import copy
 
 import certificate_truth as truth
 import numpy as np
-import test_loop
+import small_loop
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from test_uncertain import machines
+from uncertain_truth import machines
 
 VARIANTS = {
     "plain": ({}, {"contraction": 0.99574}),
@@ -35,7 +35,7 @@ ROOM = {"room": 298.15}
 def variant(name):
     """Return the sections of one variant."""
     region, evidence = VARIANTS[name]
-    parts = test_loop.document(**copy.deepcopy(region))
+    parts = small_loop.document(**copy.deepcopy(region))
     parts["evidence"] |= copy.deepcopy(evidence)
     return parts
 
@@ -49,13 +49,13 @@ def plants(parts, rng, count):
 def limited_current(parts, system, x, v):
     """Return the current that brings v into the cold face within its limits, and which limit acts (-1, 0, 1)."""
     low, high = parts["region"]["current"]["m"]
-    if test_loop.achieved(system, x, low) <= v:
+    if small_loop.achieved(system, x, low) <= v:
         return low, -1
-    if test_loop.achieved(system, x, high) >= v:
+    if small_loop.achieved(system, x, high) >= v:
         return high, 1
     for _ in range(70):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if test_loop.achieved(system, x, middle) > v else (low, middle)
+        low, high = (middle, high) if small_loop.achieved(system, x, middle) > v else (low, middle)
     return 0.5 * (low + high), 0
 
 
@@ -84,7 +84,7 @@ def one_sample(parts, system, state):
     T, _ = truth.boxes(system, region)
     kept = bool((path >= T[:, 0]).all() and (path <= T[:, 1]).all())
     kept &= bool(np.abs(path - x).max() <= region.get("drift", np.inf))
-    gap = np.array([test_loop.achieved(system, x, current) - v])
+    gap = np.array([small_loop.achieved(system, x, current) - v])
     return np.concatenate([path[-1], control["A"] @ z + control["B"] @ error + control["windup"] @ gap]), limit, kept
 
 

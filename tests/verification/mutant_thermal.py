@@ -8,11 +8,11 @@ import certificate_truth as truth
 import held_truth
 import loop_truth
 import numpy as np
+from held_truth import candidate
 from mutants import Document, Subject, holds
+from observer_truth import error_matrix, machine
 from scipy.linalg import solve_discrete_lyapunov
-from test_observer import error_matrix, machine
-from test_regulated import candidate
-from test_uncertain import machines, names_of, spans
+from uncertain_truth import machines, names_of, spans
 
 from robthermal.verification import establish
 

@@ -7,9 +7,9 @@ import json
 
 import numpy as np
 import pytest
-import test_loop
+import small_loop
 from flint import arb, ctx
-from test_observer import rod as observed_rod
+from observer_truth import rod as observed_rod
 
 from robthermal.errors import InputError
 from robthermal.verification import Certificate, establish, verify
@@ -95,7 +95,7 @@ def test_proofs_do_not_depend_on_the_precision_of_the_caller():
     kinds = {"gain": (nonlinear, region, evidence),
              "invariance": (nonlinear, {**region, "temperature": [250.0, 330.0]}, {}),
              "contraction": (nonlinear, BOX, {"method": "energy", "rate": 0.4}),
-             "loop": tuple(test_loop.document().values())}
+             "loop": tuple(small_loop.document().values())}
     before = ctx.prec
     for kind, (system, box, given) in kinds.items():
         found = []

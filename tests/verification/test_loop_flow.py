@@ -9,7 +9,7 @@ import certificate_truth as truth
 import loop_truth
 import numpy as np
 import pytest
-import test_loop
+import small_loop
 from flint import fmpq
 
 import robthermal as rt
@@ -21,11 +21,11 @@ from robthermal.verification._system import read_system
 
 @pytest.fixture(scope="module")
 def found():
-    """The pair of `test_loop`, as the search finds it; whatever its origin, the checker proves it from these digits."""
-    pair = test_loop.PAIR
+    """The pair of `small_loop`, as the search finds it; the checker proves it from the digits alone."""
+    pair = small_loop.PAIR
     system = rt.System(ambients={"room": {"temperature": 298.15}}, lumps=pair["lumps"], links=pair["links"],
                        modules=pair["modules"])
-    cert = rt.certify.loop(system, current=test_loop.BOX["current"], temperature=tuple(test_loop.BOX["temperature"]),
+    cert = rt.certify.loop(system, current=small_loop.BOX["current"], temperature=tuple(small_loop.BOX["temperature"]),
                            sample_time=1.0, controller=pair["controller"])
     assert cert.holds and verify(cert).valid
     return {"system": cert.system, "region": cert.region, "evidence": cert.evidence}
@@ -45,7 +45,7 @@ def holds(parts):
 
 
 def test_pairs_shrink_as_claimed(found):
-    assert loop_truth.violation({**found, "system": {**found["system"], "links": test_loop.PAIR["links"]}},
+    assert loop_truth.violation({**found, "system": {**found["system"], "links": small_loop.PAIR["links"]}},
                                 np.random.default_rng(3), count=8) <= 1e-6
 
 
@@ -97,10 +97,10 @@ def test_malformed_files_are_refused(found, path, value, message):
 
 def test_control_points_enclose_the_slopes():
     """J and ∂(heats)/∂I of random points lie in the hull of the control points, in random directions."""
-    system = read_system(test_loop.PAIR)
+    system = read_system(small_loop.PAIR)
     box = (fmpq(285), fmpq(310)), (fmpq(270), fmpq(300)), (fmpq(-1), fmpq(2))
     points = np.array([[float(value) for value in point] for point in control_points(system.modules[0], box)])
-    alone, rng = {**test_loop.PAIR, "links": []}, np.random.default_rng(8)
+    alone, rng = {**small_loop.PAIR, "links": []}, np.random.default_rng(8)
     reached = 0.0
     for _ in range(60):
         x = np.array([rng.choice([285.0, 297.0, 310.0]), rng.choice([270.0, 280.0, 300.0])])

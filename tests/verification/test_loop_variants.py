@@ -5,13 +5,9 @@ from __future__ import annotations
 import loop_truth
 import numpy as np
 import pytest
+from small_loop import made
 
 from robthermal.errors import InputError
-from robthermal.verification import establish
-
-
-def made(parts, margin=None):
-    return establish("loop", **parts, made_by={}, margin={} if margin is None else margin)
 
 
 @pytest.mark.parametrize("name", loop_truth.VARIANTS)

@@ -8,7 +8,8 @@ import certificate_truth as truth
 import held_truth
 import numpy as np
 import pytest
-from test_uncertain import machines, spans
+from held_truth import candidate
+from uncertain_truth import machines, spans
 
 from robthermal.errors import InputError
 from robthermal.verification import Certificate, establish, verify
@@ -96,23 +97,6 @@ def test_the_reduced_equations_have_the_jacobian_of_the_proof():
                                                                "setpoint": {module: 0}}}, y, now)
                 sides.append(held_truth.flow(document, y, now)[free])
             assert (sides[0] - sides[1]) / 2e-4 == pytest.approx(J[:, column], rel=1e-5, abs=1e-6)
-
-
-def candidate(document, method, rate, rng):
-    """Evidence that may prove something: weights or a diagonal P from a solve with the worst sampled Jacobian."""
-    holder = held_truth.held(document)
-    E = np.array([lump["capacity"] for name, lump in document["system"]["lumps"].items() if name not in holder])
-    samples = [held_truth.reduced(document, *point) for point in held_truth.points(document, rng, 30)
-               if held_truth.grip(document, *point) > 0]
-    worst = np.max(samples, axis=0) if samples else -np.diag(E)
-    d, c = (np.linalg.solve(M + 1.1 * rate * np.diag(E), -E) for M in (worst, worst.T))
-    if min(d.min(), c.min()) <= 0:
-        d = c = np.ones(len(E))
-    if method == "energy":
-        return {"method": method, "rate": rate}
-    if method == "lyapunov":
-        return {"method": method, "rate": rate, "matrix": np.diag(np.round(E * c / d, 6)).tolist()}
-    return {"method": method, "rate": rate, "weights": np.round(d if method == "max" else c, 6).tolist()}
 
 
 def test_random_and_mutated_certificates_are_never_wrongly_accepted():
