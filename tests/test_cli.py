@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -18,7 +19,7 @@ from commands import Run, Said
 from rich.console import Console
 
 import robthermal as rt
-from robthermal.cli.terminal import progress, progress_bar
+from robthermal.cli.terminal import duration, progress, progress_bar
 
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
@@ -143,8 +144,10 @@ def test_demo_writes_a_complete_folder_and_says_yes(demo: tuple[subprocess.Compl
 
 def test_demo_is_quiet_in_a_pipe(demo: tuple[subprocess.CompletedProcess[str], Path]) -> None:
     done, _ = demo
-    assert done.stderr == ""
-    assert "\x1b" not in done.stdout and "\r" not in done.stdout
+    plain = re.compile(r"robthermal: .+ so far")  # a line every ten seconds, on a machine that needs so long
+    assert [line for line in done.stderr.splitlines() if not plain.fullmatch(line)] == []
+    for text in (done.stdout, done.stderr):
+        assert "\x1b" not in text and "\r" not in text
 
 
 def test_no_spinner_in_a_pipe_that_may_have_colors(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -155,6 +158,56 @@ def test_no_spinner_in_a_pipe_that_may_have_colors(monkeypatch: pytest.MonkeyPat
         stage("simulating")
         bar(1, 2)
     assert capsys.readouterr().err == ""
+
+
+def test_plain_lines_of_long_work_in_a_pipe(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr("robthermal.cli._progress.EVERY", 0.02)
+    clock = iter([0.0])
+    monkeypatch.setattr("robthermal.cli._progress.time.monotonic", lambda: next(clock, 80.0))
+    said = ["", ""]
+
+    def line_with(words: str) -> str:
+        for _ in range(1000):
+            found = capfd.readouterr()
+            said[:] = [said[0] + found.out, said[1] + found.err]
+            line = next((line for line in said[1].splitlines() if words in line), "")
+            if line:
+                return line
+            time.sleep(0.01)
+        return ""
+
+    with progress() as told:
+        told("calibrating")
+        assert line_with("calibrating") == "robthermal: calibrating, 1 min 20 s so far"
+        told("certifying", 2, 6)
+        told("verifying every certificate")  # a sentence of the third stage: two of six are done
+        assert line_with("verifying") == ("robthermal: verifying every certificate: 2 of 6 (33 %), 1 min 20 s so far, "
+                                          "about 2 min 40 s left")
+    assert said[0] == ""
+
+
+def test_durations_in_words() -> None:
+    assert [duration(s) for s in (0.4, 59.4, 59.6, 3599.6, 7260.0)] == ["0 s", "59 s", "1 min 0 s", "1 h 0 min",
+                                                                      "2 h 1 min"]
+
+
+def test_a_terminal_gets_percentage_and_remaining_time() -> None:
+    script = ("import time; from robthermal.cli.terminal import progress_bar\n"
+              "with progress_bar('points') as told:\n"
+              "    for k in range(6): told(k, 8); time.sleep(0.25)\n")
+    pty = pytest.importorskip("pty", reason="terminals of Unix")
+    master, slave = pty.openpty()
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.DEVNULL, stderr=slave,
+                          env={**os.environ, "TERM": "xterm", "COLUMNS": "100"}) as process:
+        os.close(slave)
+        said = b""
+        with contextlib.suppress(OSError):  # the terminal is gone
+            while block := os.read(master, 4096):
+                said += block
+        os.close(master)
+    assert process.returncode == 0
+    text = said.decode()
+    assert "points" in text and "62%" in text and re.search(r"0:00:0[0-2]", text)
 
 
 def test_demo_finds_the_parameters_the_records_were_made_with(

@@ -105,7 +105,9 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
     found = rt.read_system(system) if system else None
     tables = reading(record, column)
     measured = files[1:] if system else files
-    reports = rt.jobs.measured.import_reports(measured, found, tables=tables)
+    with progress() as stage:
+        stage("reading measured files")
+        reports = rt.jobs.measured.import_reports(measured, found, tables=tables)
     summary: dict[str, Any] = {"records": [{"file": str(file), "import": report.to_dict()}
                            for file, report in zip(measured, reports, strict=True)]}
     if found is not None:
@@ -127,8 +129,9 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
     Example: robthermal simulate setup.toml inputs.csv --out simulated.csv
     """
     found = rt.read_system(system)
-    parts = rt.jobs.measured.read_files([record], found, tables=reading(read, column))
     with progress() as stage:
+        stage("reading the record")
+        parts = rt.jobs.measured.read_files([record], found, tables=reading(read, column))
         stage("simulating")
         results = [rt.thermal.simulate(found, part) for part in parts]
     temperatures = [*results[0].output_names, *(n for n in results[0].input_names if n in found.ambients)]
@@ -182,11 +185,12 @@ def diagnose(system: SystemFile,
     """
     found = rt.read_system(system)
     tables = reading(record, column)
-    train, held_out = (rt.jobs.measured.read_measured(paths, found, tables=tables)
-                       for paths in (records, validation or []))
     point = rt.jobs.request.point_from_text(found, operating_point or [])
     rt.jobs.folder.check_free(out)
     with progress() as stage:
+        stage("reading measured files")
+        train, held_out = (rt.jobs.measured.read_measured(paths, found, tables=tables)
+                           for paths in (records, validation or []))
         result = rt.jobs.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage,
                                           operating_point=point, session_gain=session_gain)
         stage("writing the report")

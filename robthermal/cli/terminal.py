@@ -1,23 +1,24 @@
-"""What the command line says, and where: tables, JSON, progress; options that several commands share."""
+"""What the command line says, and where: tables and JSON; options that several commands share."""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 import robthermal as rt
 
 from ..errors import Outcome
+from ._progress import Told as Told
+from ._progress import duration as duration
+from ._progress import progress as progress
+from ._progress import progress_bar as progress_bar
 
 _PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
@@ -103,25 +104,3 @@ def exit_unless(good: bool) -> None:
     """Exit status 1 where the honest answer is no."""
     if not good:
         raise typer.Exit(1)
-
-
-@contextmanager
-def progress() -> Iterator[Callable[[str], None]]:
-    """A spinner with the stage on a terminal; nothing in a pipe."""
-    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
-        yield lambda stage: None
-        return
-    with Console(stderr=True).status("starting") as status:
-        yield lambda stage: status.update(stage)
-
-
-@contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar of what is done on a terminal; nothing in a pipe."""
-    if not sys.stderr.isatty():  # FORCE_COLOR makes rich take a pipe for a terminal
-        yield lambda done, total: None
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
