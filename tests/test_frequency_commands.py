@@ -65,3 +65,40 @@ def test_bad_requests_are_one_message_and_status_two(setup, arguments, words):
     done = robthermal("frf", *arguments, cwd=folder)
     assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
     assert not (folder / "frf.json").exists()
+
+
+def test_inputs_that_never_change_are_left_out_and_stay_in_the_operating_point(setup):
+    """Two inputs, two outputs, a column of another name, a room that never changes: every ordinary record."""
+    _, folder = setup
+    system = rt.System(
+        name="two", ambients={"room": {"temperature": 295.0}},
+        lumps={"a": {"capacity": 40.0}, "b": {"capacity": 60.0}},
+        links=[{"between": ("a", "room"), "conductance": 2.0}, {"between": ("b", "room"), "conductance": 1.0}],
+        sensors={"Ta": {"lump": "a"}, "Tb": {"lump": "b"}}, inputs={"qa": {"lump": "a"}, "qb": {"lump": "b"}})
+    rt.thermal.write_system(system, folder / "two.toml")
+    rng = np.random.default_rng(0)
+    q, rows = 5.0 + rng.normal(size=600), ["time [s];heater 1 [W];qb [W];room [K];NTC 1 [K];Tb [K]"]
+    T = 295.0 + np.convolve(q, 0.5 * (1 - np.exp(-0.05)) * np.exp(-0.05 * np.arange(600)))[:600]
+    T += 0.01 * rng.normal(size=600)
+    rows += [f"{k};{q[k]:.6f};1.5;294.0;{T[k]:.6f};{296.5 + 0.01 * rng.normal():.6f}" for k in range(600)]
+    (folder / "two.csv").write_text("\n".join(rows), encoding="utf-8")
+    for out in ("G.json", "G.npz", "G.mat"):
+        done = robthermal("frf", "two.csv", "--system", "two.toml", "--column", "qa=heater 1", "--column", "Ta=NTC 1",
+                          "--input", "qa", "--input", "qb", "--output", "Ta", "--output", "Tb", "--out", out, "--json",
+                          cwd=folder)
+        assert done.returncode == 0, done.stderr
+        G = rt.identify.read_response(folder / out)
+        assert (G.input_names, G.output_names) == (("qa",), ("Ta", "Tb")) and G.has_covariance
+        assert G.operating_point == {"qa": pytest.approx(q.mean(), abs=1e-6), "qb": 1.5, "room": 294.0}
+        assert [one.code for one in G.remarks] == ["constant_input"]
+        assert "qb" in json.loads(done.stdout)["notes"][-1] and "qb" in G.notes[-1]
+        np.testing.assert_allclose(G.covariance[0, 0], rt.identify.read_response(folder / "G.json").covariance[0, 0])
+
+
+def test_no_input_that_changes_is_refused_with_its_name(setup):
+    system, folder = setup
+    rest = rt.Record(sample_time=1.0, inputs=np.full(300, 2.0), outputs=np.full(300, 299.0), input_names=["q"],
+                     output_names=["T"])
+    rest.save(folder / "rest.csv")
+    done = robthermal("frf", "rest.csv", "--system", "bar.toml", cwd=folder)
+    assert done.returncode == 2 and "no input changes: q" in done.stderr

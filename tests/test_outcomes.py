@@ -27,7 +27,7 @@ CODES = {
     "diagnosis": """+adequate -ambiguous +consistent +converged +declared -doubtful +estimated +found -inadequate
         -inexact +named -none -not_converged -not_predicted +nothing +predicted +selected -unexplained""",
     "fleet": "+done -failed",
-    "identify": "+estimated -frf_without_covariance -suspect -undetermined",
+    "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
     "jobs": "-circles_left_out -frf_without_covariance",
     "signals": "+designed -not_lower +resolved -undetermined -unresolved",
     "thermal": "+agrees +closed -disagrees +found -none -not_reducible +reduced +rounded +unchecked",

@@ -54,7 +54,7 @@ SURFACE = {
         Diverged InputError Outcome OutcomeCode RobthermalError
     """,
     "identify": """
-        FrequencyResponse IdentifyCode bla closed_loop etfe is_response lpm lrm lrmp read_response spectral
+        FrequencyResponse IdentifyCode bla closed_loop etfe is_response lpm lrm lrmp mean_inputs read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system couple_subsystems demo_project design_system diagnose_records

@@ -8,9 +8,10 @@ from ._lrm import lrm as lrm
 from ._lrmp import lrmp as lrmp
 from ._outcomes import IdentifyCode as IdentifyCode
 from ._read_response import read_response as read_response
+from ._records import mean_inputs as mean_inputs
 from ._response import FrequencyResponse as FrequencyResponse
 from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
 __all__ = ["FrequencyResponse", "IdentifyCode", "bla", "closed_loop", "etfe", "is_response", "lpm", "lrm", "lrmp",
-           "read_response", "spectral"]
+           "mean_inputs", "read_response", "spectral"]

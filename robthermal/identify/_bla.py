@@ -13,7 +13,7 @@ from robthermal.signals import Record
 
 from .._checks import whole_number
 from ._etfe import check_equal_lengths, least_squares_over
-from ._records import as_records, check_excitation, rounding_of, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -104,6 +104,7 @@ def bla(records: Record | Sequence[Record], period: int, degree: int = 2, half_w
         ),
         input_names=first.input_names,
         output_names=first.output_names,
+        operating_point=mean_inputs(records),
         sample_time=first.sample_time,
         n_samples=n,
         method=f"bla, {len(records)} realizations, {n_periods} periods of {period} samples",

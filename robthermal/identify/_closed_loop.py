@@ -18,7 +18,7 @@ from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, rounding_of, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -112,6 +112,7 @@ def closed_loop(
         ratio_uncertainty=quotient.ratio_uncertainty,
         input_names=records[0].input_names,
         output_names=records[0].output_names,
+        operating_point=mean_inputs(records),
         sample_time=records[0].sample_time,
         n_samples=basis.n_samples,
         method=f"closed_loop, inverse {inverse}, degree {degree}, half_width {half_width}",

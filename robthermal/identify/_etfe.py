@@ -10,7 +10,7 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 from robthermal.signals import Record
 
-from ._records import as_records, check_excitation, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, spectrum_of
 from ._response import FrequencyResponse
 
 
@@ -77,6 +77,7 @@ def etfe(record: Record | Sequence[Record]) -> FrequencyResponse:
         degrees_of_freedom=np.full(bins.size, len(records) - n_u),
         input_names=first.input_names,
         output_names=first.output_names,
+        operating_point=mean_inputs(records),
         sample_time=first.sample_time,
         n_samples=len(first),
         method=f"etfe, {len(records)} record(s)",

@@ -13,7 +13,7 @@ from robthermal.signals import Record
 from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalArrays, LocalEstimate
-from ._records import as_records, check_excitation, rounding_of, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -86,6 +86,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
         suspect=suspect_bins(found.variance, found.degrees_of_freedom, basis.half_width, rounding),
         input_names=first.input_names,
         output_names=first.output_names,
+        operating_point=mean_inputs(records),
         sample_time=first.sample_time,
         n_samples=basis.n_samples,
         method=method,

@@ -11,6 +11,8 @@ from robthermal.errors import OutcomeCode
 class IdentifyCode(OutcomeCode):
     """Codes of the outcomes of `robthermal.identify`."""
 
+    CONSTANT_INPUT = (None, "An input that never changes was left out of the identification.",
+                      "Excite it where its response is wanted; its value is in operating_point.")
     ESTIMATED = (True, "All bins are estimated.")
     FRF_WITHOUT_COVARIANCE = (False, "The file or table brings no covariance.",
                               "Give a file that robthermal frf writes where the noise counts: calibrate and diagnose "

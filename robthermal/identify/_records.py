@@ -71,6 +71,30 @@ def _check_alike(first: Record, record: Record, place: int) -> None:
             )
 
 
+def mean_inputs(records: Sequence[Record]) -> dict[str, float]:
+    """Mean of every input over all samples of all records: the operating point of an experiment.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Records of one experiment with the same inputs, at least one.
+
+    Returns
+    -------
+    dict
+        Input name: mean in the unit of the record, ambients [K].
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> r = rt.Record(sample_time=1.0, inputs=[1.0, 3.0], outputs=[300.0, 300.0], input_names=["q"], output_names=["T"])
+    >>> rt.identify.mean_inputs([r])
+    {'q': 2.0}
+    """
+    n = sum(len(record) for record in records)
+    return {name: float(sum(record[name].sum() for record in records)) / n for name in records[0].input_names}
+
+
 def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: str = "inputs") -> None:
     """Refuse signals (each (n, n_u), one per experiment) that are constant, or combinations of each other."""
     for i, name in enumerate(names):

@@ -20,6 +20,37 @@ def quantile(p: float, q: Array) -> Array:
     return quantiles[place]
 
 
+def radius_of(variance: Array, degrees_of_freedom: Array, ratio_uncertainty: Array | None, p: float) -> Array:
+    """Radii of the circles that hold each entry of G with probability `p`, as `FrequencyResponse.confidence_radius`."""
+    factor = quantile(p, degrees_of_freedom)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        radius = factor * variance
+        np.sqrt(radius, out=radius)
+        if ratio_uncertainty is not None:
+            left = 1.0 - np.sqrt(factor) * ratio_uncertainty
+            radius = np.where(left > 0.0, radius / left, np.inf)
+    radius[np.isnan(radius)] = np.inf
+    return radius
+
+
+def independent_blocks(covariance: Array, index: Array) -> Array:
+    """Joint covariance of bins that share no data: blocks on the diagonal."""
+    block, n_b = len(covariance), index.size
+    joint = np.zeros((n_b, block, n_b, block), dtype=complex)
+    for place, b in enumerate(index):
+        joint[place, :, place] = covariance[..., b]
+    return joint.reshape(n_b * block, n_b * block)
+
+
+def correlated_blocks(weights: Array, rows: Array, noise: Array) -> Array:
+    """Joint covariance of bins whose weights (n_u, m, B) act on common rows, with the noise (n_y, n_y, B) of each."""
+    shared = shared_data(weights, rows)
+    mean = 0.5 * (noise[..., :, None] + noise[..., None, :])  # the noise level may differ a little between the two
+    joint = np.einsum("aibj,opab->aiobjp", shared, mean)
+    size = len(noise) * shared.shape[0] * shared.shape[1]
+    return joint.reshape(size, size)
+
+
 def shared_data(weights: Array, rows: Array) -> Array:
     """Inner products of the weights of bins a and b over the rows they share, (B, n_u, B, n_u)."""
     n_u, _, n_b = weights.shape

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -17,7 +17,8 @@ from robthermal.errors import InputError, Outcome
 
 from . import _response_files, _response_plots, _response_text
 from ._deferred import Deferred, fixed, narrow, part_of
-from ._regions import quantile, shared_data
+from ._regions import correlated_blocks, independent_blocks, radius_of
+from ._response_shapes import PER_BIN, check_shapes
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -68,6 +69,9 @@ class FrequencyResponse:
         For :meth:`joint_covariance`: weights and rows of given bins.
     notes : sequence of str, optional
         What the estimator has to say about this result.
+    operating_point : mapping, optional
+        Means of the inputs of the records: heaters, module currents [A] and ambients [K], also of inputs that never
+        changed and are therefore not among `input_names`. Empty where they are not known.
 
     Examples
     --------
@@ -98,9 +102,10 @@ class FrequencyResponse:
     half_width: int
     method: str
     notes: tuple[str, ...]
+    operating_point: dict[str, float]
     _covariance: Any
-    _noise: Any
-    _variance: Any
+    _noise_covariance: Any
+    _noise_variance: Any
     _transient: Any
     _coherence: Any
     _joint: Any
@@ -128,9 +133,10 @@ class FrequencyResponse:
         half_width: int = 0,
         joint: Callable[[Array], tuple[Array, Array]] | None = None,
         notes: Sequence[str] = (),
+        operating_point: Mapping[str, float] | None = None,
     ):
         count = np.size(frequencies)
-        fields = {
+        values = {
             "frequencies": fixed(frequencies, float),
             "response": fixed(response, complex),
             "degrees_of_freedom": fixed(degrees_of_freedom, np.asarray(degrees_of_freedom).dtype),
@@ -145,36 +151,17 @@ class FrequencyResponse:
             "half_width": int(half_width),
             "method": method,
             "notes": tuple(notes),
+            "operating_point": {str(name): float(mean) for name, mean in (operating_point or {}).items()},
             "_covariance": covariance,
-            "_noise": noise_covariance,
-            "_variance": noise_variance,
+            "_noise_covariance": noise_covariance,
+            "_noise_variance": noise_variance,
             "_transient": transient,
             "_coherence": coherence,
             "_joint": joint,
         }
-        for name, value in fields.items():
+        for name, value in values.items():
             object.__setattr__(self, name, value)  # frozen: this is the one place that writes
-        self._check_shapes()
-
-    def _check_shapes(self) -> None:
-        n_y, n_u, n_f = len(self.output_names), len(self.input_names), self.n_frequencies
-        if self._covariance is None and self.gram is None:
-            raise InputError("neither covariance nor gram is given", where="covariance")
-        wanted: list[tuple[str, Any, tuple[int, ...]]] = [
-            ("response", self.response, (n_y, n_u, n_f)),
-            ("degrees_of_freedom", self.degrees_of_freedom, (n_f,)),
-            ("suspect", self.suspect, (n_f,)),
-            ("gram", self.gram, (n_u, n_u, n_f)),
-            ("covariance", self._covariance, (n_y * n_u, n_y * n_u, n_f)),
-            ("noise_covariance", self._noise, (n_y, n_y, n_f)),
-            ("nonlinear_covariance", self.nonlinear_covariance, (n_y, n_y, n_f)),
-            ("ratio_uncertainty", self.ratio_uncertainty, (n_y, n_u, n_f)),
-            ("transient", self._transient, (n_y, n_f)),
-            ("coherence", self._coherence, (n_y, n_f)),
-        ]
-        for name, value, shape in wanted:
-            if value is not None and not callable(value) and np.shape(value) != shape:
-                raise InputError(f"{name} has shape {np.shape(value)}", where=name, expected=f"shape {shape}")
+        check_shapes(self._arguments())
 
     @property
     def n_frequencies(self) -> int:
@@ -192,13 +179,13 @@ class FrequencyResponse:
     @cached_property
     def noise_covariance(self) -> Array:
         """E[V_o V_p*], shape (n_y, n_y, n_f) [output unit squared]."""
-        return fixed(part_of(self._noise, slice(None)), complex)
+        return fixed(part_of(self._noise_covariance, slice(None)), complex)
 
     @cached_property
     def noise_variance(self) -> Array:
         """Diagonal of the noise covariance, shape (n_y, n_f) [output unit squared]."""
-        if self._variance is not None:
-            return fixed(self._variance, float)
+        if self._noise_variance is not None:
+            return fixed(self._noise_variance, float)
         return fixed(np.einsum("oof->of", self.noise_covariance).real, float)
 
     @cached_property
@@ -252,15 +239,7 @@ class FrequencyResponse:
         numpy.ndarray, shape (n_y, n_u, n_f)
             Radii in the complex plane [unit of G].
         """
-        factor = quantile(p, self.degrees_of_freedom)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            radius = factor * self.variance
-            np.sqrt(radius, out=radius)
-            if self.ratio_uncertainty is not None:
-                left = 1.0 - np.sqrt(factor) * self.ratio_uncertainty
-                radius = np.where(left > 0.0, radius / left, np.inf)
-        radius[np.isnan(radius)] = np.inf
-        return radius
+        return radius_of(self.variance, self.degrees_of_freedom, self.ratio_uncertainty, p)
 
     def joint_covariance(self, bins: ArrayLike) -> Array:
         """Covariance of G at several bins together: neighboring estimates share data and are correlated.
@@ -277,19 +256,11 @@ class FrequencyResponse:
             at the ends, where windows are shifted.
         """
         index = np.atleast_1d(np.asarray(bins, dtype=int))
-        n_y, n_u, n_b = len(self.output_names), len(self.input_names), index.size
-        block = n_y * n_u
         if self._joint is None:
-            joint = np.zeros((n_b, block, n_b, block), dtype=complex)
-            for place, b in enumerate(index):
-                joint[place, :, place] = self.covariance[..., b]
-            return joint.reshape(n_b * block, n_b * block)
+            return independent_blocks(self.covariance, index)
+        noise = np.stack([part_of(self._noise_covariance, slice(b, b + 1))[..., 0] for b in index], axis=-1)
         weights, rows = self._joint(index)
-        shared = shared_data(weights, rows)
-        noise = np.stack([part_of(self._noise, slice(b, b + 1))[..., 0] for b in index], axis=-1)
-        mean = 0.5 * (noise[..., :, None] + noise[..., None, :])  # the noise level may differ a little between the two
-        joint = np.einsum("aibj,opab->aiobjp", shared, mean)
-        return joint.reshape(n_b * block, n_b * block)
+        return correlated_blocks(weights, rows, noise)
 
     def between(self, low: float, high: float) -> FrequencyResponse:
         """The part from `low` to `high` [Hz], both included.
@@ -311,35 +282,54 @@ class FrequencyResponse:
                 where="low, high",
                 expected=f"limits within {self.frequencies[0]:g} ... {self.frequencies[-1]:g} Hz",
             )
-        part, first = slice(int(inside[0]), int(inside[-1]) + 1), int(inside[0])
-        joint = self._joint
-        return FrequencyResponse(
-            frequencies=self.frequencies[part],
-            response=self.response[..., part],
-            noise_covariance=narrow(self._noise, part),
-            degrees_of_freedom=self.degrees_of_freedom[part],
-            covariance=narrow(self._covariance, part),
-            gram=narrow(self.gram, part),
-            noise_variance=narrow(self._variance, part),
-            transient=narrow(self._transient, part),
-            coherence=narrow(self._coherence, part),
-            suspect=self.suspect[part],
-            nonlinear_covariance=narrow(self.nonlinear_covariance, part),
-            ratio_uncertainty=narrow(self.ratio_uncertainty, part),
-            input_names=self.input_names,
-            output_names=self.output_names,
-            sample_time=self.sample_time,
-            n_samples=self.n_samples,
-            method=self.method,
-            half_width=self.half_width,
-            joint=None if joint is None else lambda index: joint(np.asarray(index) + first),
-            notes=self.notes,
-        )
+        return self._part(slice(int(inside[0]), int(inside[-1]) + 1))
+
+    def _part(self, part: slice) -> FrequencyResponse:
+        arguments = self._arguments()
+        joint, per_bin = arguments.pop("joint"), [name for name in arguments if name in PER_BIN]
+        return FrequencyResponse(**{
+            **arguments,
+            **{name: narrow(arguments[name], part) for name in per_bin},
+            "joint": None if joint is None else lambda index: joint(np.asarray(index) + part.start),
+        })
+
+    def _arguments(self) -> dict[str, Any]:
+        """What the constructor was given."""
+        return {field.name.removeprefix("_"): getattr(self, field.name) for field in fields(self)}
+
+    def replace(self, **changes: Any) -> FrequencyResponse:
+        """The same estimate with other notes, names, operating point or any other argument of the constructor.
+
+        Parameters
+        ----------
+        **changes
+            New values by the name of the argument.
+
+        Returns
+        -------
+        FrequencyResponse
+
+        Examples
+        --------
+        >>> import robthermal as rt
+        >>> G = rt.identify.FrequencyResponse(
+        ...     frequencies=[0.1], response=[[[2.0]]], noise_covariance=[[[1e-4]]], gram=[[[1.0]]],
+        ...     degrees_of_freedom=[8], input_names=["q"], output_names=["T"], sample_time=1.0, n_samples=100,
+        ...     method="by hand")
+        >>> G.replace(operating_point={"q": 5.0}).operating_point
+        {'q': 5.0}
+        """
+        return FrequencyResponse(**{**self._arguments(), **changes})
 
     @property
     def outcome(self) -> Outcome:
         """Whether the estimate may be used as it stands; the text says what to distrust and what to do."""
         return _response_text.outcome(self)
+
+    @property
+    def remarks(self) -> tuple[Outcome, ...]:
+        """What has to stand beside any claim that rests on it: ``constant_input``, ``frf_without_covariance``."""
+        return _response_text.remarks(self)
 
     def to_control(self) -> control.FrequencyResponseData:
         """As a python-control object, at angular frequencies [rad/s], bins that are not determined left out.

@@ -24,6 +24,7 @@ from robthermal._write import whole_file
 from robthermal.errors import InputError
 
 from ._response_csv import is_table, read_table
+from ._response_shapes import shapes_of
 
 if TYPE_CHECKING:
     from ._response import FrequencyResponse
@@ -41,8 +42,10 @@ _ARRAYS = (
     "suspect",
     "nonlinear_covariance",
     "ratio_uncertainty",
+    "operating_point_values",
 )
-_LISTS = ("input_names", "output_names", "notes")
+_LISTS = ("input_names", "output_names", "notes", "operating_point_names")
+_OPTIONAL = ("operating_point_names",)  # files of earlier versions have none
 _SCALARS = {"sample_time": float, "n_samples": int, "half_width": int, "method": str}
 # What the readers of json, zip archives and numpy raise for damaged files, and the conversions below for content of
 # another form. RuntimeError: an archive that is encrypted, or packed in a way that zipfile does not know; nesting.
@@ -62,8 +65,10 @@ def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
     if not result.n_samples:
         raise InputError("the response was read from CSV and has no covariance", where="save",
                          remedy="Keep the CSV file it was read from.")
-    arrays = {name: getattr(result, name) for name in _ARRAYS if getattr(result, name) is not None}
-    texts = {name: list(getattr(result, name)) for name in _LISTS}
+    means = result.operating_point
+    arrays = {name: getattr(result, name) for name in _ARRAYS[:-1] if getattr(result, name) is not None}
+    arrays["operating_point_values"] = np.array(list(means.values()), float)
+    texts = {name: list(getattr(result, name)) for name in _LISTS[:-1]} | {"operating_point_names": list(means)}
     scalars = {name: getattr(result, name) for name in _SCALARS}
     head = {"format": FORMAT, **scalars}
     with whole_file(path) as part:
@@ -158,17 +163,27 @@ def load(path: str | PathLike[str], sample_time: float = math.nan) -> dict[str, 
     if content.get("format") != FORMAT:
         raise InputError(f"its format is {quoted(content.get('format'))}", where=str(path),
                          expected=f"{FORMAT!r}, as robthermal frf writes it")
-    missing = [name for name in (*_ARRAYS[:5], *_LISTS, *_SCALARS) if name not in content]
+    missing = [name for name in (*_ARRAYS[:5], *_LISTS, *_SCALARS) if name not in content and name not in _OPTIONAL]
     if missing:
         raise InputError(f"lacks {', '.join(missing)}", where=str(path), remedy="Write it again with save.")
     arguments = {name: content[name] for name in _ARRAYS if name in content}
-    arguments |= {name: _texts(content[name], name, path) for name in _LISTS}
+    arguments |= {name: _texts(content.get(name, []), name, path) for name in _LISTS}
     arguments |= {name: _scalar(content[name], name, kind, path) for name, kind in _SCALARS.items()}
     shape = len(arguments["output_names"]), len(arguments["input_names"]), arguments["frequencies"].size
     if arguments["response"].shape != shape:
         raise InputError(f"its response has shape {excerpt(arguments['response'].shape)}", where=str(path),
                          expected=f"{shape}, from its names and frequencies", remedy="Write it again with save.")
-    return arguments
+    return arguments | {"operating_point": _operating_point(arguments, path)}
+
+
+def _operating_point(arguments: dict[str, Any], path: Path) -> dict[str, float]:
+    """Means of the inputs from the two lists of a file, which are taken out of the arguments."""
+    names = arguments.pop("operating_point_names")
+    values = np.ravel(arguments.pop("operating_point_values", []))
+    if len(names) != values.size or values.dtype.kind not in "fi" or not np.isfinite(values).all():
+        raise InputError(f"its operating point has {len(names)} names and values {excerpt(values.tolist())}",
+                         where=str(path), expected="one finite number per name", remedy="Write it again with save.")
+    return dict(zip(names, values.astype(float).tolist(), strict=True))
 
 
 def _refuse_large(path: Path, kind: str) -> None:
@@ -275,17 +290,5 @@ def _read_mat(path: Path) -> dict[str, Any]:
 
 def _without_matlab_padding(content: dict[str, Any]) -> dict[str, Any]:
     """MATLAB has no vectors and drops trailing axes of one: the lengths of the names restore the shapes."""
-    n_f, n_y, n_u = content["frequencies"].size, len(content["output_names"]), len(content["input_names"])
-    shapes = {
-        "frequencies": (n_f,),
-        "degrees_of_freedom": (n_f,),
-        "suspect": (n_f,),
-        "response": (n_y, n_u, n_f),
-        "ratio_uncertainty": (n_y, n_u, n_f),
-        "covariance": (n_y * n_u, n_y * n_u, n_f),
-        "noise_covariance": (n_y, n_y, n_f),
-        "nonlinear_covariance": (n_y, n_y, n_f),
-        "transient": (n_y, n_f),
-        "coherence": (n_y, n_f),
-    }
+    shapes = shapes_of(len(content["output_names"]), len(content["input_names"]), content["frequencies"].size)
     return {name: value.reshape(shapes[name]) if name in shapes else value for name, value in content.items()}

@@ -33,6 +33,15 @@ def outcome(result: FrequencyResponse) -> Outcome:
     return IdentifyCode.ESTIMATED.outcome(" ".join([f"All {len(result)} bins estimated.", *result.notes]))
 
 
+def remarks(result: FrequencyResponse) -> tuple[Outcome, ...]:
+    """What has to stand beside any claim that rests on the estimate."""
+    left_out = [note for note in result.notes if f"({IdentifyCode.CONSTANT_INPUT.code})" in note]
+    found = [IdentifyCode.CONSTANT_INPUT.outcome(note, ok=True) for note in left_out]
+    if not result.has_covariance:
+        found.append(IdentifyCode.FRF_WITHOUT_COVARIANCE.outcome())
+    return tuple(found)
+
+
 def table(result: FrequencyResponse) -> str:
     """A few frequencies of every entry of G, and the outcome."""
     lines = [

@@ -14,7 +14,7 @@ from robthermal.signals import Record
 from .._checks import whole_number
 from ._etfe import least_squares_over
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, rounding_level
+from ._records import as_records, check_excitation, mean_inputs, rounding_level
 from ._response import FrequencyResponse
 
 WINDOWS = ("hann", "rectangular")
@@ -102,6 +102,7 @@ def spectral(
         coherence=_coherence(response, U, noise * (count - n_u) / count),
         input_names=first.input_names,
         output_names=first.output_names,
+        operating_point=mean_inputs(records),
         sample_time=first.sample_time,
         n_samples=max(len(r) for r in records),
         method=f"spectral, {count} segments of {length} samples, {window} window, overlap {overlap:g}",

@@ -38,6 +38,42 @@ def test_the_content_tells_the_format_not_the_ending(estimate: FrequencyResponse
     for name in ("frequencies", "response", "covariance", "noise_covariance", "degrees_of_freedom"):
         np.testing.assert_array_equal(getattr(found, name), getattr(estimate, name), err_msg=name)
     assert found.has_covariance and found.sample_time == 0.5 and found.input_names == ("q1", "q2")
+    assert found.operating_point == estimate.operating_point and set(found.operating_point) == {"q1", "q2"}
+
+
+@pytest.mark.parametrize("kind", ["json", "npz", "mat"])
+@pytest.mark.parametrize("means", [{}, {"q1": 5.0}, {"q1": 5.0, "room °C": 295.5, "m2": -0.25}])
+def test_notes_and_operating_point_come_back(estimate: FrequencyResponse, kind: str, means: dict[str, float],
+                                             tmp_path: Path) -> None:
+    notes = ("One.", "Left out because they never change: room (constant_input).")[:len(means)]
+    estimate.replace(operating_point=means, notes=notes).save(tmp_path / f"G.{kind}")
+    found = read_response(tmp_path / f"G.{kind}")
+    assert found.operating_point == means and found.notes == notes
+    assert [one.code for one in found.remarks] == ["constant_input"][:max(len(means) - 1, 0)]
+
+
+def test_a_file_of_an_earlier_version_has_no_operating_point(estimate: FrequencyResponse, tmp_path: Path) -> None:
+    estimate.save(tmp_path / "G.json")
+    content = json.loads((tmp_path / "G.json").read_text(encoding="utf-8"))
+    damaged = {**content, "operating_point_names": ["q1"]}
+    for name in ("operating_point_names", "operating_point_values"):
+        del content[name]
+    (tmp_path / "old.json").write_text(json.dumps(content), encoding="utf-8")
+    (tmp_path / "damaged.json").write_text(json.dumps(damaged), encoding="utf-8")
+    assert read_response(tmp_path / "old.json").operating_point == {}
+    with pytest.raises(rt.InputError, match="operating point has 1 names"):
+        read_response(tmp_path / "damaged.json")
+
+
+def test_the_operating_point_is_the_mean_over_all_records(estimate: FrequencyResponse) -> None:
+    def run(n: int, seed: int) -> rt.Record:
+        u = 3.0 + np.random.default_rng(seed).normal(size=n)
+        return rt.Record(sample_time=1.0, inputs=u, outputs=2 * u, input_names=["q"], output_names=["T"])
+
+    records = [run(200, 0), run(400, 1)]
+    mean = float(np.concatenate([r["q"] for r in records]).mean())
+    G = rt.identify.lpm(records)
+    assert G.operating_point == {"q": pytest.approx(mean)} == G.between(0.01, 0.1).operating_point
 
 
 def table(size: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,18 @@ import numpy as np
 
 from ...calibration import Fit, ResponseFit, calibrate
 from ...errors import InputError
-from ...identify import FrequencyResponse, etfe, is_response, lpm, lrm, lrmp, read_response, spectral
+from ...identify import (
+    FrequencyResponse,
+    IdentifyCode,
+    etfe,
+    is_response,
+    lpm,
+    lrm,
+    lrmp,
+    mean_inputs,
+    read_response,
+    spectral,
+)
 from ...signals import Excitation, Record, multisines
 from ...thermal import System
 from ._import import ReadTable, read_files
@@ -49,7 +59,7 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     Returns
     -------
     FrequencyResponse
-        Inputs that never change are left out, which a note says.
+        Inputs that never change are left out, which a note says; `operating_point` has the means of all inputs.
 
     Raises
     ------
@@ -68,22 +78,24 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     """
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
-    parts = [part for path in paths for part in _channels(path, system, inputs, outputs, tables)]
-    records, constant = _changing(parts, inputs)
+    parts = [part for path in paths for part in _parts(path, system, inputs, outputs, tables)]
+    chosen = [part.select(inputs=list(inputs or part.input_names), outputs=list(outputs or part.output_names))
+              for part in parts]
+    records, constant = _changing(chosen)
     given: Any = list(poles) if poles else system if system is not None else "auto"
     G = {"etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
          "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
-    if constant:
-        G = replace(G, notes=(*G.notes, f"left out because they never change: {', '.join(constant)} (constant_input)"))
+    note = (f"Left out because they never change: {', '.join(constant)} ({IdentifyCode.CONSTANT_INPUT.code}).",)
+    G = G.replace(notes=G.notes + (note if constant else ()), operating_point=mean_inputs(parts))
     return G.between(*band) if band else G
 
 
-def _changing(records: list[Record], asked: Sequence[str]) -> tuple[list[Record], list[str]]:
-    """Records without the inputs that are constant in all of them, unless they were asked for by name."""
+def _changing(records: list[Record]) -> tuple[list[Record], list[str]]:
+    """Records without the inputs that are constant in all of them."""
     names = records[0].input_names if records else ()
-    constant = [name for name in names if name not in asked and all(np.ptp(record[name]) == 0.0 for record in records)]
+    constant = [name for name in names if all(np.ptp(record[name]) == 0.0 for record in records)]
     if not constant:
         return records, []
     left = [name for name in names if name not in constant]
@@ -93,8 +105,9 @@ def _changing(records: list[Record], asked: Sequence[str]) -> tuple[list[Record]
     return [record.select(inputs=left) for record in records], constant
 
 
-def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str],
-              tables: Sequence[ReadTable]) -> list[Record]:
+def _parts(path: Path, system: System | None, inputs: Sequence[str], outputs: Sequence[str],
+           tables: Sequence[ReadTable]) -> list[Record]:
+    """Uninterrupted parts of one file, with every input that the system has."""
     if system is None:
         if not inputs or not outputs:
             raise InputError("the columns are not known", where=str(path),
@@ -103,8 +116,7 @@ def _channels(path: Path, system: System | None, inputs: Sequence[str], outputs:
     records = read_files([path], system, tables=tables)
     if not records[0].output_names:
         raise InputError("has no sensor column", where=str(path), expected="one of " + ", ".join(system.sensor_names))
-    return [record.select(inputs=list(inputs or record.input_names), outputs=list(outputs or record.output_names))
-            for record in records]
+    return records
 
 
 def design_excitation(names: Sequence[str], *, period: int, sample_time: float, band: tuple[float, float],
