@@ -23,9 +23,9 @@ SURFACE = {
     """,
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
-        check_certificate check_loop_parameters contraction frequency_norm frequency_radius gains heater_heat hinf
-        invariance largest_current largest_regulated_current limit_map loop network observer peak regulated runaway
-        runaway_free stability thesis_bounds usable_current
+        check_certificate check_loop_parameters closed_loop contraction frequency_norm frequency_radius gains
+        heater_heat hinf invariance largest_current largest_regulated_current limit_map loop network observer peak
+        regulated runaway runaway_free stability thesis_bounds usable_current
     """,
     "coupling": """
         NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors

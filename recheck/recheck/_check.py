@@ -19,7 +19,7 @@ KINDS: dict[str, Kind] = {
     "runaway": (_runaway.read, _runaway.check), "network": (_network.read, _network.check),
     "stability": (_stability.read, _stability.check), "gain": (_gain.read, _gain.check),
     "observer": (_observer.read, _observer.check)}
-OTHERS = ("regulated", "loop", "hinf", "peak", "frequency")
+OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop")
 
 
 @dataclass(frozen=True)

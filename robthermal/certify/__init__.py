@@ -1,6 +1,7 @@
 """Certificates of thermal systems: contraction in a box, current limits, box invariance, runaway, large networks."""
 
 from ..linear import GainBound as GainBound
+from ..linear import closed_loop as closed_loop
 from ..linear import frequency_norm as frequency_norm
 from ..linear import frequency_radius as frequency_radius
 from ..linear import hinf as hinf
@@ -34,7 +35,7 @@ from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
 __all__ = ["CertifyCode", "CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree",
-           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "contraction",
+           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "closed_loop", "contraction",
            "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
            "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
            "runaway_free", "stability", "thesis_bounds", "usable_current"]

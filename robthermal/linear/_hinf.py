@@ -16,7 +16,7 @@ from ._stability import coordinates
 from ._systems import Plant, made_by, read_plant, scaling
 
 _LOSSES = (0.0, 0.02, 0.1)  # given up in turn where a proof fails
-_SHIFTS = (1e-4, 1e-7)  # of the strict Riccati equation, relative to the bound²
+SHIFTS = (1e-4, 1e-7)  # of the strict Riccati equation, relative to the bound²
 
 
 def hinf(system: Any, bound: float | None = None, *, left: Array | None = None,
@@ -83,8 +83,8 @@ def _prove(plant: Plant, scaled: Plant, norm: float, bound: float, L: Array | No
     region |= {key: matrix for key, matrix in (("left", L), ("right", R)) if matrix is not None}
     given = f"{100 * loss:g} % given up for the proof"
     if norm < bound and len(plant.A):
-        for shift in _SHIFTS:
-            matrix = _riccati(scaled, norm + 0.7 * (bound - norm), bound**2 * shift)
+        for shift in SHIFTS:
+            matrix = bounded_real_matrix(scaled, norm + 0.7 * (bound - norm), bound**2 * shift)
             if matrix is None:
                 continue
             cert = establish("hinf", system=plant.section, region=region, margin={},
@@ -96,7 +96,7 @@ def _prove(plant: Plant, scaled: Plant, norm: float, bound: float, L: Array | No
                      made_by=made_by("none", f"polynomial; {given}"))
 
 
-def _riccati(plant: Plant, level: float, shift: float) -> Array | None:
+def bounded_real_matrix(plant: Plant, level: float, shift: float) -> Array | None:
     """P of the bounded real lemma at a level below the bound, with shift I added to C'C in excited coordinates."""
     T = coordinates(plant.A, plant.B @ plant.B.T, bool(plant.dt))
     if T is None:

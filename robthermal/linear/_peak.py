@@ -65,7 +65,7 @@ def peak(system: Any) -> GainBound:
         cert = _establish(plant, lower * (1 + 1e-12) or 1e-300, {"method": "positive"}, "gain at zero")
         if cert.holds:
             return GainBound(float(cert.region["bound"]), lower, frequency, cert)
-    for evidence, bound, status in _candidates(plant):
+    for evidence, bound, status in ellipsoids(plant):
         cert = _establish(plant, bound, evidence, status)
         if cert.holds:
             break
@@ -82,7 +82,7 @@ def _positive(plant: Plant) -> bool:
     return plant.D.shape == (1, 1) and all((matrix >= 0).all() for matrix in (off, plant.B, plant.C, plant.D))
 
 
-def _candidates(plant: Plant) -> Iterator[tuple[dict[str, Any], float, str]]:
+def ellipsoids(plant: Plant) -> Iterator[tuple[dict[str, Any], float, str]]:
     """Evidence and bound, with more and more slack."""
     best = _best_decay(plant)
     for slack, floor in _SLACKS:

@@ -47,7 +47,7 @@ def stability(system: Any, *, rate: float = 0.0) -> Certificate:
     plant = read_plant(system)
     _check_rate(plant, rate)
     region = {"rate": float(rate)}
-    matrix = _lyapunov(plant, rate)
+    matrix = lyapunov_matrix(plant, rate)
     if matrix is not None:
         cert = establish("stability", system=plant.section, region=region, margin={},
                          evidence={"method": "lyapunov", "matrix": matrix},
@@ -65,7 +65,7 @@ def _check_rate(plant: Plant, rate: float) -> None:
                          expected="zero or above [1/s]; below 1 for a sampled system")
 
 
-def _lyapunov(plant: Plant, rate: float) -> Array | None:
+def lyapunov_matrix(plant: Plant, rate: float) -> Array | None:
     """P that decays with the rate, solved in coordinates whose modes are driven alike; None where floats see none."""
     n = len(plant.A)
     if n == 0:

@@ -34,7 +34,7 @@ class Certificate:
     ----------
     kind : str
         Kind of claim: contraction, invariance, runaway, network, observer, gain, regulated, loop, stability, hinf,
-        peak or frequency.
+        peak, frequency or closed_loop.
     claim : str
         One sentence, the one its data give.
     system : mapping

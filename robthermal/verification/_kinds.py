@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._closed_loop import CLOSED_LOOP
 from ._contraction import CONTRACTION
 from ._frequency import FREQUENCY
 from ._gain import GAIN
@@ -17,4 +18,5 @@ from ._runaway import RUNAWAY
 from ._stability import STABILITY
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
-                                                       REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP)}
+                                                       REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP,
+                                                       CLOSED_LOOP)}

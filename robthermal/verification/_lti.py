@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,19 +48,24 @@ def read_linear(value: Any) -> LinearSystem:
     """Return the system of a section {"A", "B", "C", "D", "sample_time"}, or raise InputError."""
     table = mapping(value, "system")
     no_other(table, ["A", "B", "C", "D", "sample_time"], "system")
-    A = read_matrix(get(table, "A", "system"), "system.A")
-    D = read_matrix(get(table, "D", "system"), "system.D")
+    return read_realization(table, not_negative(get(table, "sample_time", "system"), "system.sample_time"), "system")
+
+
+def read_realization(table: Mapping[str, Any], sample_time: fmpq, where: str) -> LinearSystem:
+    """Return the system of the matrices A, B, C, D of an object; its other keys are not looked at."""
+    A = read_matrix(get(table, "A", where), f"{where}.A")
+    D = read_matrix(get(table, "D", where), f"{where}.D")
     n = len(A)
     if n > MOST_STATES:
-        raise InputError(f"{n} states", where="system.A", expected=f"at most {MOST_STATES}")
+        raise InputError(f"{n} states", where=f"{where}.A", expected=f"at most {MOST_STATES}")
     if not D or not D[0]:
-        raise InputError("no output or no input", where="system.D", expected="at least one row and one column")
-    B = read_matrix(get(table, "B", "system"), "system.B")
-    C = read_matrix(get(table, "C", "system"), "system.C")
+        raise InputError("no output or no input", where=f"{where}.D", expected="at least one row and one column")
+    B = read_matrix(get(table, "B", where), f"{where}.B")
+    C = read_matrix(get(table, "C", where), f"{where}.C")
     for name, matrix, rows, columns in (("A", A, n, n), ("B", B, n, len(D[0])), ("C", C, len(D), n),
                                         ("D", D, len(D), len(D[0]))):
-        expect_shape(matrix, rows, columns, f"system.{name}")
-    return LinearSystem(A, B, C, D, not_negative(get(table, "sample_time", "system"), "system.sample_time"))
+        expect_shape(matrix, rows, columns, f"{where}.{name}")
+    return LinearSystem(A, B, C, D, sample_time)
 
 
 def read_matrix(value: Any, where: str) -> Rows:

@@ -88,6 +88,10 @@ def _content(section: Any) -> list[Any]:
     table = mapping(section, "system")
     if "lumps" in table:
         return _thermal(table)
+    if "plant" in table:
+        return [Name("closed_loop"), *(get(mapping(get(table, part, "system"), f"system.{part}"), key, f"system.{part}")
+                                       for part in ("plant", "controller") for key in "ABCD"),
+                *(get(table, key, "system") for key in ("n_meas", "n_ctrl", "sample_time"))]
     for family, keys in _SIZES.items():
         if keys[0] in table:
             return [Name(family), *(get(table, key, "system") for key in keys)]

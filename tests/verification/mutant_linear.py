@@ -274,7 +274,83 @@ def break_peak(document: Document, rng: np.random.Generator) -> float:
         document["region"]["bound"]) - 1)
 
 
+# closed_loop
+
+
+def close(system: Document) -> Document:
+    """Return the loop in floats by another way than the checker's: u is solved for together with the states."""
+    P, K = matrices(system["plant"]), matrices(system["controller"])
+    n_u, n_y = (int(truth.number(system[key])) for key in ("n_ctrl", "n_meas"))
+    n, k, m, p = len(P[0]), len(K[0]), P[3].shape[1] - n_u, P[3].shape[0] - n_y
+    known = np.block([[P[0], np.zeros((n, k)), P[1][:, :m]], [P[2][p:], np.zeros((n_y, k)), P[3][p:, :m]]])
+    # unknown: u and y of u = K_C x_K + K_D y, y = C2 x + D21 w + D22 u
+    left = np.block([[np.eye(n_u), -K[3]], [-P[3][p:, m:], np.eye(n_y)]])
+    right = np.block([[np.zeros((n_u, n)), K[2], np.zeros((n_u, m))], [known[n:]]])
+    u, y = np.split(np.linalg.solve(left, right), [n_u])
+    A = np.vstack([known[:n] + P[1][:, m:] @ u, K[1] @ y + np.hstack([np.zeros((k, n)), K[0], np.zeros((k, m))])])
+    C = np.hstack([P[2][:p], np.zeros((p, k)), P[3][:p, :m]]) + P[3][:p, m:] @ u
+    return {"A": A[:, :n + k].tolist(), "B": A[:, n + k:].tolist(), "C": C[:, :n + k].tolist(),
+            "D": C[:, n + k:].tolist(), "sample_time": system["sample_time"]}
+
+
+def make_closed_loop(rng: np.random.Generator) -> Document:
+    n, k, dt = int(rng.integers(1, 4)), int(rng.integers(0, 3)), float(rng.choice([0.0, 0.2]))
+    n_u, n_y, m, p = (int(rng.integers(1, 3)) for _ in range(4))
+    plant, controller = (
+        {key: np.round(size * rng.standard_normal(shape), 3).tolist()
+         for key, shape in zip("ABCD", shapes, strict=True)}
+        for size, shapes in ((1.0, ((n, n), (n, m + n_u), (p + n_y, n), (p + n_y, m + n_u))),
+                             (0.3, ((k, k), (k, n_y), (n_u, k), (n_u, n_y)))))
+    system = {"plant": plant, "controller": controller, "n_meas": n_y, "n_ctrl": n_u, "sample_time": dt}
+    loop = close(system)
+    modes = np.linalg.eigvals(np.array(loop["A"]))
+    spare = 0.05 + 0.5 * rng.random()
+    if dt:  # u = K y is the same loop when A, B of both are scaled alike
+        factor = (1 - spare) / max(np.abs(modes).max(), 1e-3)
+        for part in (plant, controller):
+            part.update({key: np.round(factor * np.array(part[key]), 6).tolist() for key in "AB"})
+    else:
+        for part in (plant, controller):
+            part["A"] = np.round(np.array(part["A"]) - (modes.real.max() + spare) * np.eye(len(part["A"])), 6).tolist()
+    loop = close(system)
+    A, B, C, D = matrices(loop)
+    region: Document = {"measure": "hinf", "bound": _norm(loop) * (1 + 10 ** float(rng.uniform(-2.5, -1)))}
+    evidence: Document = {"method": "polynomial"}
+    if rng.random() < 0.3:
+        region = {"measure": "stability", "rate": 0.9 * (spare if not dt else 1 - np.abs(np.linalg.eigvals(A)).max())}
+    elif rng.random() < 0.4 and (dt or n_u + n_y > 2):  # continuous: D must be zero
+        if not dt:
+            plant["D"] = np.zeros((p + n_y, m + n_u)).tolist()
+            A, B, C, D = matrices(close(system))
+        P = gramian(A, C, dt > 0)
+        region = {"measure": "h2", "bound": float(np.sqrt(np.trace(B.T @ P @ B) + np.sum(D**2))) * 1.001}
+        evidence = {"method": "lyapunov", "matrix": np.round(P + 1e-6 * gramian(A, np.eye(n + k), dt > 0), 9).tolist()}
+    document = {"system": system, "region": region, "evidence": evidence}
+    return document if holds("closed_loop", document) else make_closed_loop(rng)
+
+
+def gramian(A: np.ndarray, C: np.ndarray, sampled: bool) -> np.ndarray:
+    """Return P with A'P + PA + C'C = 0, or A'PA - P + C'C = 0, by Kronecker products."""
+    n = len(A)
+    K = np.kron(A.T, A.T) - np.eye(n * n) if sampled else np.kron(A.T, np.eye(n)) + np.kron(np.eye(n), A.T)
+    P = np.linalg.solve(K, -(C.T @ C).ravel()).reshape(n, n)
+    return (P + P.T) / 2
+
+
+def break_closed_loop(document: Document, rng: np.random.Generator) -> float:
+    region, loop = document["region"], close(document["system"])
+    if region["measure"] == "stability":
+        return spare_decay(loop, truth.number(region.get("rate", 0)))
+    loss, bound = spare_decay(loop), truth.number(region["bound"])
+    if loss > 0 or region["measure"] == "hinf":
+        return max(loss, _norm(loop) / bound - 1)
+    A, B, C, D = matrices(loop)
+    P = gramian(A, C, truth.number(loop["sample_time"]) > 0)
+    return float(np.sqrt(max(np.trace(B.T @ P @ B) + np.sum(D**2), 0.0))) / bound - 1
+
+
 SUBJECTS = (Subject("stability", make_stability, break_stability, tolerance=1e-7),
             Subject("hinf", make_hinf, break_hinf, tolerance=1e-7),
             Subject("peak", make_peak, break_peak, tolerance=1e-7),
-            Subject("frequency", make_frequency, break_frequency, tolerance=1e-7))
+            Subject("frequency", make_frequency, break_frequency, tolerance=1e-7),
+            Subject("closed_loop", make_closed_loop, break_closed_loop, tolerance=1e-7))

@@ -35,6 +35,10 @@ def test_falsifiers_find_what_is_false(kind):
     region, evidence = document["region"], document["evidence"]
     if kind == "stability":
         region["rate"] = 0.9 * (1 if document["system"]["sample_time"] else 1e6)
+    elif kind == "closed_loop":
+        region["rate" if region["measure"] == "stability" else "bound"] = (
+            (0.999 if document["system"]["sample_time"] else 1e6) if region["measure"] == "stability"
+            else region["bound"] / 4)
     elif kind in ("hinf", "peak"):
         region["bound"] /= 4
     elif kind == "frequency":

@@ -49,6 +49,8 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
     "hinf": (_LINEAR,),
     "peak": (_LINEAR, "The system starts at rest."),
     "frequency": (_LINEAR,),
+    "closed_loop": (_LINEAR, "The controller runs with the numbers of the certificate file, without limits or delays "
+                    "beyond those of the plant."),
     "loop": (
         "Controller and law run as in the certificate file, read the true temperatures at the samples, and the current "
         "is held between them. Where the sentence says \"sampled model\", nothing is claimed of what the machine does "
