@@ -158,6 +158,19 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -
     assert page.count("<svg") >= 4 and "How linear the loop is" in page
 
 
+def test_a_distant_sensor_is_regulated(run: Cli, file: Path, tmp_path: Path) -> None:
+    """The set-point is what the lagging sensor on the part reads; the report and the file say what is regulated."""
+    said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--bandwidth", "0.01", "--sample-time",
+               "2", "--out", tmp_path / "out")
+    assert said.status == 0 and said.err == ""
+    numbers = json.loads((tmp_path / "out" / "design.json").read_text(encoding="utf-8"))
+    point = numbers["controller"]["modules"]["m1"]["regulates"]
+    assert (point["kind"], point["name"], point["lump"], point["time_constant"]["value"]) == ("sensor", "T_slow",
+                                                                                              "part", 20.0)
+    assert "T_slow" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert numbers["setpoint"]["value"]["m1"] == pytest.approx(285.15)
+
+
 def test_numbers_of_the_file_agree_with_the_certificates(written: Path, fold: rt.thermal.LoadCurve) -> None:
     numbers = json.loads((written / "out" / "design.json").read_text(encoding="utf-8"))
     module = numbers["law"]["modules"]["m1"]
@@ -322,6 +335,9 @@ def test_not_certified_is_an_answer(run: Run, tmp_path: Path) -> None:
     (["--current", "m1=0:3"], ["runaway limit I*", "at most"]),
     (["--current", "m1=0.2:1"], ["leaves zero out"]),
     (["--current", "m1=0:0.01"], ["cannot be held", "the current limit is reached", "reachable range, m1"]),
+    (["--regulate", "T_part"], ["'T_part'", "--regulate", "MODULE=NAME"]),
+    (["--regulate", "m1=T_sink"], ["does not influence sensor 'T_sink'", "stage, part, box"]),
+    (["--regulate", "m1=T_nowhere"], ["no sensor or lump 'T_nowhere'", "T_part"]),
     (["--sensors", "T_nowhere"], ["T_nowhere", "T_sink, T_part"]),
     (["--sensors", "T_slow"], ["T_slow", "lags"]),
     (["--sensors", "T_part,T_part"], ["one lump"]),

@@ -37,10 +37,11 @@ SURFACE = {
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DesignCode
         DisturbanceObserver
         Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
-        MatrixController ObserverModel PID Placement Polarity Reach Reachable Seen StateFeedback StepResponseLinearity
+        MatrixController ObserverModel PID Placement Polarity Reach Reachable RegulatedPoint Seen StateFeedback
+        StepResponseLinearity
         certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
         feedback_linearization linear_controller load_controller loop_poles observer pid place_sensors reachable
-        simulate_loop state_feedback step_response_linearity unobservable
+        regulated_points simulate_loop state_feedback step_response_linearity unobservable
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck

@@ -244,8 +244,11 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
 @app.command()
 def design(system: SystemFile, out: Out = Path("robthermal-design"),
            setpoint: Annotated[list[str] | None, typer.Option(
-               help="Cold face to hold, in the unit of the file; default the lower end of --temperature.",
+               help="Temperature to hold, in the unit of the file; default the lower end of --temperature.",
                metavar="NAME=VALUE")] = None,
+           regulate: Annotated[list[str] | None, typer.Option(
+               help="Sensor or lump that a module regulates, may repeat; default its cold face.",
+               metavar="MODULE=NAME")] = None,
            current: Annotated[list[str] | None, typer.Option(
                help="Limits of one module [A]; default the largest that are certified.", metavar="NAME=LO:HI")] = None,
            ambient: AmbientRange = None, temperature: Box = None,
@@ -262,7 +265,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
     found = rt.read_system(system)
     wanted = rt.jobs.design.design_from_text(
         found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
-        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method)
+        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method, regulate=regulate or [])
     rt.jobs.folder.check_free(out)
     with progress() as stage:
         result = rt.jobs.design_system(found, wanted, stage)

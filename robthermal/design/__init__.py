@@ -38,6 +38,8 @@ from ._polarity import Polarity as Polarity
 from ._polarity import check_polarity as check_polarity
 from ._reachable import Reachable as Reachable
 from ._reachable import reachable as reachable
+from ._regulated_points import RegulatedPoint as RegulatedPoint
+from ._regulated_points import regulated_points as regulated_points
 from ._robust_feedback import corner_plants as corner_plants
 from ._sampling import loop_poles as loop_poles
 from ._state_feedback import StateFeedback as StateFeedback
@@ -52,9 +54,9 @@ collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
            "ControllerInput", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward",
-           "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController", "ObserverModel",
-           "PID", "Placement", "Polarity", "Reach", "Reachable", "Seen", "StateFeedback", "StepResponseLinearity",
-           "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain", "corner_plants",
-           "disturbance_observer", "feed_forward", "feedback_linearization", "linear_controller", "load_controller",
-           "loop_poles", "observer", "pid", "place_sensors", "reachable", "simulate_loop", "state_feedback",
-           "step_response_linearity", "unobservable"]
+           "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController",
+           "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen",
+           "StateFeedback", "StepResponseLinearity", "certify_loop", "check_polarity", "cold_side", "collapse",
+           "constant_gain", "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization",
+           "linear_controller", "load_controller", "loop_poles", "observer", "pid", "place_sensors", "reachable",
+           "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "unobservable"]

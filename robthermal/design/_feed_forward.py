@@ -80,6 +80,7 @@ def feed_forward(plant: ColdSide, controller: Controller) -> FeedForward:
     1.0
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    plant.expect_faces("feed-forward")
     expect_controller(controller)
     if isinstance(controller, DisturbanceObserver):
         raise InputError("the controller is a disturbance observer", where="argument controller",
@@ -171,6 +172,7 @@ def disturbance_observer(plant: ColdSide, controller: Controller, *, time_consta
     True
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    plant.expect_faces("a disturbance observer")
     expect_controller(controller)
     h, tau = controller.sample_time, positive_number(time_constant, "time_constant", "s")
     if tau < 2 * h:

@@ -20,6 +20,7 @@ from ._linearization import Command, FeedbackLinearization
 from ._modules import Array, ModuleSet, check_system
 from ._outcomes import DesignCode
 from ._plant import ColdSide, cold_side
+from ._regulated_points import Regulate
 
 Law = FeedbackLinearization | ConstantGain
 Signals = Mapping[str, ArrayLike]
@@ -49,6 +50,10 @@ class ClosedLoop:
         Name of the active limit of every module; empty where none is active.
     outcome : Outcome
         "settled", "moving", "limited" or "ran_away".
+    regulated : ndarray, shape (n, n_modules)
+        What is regulated, without noise: the cold faces, other lumps, or readings [K].
+    points : tuple of str
+        Names of the lumps or sensors that are regulated.
     """
 
     law: Law
@@ -63,20 +68,25 @@ class ClosedLoop:
     achieved: Array
     limit: np.ndarray
     outcome: Outcome
+    regulated: Array
+    points: tuple[str, ...]
 
     def __str__(self) -> str:
         return self.outcome.text
 
     def plot(self) -> Any:
-        """Plot cold faces with their set-points [°C] and currents [A]; returns the two matplotlib axes."""
+        """Plot what is regulated with its set-points [°C], other cold faces thin, and currents [A]; two axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(2, sharex=True, layout="constrained")
         for i, name in enumerate(_base(self.law).names):
-            line, = axes[0].plot(self.time, self.cold[:, i] - ZERO_CELSIUS, label=name)
+            line, = axes[0].plot(self.time, self.regulated[:, i] - ZERO_CELSIUS, label=f"{name}: {self.points[i]}")
+            if (self.regulated[:, i] != self.cold[:, i]).any():
+                axes[0].plot(self.time, self.cold[:, i] - ZERO_CELSIUS, ":", color=line.get_color(),
+                             label=f"cold face of {name}")
             axes[0].plot(self.time, self.reference[:, i] - ZERO_CELSIUS, "--", color=line.get_color())
             axes[1].plot(self.time, self.current[:, i], color=line.get_color(), drawstyle="steps-post")
-        axes[0].set(ylabel="cold face [°C]", title=self.outcome.code)
+        axes[0].set(ylabel="temperature [°C]", title=self.outcome.code)
         axes[0].legend()
         axes[1].set(xlabel="time [s]", ylabel="current [A]")
         return axes
@@ -86,7 +96,7 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
                   inputs: Signals | None = None, load: Signals | None = None,
                   initial: ArrayLike | Mapping[str, float] | None = None, current: ArrayLike = 0.0,
                   drive: Literal["current", "voltage"] = "current", observer: Observer | None = None,
-                  noise_seed: int | None = None) -> ClosedLoop:
+                  noise_seed: int | None = None, regulate: Regulate = None) -> ClosedLoop:
     """Simulate a sampled controller on the nonlinear system.
 
     Parameters
@@ -96,7 +106,8 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     controller : Controller
         From `pid`, `state_feedback`, `linear_controller`, `feed_forward` or `disturbance_observer`.
     reference : array_like or mapping
-        Set-points of the cold faces [K]: one number, one per module, (n, n_modules), or module to number or (n,).
+        Set-points of the cold faces, or of what is regulated instead [K]: one number, one per module, (n, n_modules),
+        or module to number or (n,).
     law : FeedbackLinearization or ConstantGain
         Turns the heats into currents.
     duration : float
@@ -115,6 +126,10 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
         Estimates all lumps from the sensors; without it every lump is measured.
     noise_seed : int, optional
         Adds the sensors' noise; None for none.
+    regulate : mapping of module to str, optional
+        Sensor or lump that a module regulates; default its cold face. The controller sees what the sensor reads, with
+        its lag, delay, gain, offset and noise; of a lump what is measured or estimated. A delay is interpolated
+        between samples.
 
     Returns
     -------
@@ -136,7 +151,8 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     >>> loop.outcome.code
     'settled'
     """
-    run = _Run(system, controller, law, duration, inputs or {}, load or {}, initial, drive, observer, noise_seed)
+    run = _Run(system, controller, law, duration, inputs or {}, load or {}, initial, drive, observer, noise_seed,
+               regulate)
     return run.go(reference, _base(law).modules.vector(current, "current", "A"))
 
 
@@ -154,7 +170,7 @@ class _Run:
 
     def __init__(self, system: System, controller: Controller, law: Law, duration: float, inputs: Signals,
                  load: Signals, initial: ArrayLike | Mapping[str, float] | None, drive: str,
-                 observer: Observer | None, noise_seed: int | None):
+                 observer: Observer | None, noise_seed: int | None, regulate: Regulate):
         check_system(system)
         expect_controller(controller)
         base = _base(law)
@@ -173,7 +189,10 @@ class _Run:
         self.plant = Stepper(system, self.h / self.substeps, initial=initial, loads=tuple(load))
         self.inputs = self._signals(inputs, "inputs")
         self.load = self._signals(load, "load")
-        self.linear: ColdSide = cold_side(base)
+        self.linear: ColdSide = cold_side(base, regulate=regulate)
+        self.points = self.linear.points
+        self.reads = observer is not None or any(point.kind == "sensor" for point in self.points)
+        self.sources: list[Array] = []  # readings of every sample, as if without delay
         self.true = ModuleSet.of(system, base.names)
         self.noise = None if noise_seed is None else np.random.default_rng(noise_seed)
 
@@ -207,17 +226,20 @@ class _Run:
             for k in range(self.n):
                 true, named = self.plant.lumps, {name: float(values[k]) for name, values in self.inputs.items()}
                 believed = true if self.observer is None else self.observer.estimate(memory)
-                given = ControllerInput(wanted_cold[k], believed[self.base.modules.cold], believed,
-                            self.linear.surroundings(believed, named))
+                clean = self._readings()
+                seen = clean if self.noise is None or not self.reads else clean + self._noise()
+                given = ControllerInput(wanted_cold[k], self._regulated(believed, seen), believed,
+                                        self.linear.surroundings(believed, named))
                 if state is None:
                     state = self.controller.start(given, self._heat_of(current, believed))
                 heat = self.controller.heat(state, given)
                 command = self.law.command(heat, believed, previous=current, sample_time=self.h)
                 state = self.controller.advance(state, given, heat, command.heat)
-                rows.append((true, believed, command, heat))
+                rows.append((true, believed, command, heat, self._regulated(true, clean)))
                 if self.observer is not None:
                     u = {**named, **dict(zip(self.base.names, command.current.tolist(), strict=True))}
-                    memory = self.observer.step(memory, self._reading(), u)
+                    names = self.plant.system.sensor_names
+                    memory = self.observer.step(memory, seen[[names.index(name) for name in self.observer.sensors]], u)
                 self._advance(command, named, k)
                 current = command.current
         except Diverged as error:
@@ -229,13 +251,27 @@ class _Run:
             return self.law.heat - (current - self.law.current) / self.law.gain
         return self.law.heat(current, temperatures)
 
-    def _reading(self) -> Array:
-        readings = self.plant.readings
-        if self.noise is not None:
-            sigma = np.array([sensor.noise for sensor in self.plant.system.sensors.values()])
-            readings = readings + sigma * self.noise.standard_normal(len(sigma))
-        names = self.plant.system.sensor_names
-        return readings[[names.index(name) for name in (self.observer.sensors if self.observer else ())]]
+    def _readings(self) -> Array:
+        """Readings of all sensors now, without noise; before the start they were what they are at the start."""
+        self.sources.append(self.plant.undelayed)
+        found = self.sources[-1].copy()
+        for i, sensor in enumerate(self.plant.system.sensors.values()):
+            if sensor.delay:
+                at = max(len(self.sources) - 1 - sensor.delay / self.h, 0.0)
+                first = min(int(at), len(self.sources) - 2) if len(self.sources) > 1 else 0
+                later = self.sources[min(first + 1, len(self.sources) - 1)][i]
+                found[i] = self.sources[first][i] + (at - first) * (later - self.sources[first][i])
+        return found
+
+    def _noise(self) -> Array:
+        sigma = np.array([sensor.noise for sensor in self.plant.system.sensors.values()])
+        return sigma * (0.0 if self.noise is None else self.noise.standard_normal(len(sigma)))
+
+    def _regulated(self, lumps: Array, readings: Array) -> Array:
+        """What the modules regulate: readings, or temperatures of lumps."""
+        system = self.plant.system
+        return np.array([readings[system.sensor_names.index(point.name)] if point.kind == "sensor"
+                         else lumps[system.lump_names.index(point.name)] for point in self.points])
 
     def _advance(self, command: Command, named: dict[str, float], k: int) -> None:
         load = {lump: float(values[k]) for lump, values in self.load.items()}
@@ -247,23 +283,24 @@ class _Run:
             self.plant.step({**named, **dict(zip(self.base.names, current.tolist(), strict=True))}, load)
 
     def _result(self, rows: list[tuple[Any, ...]], reference: Array, outcome: Outcome | None) -> ClosedLoop:
-        true, believed, commands, wanted = zip(*rows, strict=True)
+        true, believed, commands, wanted, regulated = zip(*rows, strict=True)
         lumps = np.array(true)
         fields = {key: np.array([getattr(c, key) for c in commands]) for key in ("current", "voltage", "heat", "limit")}
         cold = lumps[:, self.base.modules.cold]
         reference = reference[:len(cold)]
         return ClosedLoop(self.law, self.h * np.arange(len(cold)), reference, cold, lumps, np.array(believed),
                           fields["current"], fields["voltage"], np.array(wanted), fields["heat"], fields["limit"],
-                          _judge(self.base, cold, reference, fields["limit"]) if outcome is None else outcome)
+                          self._judge(np.array(regulated), reference, fields["limit"]) if outcome is None else outcome,
+                          np.array(regulated), tuple(point.name for point in self.points))
 
-
-def _judge(law: FeedbackLinearization, cold: Array, reference: Array, limit: np.ndarray) -> Outcome:
-    tail = slice(-max(len(cold) // 20, 2), None)
-    error = np.abs(cold - reference)[tail].max(axis=0)
-    if error.max() < _SETTLED:
-        return DesignCode.SETTLED.outcome(f"Settled: every cold face stays within {_SETTLED} K of its set-point.")
-    i = int(np.argmax(error))
-    if (limit[tail, i] != "").all():
-        return DesignCode.LIMITED.outcome(
-            f"{law.names[i]} is at its {limit[-1, i]} limit and {error[i]:.3g} K from its set-point:")
-    return DesignCode.MOVING.outcome(f"{law.names[i]} is still {error[i]:.3g} K from its set-point:")
+    def _judge(self, regulated: Array, reference: Array, limit: np.ndarray) -> Outcome:
+        tail = slice(-max(len(regulated) // 20, 2), None)
+        error = np.abs(regulated - reference)[tail].max(axis=0)
+        if error.max() < _SETTLED:
+            what = "cold face" if self.linear.at_faces else "regulated temperature"
+            return DesignCode.SETTLED.outcome(f"Settled: every {what} stays within {_SETTLED} K of its set-point.")
+        i = int(np.argmax(error))
+        if (limit[tail, i] != "").all():
+            return DesignCode.LIMITED.outcome(
+                f"{self.base.names[i]} is at its {limit[-1, i]} limit and {error[i]:.3g} K from its set-point:")
+        return DesignCode.MOVING.outcome(f"{self.base.names[i]} is still {error[i]:.3g} K from its set-point:")

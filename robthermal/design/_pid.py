@@ -75,7 +75,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     Parameters
     ----------
     plant : ColdSide
-        What it controls.
+        What it controls; its regulated points may be sensors or lumps away from the cold faces.
     sample_time : float
         Time between two samples [s].
     bandwidth : float, optional
@@ -96,7 +96,7 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     ------
     InputError
         Neither or both of bandwidth and proportional; a sample time too slow for the sampled loop to be stable, with
-        the slowest that would do.
+        the slowest that would do; modules that are paired crosswise with their points.
 
     Examples
     --------
@@ -114,8 +114,8 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     m = len(plant.law.names)
     if bandwidth is not None:
         w = positive_number(bandwidth, "bandwidth", "rad/s")
-        G = plant.C @ np.linalg.solve(1j * w * np.eye(len(plant.A)) - plant.A, plant.B[:, :m])
-        kp = 1 / np.abs(np.diag(G))
+        check_pairs(plant)
+        kp = 1 / np.abs(np.diag(plant.response(w)[0]))
         ki, kd = kp * w / 4, np.zeros(m)
     else:
         kp, ki, kd = (per_module(gain, m, name, unit) for gain, name, unit in (
@@ -129,3 +129,15 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     controller = PID(kp, ki, kd, tau, tracking, h)
     check_sampling(plant, controller, lambda time: PID(kp, ki, kd, max(tau, 2 * time), tracking, time))
     return controller
+
+
+def check_pairs(plant: ColdSide) -> None:
+    """Refuse modules that regulate each other's points: the relative gain of a loop is then negative."""
+    gain = plant.response(0.0)[0].real
+    relative = np.diag(gain * np.linalg.inv(gain).T)
+    for point, share in zip(plant.points, relative, strict=True):
+        if share <= 0:
+            raise InputError(f"module {point.module!r} regulates {point.name!r}, which the other modules move more "
+                             f"(relative gain {share:.3g})", where=f"regulate {point.module}",
+                             expected="a point that its own module moves most",
+                             remedy="Swap the points between the modules.")

@@ -8,15 +8,18 @@ from dataclasses import dataclass
 import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ..thermal import Equations
+from ._discrete import delayed, held
 from ._linearization import FeedbackLinearization
 from ._modules import Array
 from ._numbers import expect, numbers
+from ._regulated_points import Regulate, RegulatedPoint, regulated_points
+
+_ALIKE = 1e8  # condition of the static gains beyond which two points move as one
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class ColdSide:
         are the inputs after the modules' heats.
     A, B : ndarray
         (n, n) [1/s] and (n, n_modules + n_around).
+    points : tuple of RegulatedPoint
+        What every module regulates.
     """
 
     law: FeedbackLinearization
@@ -41,6 +46,7 @@ class ColdSide:
     around: tuple[str, ...]
     A: Array
     B: Array
+    points: tuple[RegulatedPoint, ...]
 
     @property
     def indices(self) -> NDArray[np.intp]:
@@ -53,6 +59,59 @@ class ColdSide:
         faces = [part.cold for part in self.law.modules.parts]
         return np.array([[float(lump == face) for lump in self.lumps] for face in faces])
 
+    @property
+    def at_faces(self) -> bool:
+        """Whether every module regulates its own cold face."""
+        return all(point.plain and point.lump == part.cold
+                   for point, part in zip(self.points, self.law.modules.parts, strict=True))
+
+    def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
+        """Frequency response from the heats v to what is regulated, (n_frequencies, n_modules, n_modules) [K/W].
+
+        Parameters
+        ----------
+        frequency : array_like
+            Angular frequencies of the response [rad/s].
+        """
+        s = 1j * np.atleast_1d(np.asarray(frequency, float))
+        m = len(self.points)
+        at = [self.lumps.index(point.lump) for point in self.points]
+        X = np.linalg.solve(s[:, None, None] * np.eye(len(self.A)) - self.A, self.B[:, :m])
+        return X[:, at] * np.stack([point.response(s) for point in self.points], axis=-1)[:, :, None]
+
+    def regulated(self, sample_time: float) -> tuple[Array, Array, Array]:
+        """Sampled A, B, C from held heats v to what is regulated; states: lumps, lags of sensors, delayed readings.
+
+        Exact: a delay of l samples less a part of one reads the state that far into the earlier sample.
+
+        Parameters
+        ----------
+        sample_time : float
+            Time between samples [s].
+        """
+        n, m, lags = len(self.A), len(self.points), [p for p in self.points if p.time_constant]
+        A, B = np.zeros((n + len(lags), n + len(lags))), np.zeros((n + len(lags), m))
+        A[:n, :n], B[:n] = self.A, self.B[:, :m]
+        C = np.zeros((m, len(A)))
+        for row, point in enumerate(lags, n):
+            A[row, self.lumps.index(point.lump)], A[row, row] = 1 / point.time_constant, -1 / point.time_constant
+        for row, point in enumerate(self.points):
+            C[row, n + lags.index(point) if point.time_constant else self.lumps.index(point.lump)] = point.gain
+        return delayed(A, B, C, [point.delay for point in self.points], sample_time)
+
+    def expect_faces(self, what: str) -> None:
+        """Refuse a plant that regulates anything but its cold faces.
+
+        Parameters
+        ----------
+        what : str
+            Name of the controller that cannot do more.
+        """
+        if not self.at_faces:
+            raise InputError(f"{what} of {', '.join(point.name for point in self.points)}", where="argument plant",
+                             expected="a plant that regulates its cold faces", remedy="Use rt.design.pid or "
+                             "linear_controller for another point, or leave regulate out.")
+
     def sampled(self, sample_time: float) -> tuple[Array, Array]:
         """Exact zero-order-hold A_d and B_d at a sample time [s].
 
@@ -61,11 +120,7 @@ class ColdSide:
         sample_time : float
             Time between samples [s].
         """
-        n, m = self.B.shape
-        both = np.zeros((n + m, n + m))
-        both[:n] = np.hstack([self.A, self.B]) * sample_time
-        exact = expm(both)[:n]
-        return exact[:, :n], exact[:, n:]
+        return held(self.A, self.B, sample_time)
 
     def to_control(self, sample_time: float = 0.0) -> control.StateSpace:
         """python-control state space from [v, around] to the cold faces; continuous for sample_time 0.
@@ -111,7 +166,8 @@ class ColdSide:
         return np.linalg.solve(to_face[:, :m], np.asarray(reference) - to_face[:, m:] @ np.asarray(around))
 
 
-def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None) -> ColdSide:
+def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None, *,
+              regulate: Regulate = None) -> ColdSide:
     """Linear plant of a feedback-linearized system, from the heats v to the cold faces.
 
     Parameters
@@ -121,6 +177,9 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     temperatures : array_like, shape (n_lumps,), optional
         Where natural convection and radiation are linearized [K]; default the initial temperatures. The links of
         modules and conduction are linear: for them it does not matter.
+    regulate : mapping of module to str, optional
+        Sensor or lump that a module regulates; default its cold face. Lag, delay, gain and offset of a sensor, and the
+        network between the cold face and the point, are then part of the loop.
 
     Returns
     -------
@@ -132,7 +191,8 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     ------
     InputError
         When one lump is the hot face of one driven module and the cold face of another (a cascade): v of the one is
-        then not free of the current of the other.
+        then not free of the current of the other. A regulated point that its module does not influence through its
+        cold side, or that it cannot move independently of another one.
 
     Examples
     --------
@@ -166,7 +226,32 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None)
     drive = np.array([[float(i == c) for c in law.modules.cold] for i in states])
     B = np.hstack([drive, heaters[:, used_heaters], full[np.ix_(states, used)]])
     capacity = eq.capacity[states][:, None]
-    return ColdSide(law, tuple(nodes[i] for i in states), around, full[np.ix_(states, states)] / capacity, B / capacity)
+    side = ColdSide(law, tuple(nodes[i] for i in states), around, full[np.ix_(states, states)] / capacity, B / capacity,
+                    regulated_points(law, regulate))
+    island = {nodes[i]: int(label[np.searchsorted(free, i)]) for i in states}
+    _check_influence(side, island)
+    return side
+
+
+def _check_influence(side: ColdSide, part: Mapping[str, int]) -> None:
+    """Refuse points that no current can hold: not on the cold side of their module, or two that move as one."""
+    faces = [module.cold for module in side.law.modules.parts]
+    for point, face in zip(side.points, faces, strict=True):
+        if part.get(point.lump) != part[face]:
+            what = f"{point.kind} {point.name!r}" + (f", on lump {point.lump!r}," if point.kind == "sensor" else "")
+            why = (f"no link joins it to {face!r}" if point.lump in part
+                   else f"it is not on the cold side of {point.module!r}")
+            near = [lump for lump in side.lumps if part[lump] == part[face]]
+            raise InputError(f"module {point.module!r} does not influence {what} through its cold face: {why}",
+                             where=f"regulate {point.module}", expected="a lump among " + ", ".join(near)
+                             + ", or a sensor on one of them",
+                             remedy="The law makes the cold side linear; what the hot side warms is no part of it.")
+    gain = side.response(0.0)[0].real
+    scale = gain / np.sqrt(np.outer(np.abs(gain).max(axis=1), np.abs(gain).max(axis=0)))
+    if np.linalg.cond(scale) > _ALIKE:
+        raise InputError("the modules cannot move " + ", ".join(point.name for point in side.points)
+                         + " independently of each other", where="regulate", expected="a point of its own for every "
+                         "module", remedy="Let one of the modules regulate its cold face.")
 
 
 def _passive(eq: Equations, x: Array) -> Array:

@@ -16,6 +16,8 @@ from ._linearization import FeedbackLinearization
 from ._modules import Array
 from ._numbers import expect
 from ._outcomes import DesignCode
+from ._plant import cold_side
+from ._regulated_points import Regulate, RegulatedPoint, regulated_points
 
 _FINE = 1e-3  # K
 _STRIDE = 2.0  # K, first step of the march
@@ -29,11 +31,11 @@ class Reachable:
     Parameters
     ----------
     setpoint : dict
-        Module to wanted temperature of its cold face [K].
+        Module to wanted temperature of its cold face, or of what it regulates instead [K].
     passive : dict
-        The same faces with the modules off and the load on [K].
+        The same with the modules off and the load on [K].
     limit : dict
-        How far the faces can be brought from `passive`, together, along the line through the set-points [K].
+        How far they can be brought from `passive`, together, along the line through the set-points [K].
     current : dict
         Currents that hold the set-points, or the limit if they are beyond it [A].
     binding : str
@@ -41,6 +43,10 @@ class Reachable:
         when the set-points are held and nothing binds up to three times as far.
     outcome : Outcome
         "reachable", or "unreachable" with the reachable range.
+    faces : dict
+        Module to the temperature of its cold face with these currents [K].
+    temperatures : dict
+        Lump to its temperature with these currents [K].
     """
 
     setpoint: dict[str, float]
@@ -49,6 +55,8 @@ class Reachable:
     current: dict[str, float]
     binding: str
     outcome: Outcome
+    faces: dict[str, float]
+    temperatures: dict[str, float]
 
     def __str__(self) -> str:
         return self.outcome.text
@@ -75,12 +83,13 @@ class Reachable:
             ax.plot([i, i], np.array([self.passive[name], self.limit[name]]) - ZERO_CELSIUS, lw=8, alpha=0.4)
             ax.plot(i, self.setpoint[name] - ZERO_CELSIUS, "k_", ms=24)
         ax.set_xticks(range(len(self.setpoint)), list(self.setpoint))
-        ax.set(ylabel="cold face [°C]", title="set-point (black) and reachable range")
+        ax.set(ylabel="regulated temperature [°C]", title="set-point (black) and reachable range")
         return ax
 
 
 def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float, *,
-              load: Mapping[str, float] | None = None, inputs: Mapping[str, float] | None = None) -> Reachable:
+              load: Mapping[str, float] | None = None, inputs: Mapping[str, float] | None = None,
+              regulate: Regulate = None) -> Reachable:
     """Can these set-points be held, in steady state, with this load and within the feedback law's current limits?
 
     Parameters
@@ -88,11 +97,13 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     law : FeedbackLinearization
         Its system and current limits.
     setpoint : mapping of module to float, or one number for all
-        Temperatures of the cold faces [K].
+        Temperatures of the cold faces, or of what is regulated instead [K].
     load : mapping of lump to float, optional
         Heat into lumps [W].
     inputs : mapping, optional
         Ambients [K], heaters [unit], currents of other modules [A].
+    regulate : mapping of module to str, optional
+        Sensor or lump that a module regulates; default its cold face. Offset and gain of a sensor count.
 
     Returns
     -------
@@ -116,18 +127,22 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     if target.min() < 150.0:
         raise InputError(f"a set-point is {target.min():g} K", where="argument setpoint", expected="kelvin",
                          remedy=ADD_ZERO)
-    search = _Search.of(law, dict(load or {}), dict(inputs or {}))
-    base = search.passive[search.held]
-    share, at, why = search.furthest(target)
-    passive, wanted, far = (dict(zip(law.names, a.tolist(), strict=True))
-                            for a in (base, target, base + share * (target - base)))
-    current = dict(zip(law.names, at.tolist(), strict=True))
+    search = _Search.of(law, dict(load or {}), dict(inputs or {}),
+                        cold_side(law, regulate=regulate).points if regulate else regulated_points(law))
+    base = search.readings(search.passive)
+    share, x, at, why = search.furthest(np.array([point.temperature(value) for point, value in
+                                                  zip(search.points, target, strict=True)]))
+    passive, wanted, far, current, faces = (
+        dict(zip(law.names, a.tolist(), strict=True))
+        for a in (base, target, base + share * (target - base), at, x[law.modules.cold]))
+    lumps = dict(zip(law.system.lump_names, x.tolist(), strict=True))
     if share >= 1:
         further = f" In their direction: {_ranges(passive, far)}; beyond, {_words(why)}." if why else ""
-        return Reachable(wanted, passive, far, current, why,
-                         DesignCode.REACHABLE.outcome(f"The set-points can be held.{further}"))
-    return Reachable(wanted, passive, far, current, why, DesignCode.UNREACHABLE.outcome(
-        f"These set-points cannot be held: {_words(why)}. Reachable is {_ranges(passive, far)}."))
+        outcome = DesignCode.REACHABLE.outcome(f"The set-points can be held.{further}")
+    else:
+        outcome = DesignCode.UNREACHABLE.outcome(
+            f"These set-points cannot be held: {_words(why)}. Reachable is {_ranges(passive, far)}.")
+    return Reachable(wanted, passive, far, current, why, outcome, faces, lumps)
 
 
 @dataclass(frozen=True)
@@ -139,9 +154,11 @@ class _Search:
     u: Array
     heat: Array
     passive: Array
+    points: tuple[RegulatedPoint, ...]
 
     @classmethod
-    def of(cls, law: FeedbackLinearization, load: dict[str, float], inputs: dict[str, float]) -> _Search:
+    def of(cls, law: FeedbackLinearization, load: dict[str, float], inputs: dict[str, float],
+           points: tuple[RegulatedPoint, ...]) -> _Search:
         """Start at the steady state with the feedback law's modules off and the load on."""
         for name in law.names:
             if name in inputs:
@@ -156,28 +173,32 @@ class _Search:
         for name, value in inputs.items():
             u[law.system.exogenous_names.index(name)] = value
         heat = np.array([load.get(name, 0.0) for name in law.system.lumps])
-        return cls(law, eq, u, heat, np.array(list(found.equilibria[0].temperatures.values())))
+        return cls(law, eq, u, heat, np.array(list(found.equilibria[0].temperatures.values())), points)
 
     @property
     def held(self) -> list[int]:
         """Lumps that are held."""
-        return self.law.modules.cold
+        return [self.law.system.lump_names.index(point.lump) for point in self.points]
+
+    def readings(self, x: Array) -> Array:
+        """What is regulated, in steady state at these lump temperatures."""
+        return np.array([float(point.reading(x[i])) for point, i in zip(self.points, self.held, strict=True)])
 
     @property
     def columns(self) -> list[int]:
         """Columns of u with the currents of the feedback law's modules."""
         return [self.law.system.exogenous_names.index(name) for name in self.law.names]
 
-    def furthest(self, target: Array) -> tuple[float, Array, str]:
-        """Largest share of the way to the target (three at most), currents there or at the target, what binds."""
+    def furthest(self, target: Array) -> tuple[float, Array, Array, str]:
+        """Largest share of the way to the target (three at most), lumps and currents there or at it, what binds."""
         base = self.passive[self.held]
         size = float(np.abs(target - base).max())
         if size < _FINE:
-            return 1.0, np.zeros(len(base)), ""
+            return 1.0, self.passive, np.zeros(len(base)), ""
         x: Array = self.passive
         current: Array = np.zeros(len(base))
         share, why = 0.0, ""
-        at_target, step = current, _STRIDE / size
+        at_target, step = (x, current), _STRIDE / size
         while step * size > _FINE and share < _FURTHEST:
             goal = min(share + step, 1.0 if share < 1 else _FURTHEST)
             found = self._solve(base + goal * (target - base), x, current)
@@ -186,19 +207,19 @@ class _Search:
                 step /= 2
                 continue
             share, (x, current), step = goal, found, min(1.5 * step, 2 * _STRIDE / size)
-            at_target = current if share <= 1 else at_target
-        return share, at_target, why
+            at_target = (x, current) if share <= 1 else at_target
+        return share, *at_target, why
 
     def _limit(self, x: Array, current: Array) -> str:
         """Limit of the feedback law that these currents exceed."""
         active = self.law.command(self.law.heat(current, x), x).limit
         return next((str(name) for name in active if name), "")
 
-    def _solve(self, faces: Array, x: Array, current: Array) -> tuple[Array, Array] | None:
+    def _solve(self, goal: Array, x: Array, current: Array) -> tuple[Array, Array] | None:
         """Newton for the free temperatures and the currents; None unless it ends in a stable steady state nearby."""
         x, u, held, columns = x.copy(), self.u.copy(), self.held, self.columns
         free = np.setdiff1d(np.arange(len(x)), held)
-        x[held], u[columns] = faces, current
+        x[held], u[columns] = goal, current
         for _ in range(20):
             Jx, Ju = self.eq.jacobian(x, u).toarray(), self.eq.input_jacobian(x, u).toarray()[:, columns]
             change = np.linalg.solve(np.hstack([Jx[:, free], Ju]), self.eq.heat(x, u) + self.heat)
@@ -207,15 +228,16 @@ class _Search:
             x[free] -= change[:len(free)]
             u[columns] -= change[len(free):]
             if np.abs(change).max() < 1e-9:
-                return (x, u[columns]) if self._stable(Jx, Ju, free, u[columns], x) else None
+                return (x, u[columns]) if self._stable(Jx, Ju, u[columns], x) else None
         return None
 
-    def _stable(self, Jx: NDArray[np.float64], Ju: NDArray[np.float64], free: NDArray[np.intp],
-                current: Array, x: Array) -> bool:
-        """Whether the rest of the network is stable while the currents, below their optimum, hold the faces."""
+    def _stable(self, Jx: NDArray[np.float64], Ju: NDArray[np.float64], current: Array, x: Array) -> bool:
+        """Whether the rest of the network is stable while the currents, below their optimum, hold the cold faces."""
         if not np.isfinite(self.law.gain(current, x)).all():
             return False
-        feedback = -np.linalg.solve(Ju[self.held], Jx[self.held][:, free])
+        faces = self.law.modules.cold
+        free = np.setdiff1d(np.arange(len(x)), faces)
+        feedback = -np.linalg.solve(Ju[faces], Jx[faces][:, free])
         matrix = (Jx[np.ix_(free, free)] + Ju[free] @ feedback) / self.eq.capacity[free, None]
         return bool(np.linalg.eigvals(matrix).real.max(initial=-np.inf) < 0)
 

@@ -17,7 +17,7 @@ _FASTEST = 1e-3  # of the sample time asked for: no slower loop is searched belo
 
 
 def loop_poles(plant: ColdSide, controller: Controller) -> NDArray[np.complex128]:
-    """Poles of the sampled loop of the linear cold side and a controller, no limit active.
+    """Poles of the sampled loop of the linear cold side, its sensors, and a controller; no limit active.
 
     Parameters
     ----------
@@ -41,22 +41,22 @@ def loop_poles(plant: ColdSide, controller: Controller) -> NDArray[np.complex128
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
     expect_controller(controller)
-    A, B = plant.sampled(controller.sample_time)
+    A, B, C = plant.regulated(controller.sample_time)
     n, m = len(A), len(plant.law.names)
     rest = np.full(len(plant.law.system.lumps), 300.0)
     around = np.zeros(len(plant.around))
 
     def inputs(x: Array) -> ControllerInput:
         temperatures = rest.copy()
-        temperatures[plant.indices] += x
-        return ControllerInput(np.full(m, 300.0), 300.0 + plant.C @ x, temperatures, around)
+        temperatures[plant.indices] += x[:len(plant.lumps)]
+        return ControllerInput(np.full(m, 300.0), 300.0 + C @ x, temperatures, around)
 
     memory = controller.start(inputs(np.zeros(n)), np.zeros(m))
 
     def step(s: Array) -> Array:
         now = inputs(s[:n])
         heat = controller.heat(memory + s[n:], now)
-        return np.concatenate([A @ s[:n] + B[:, :m] @ heat, controller.advance(memory + s[n:], now, heat, heat)])
+        return np.concatenate([A @ s[:n] + B @ heat, controller.advance(memory + s[n:], now, heat, heat)])
 
     # the map is affine: differences from one point are its matrix, exactly
     zero = np.zeros(n + len(memory))

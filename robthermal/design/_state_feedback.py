@@ -112,6 +112,7 @@ def state_feedback(plant: ColdSide, *, sample_time: float, bandwidth: float | No
     True
     """
     expect(plant, ColdSide, "plant", "rt.design.cold_side")
+    plant.expect_faces("a state feedback")
     h, m, n = positive_number(sample_time, "sample_time", "s"), len(plant.law.names), len(plant.A)
     if (bandwidth is None) == (gain is None):
         raise InputError("give either bandwidth or gain", where="argument bandwidth", expected="one of the two")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, Outcome
-from ..thermal import Equilibrium, System, steady_state
+from ..thermal import System, steady_state
 from ._constant_gain import constant_gain
 from ._controller import Controller
 from ._linearization import FeedbackLinearization
@@ -17,6 +17,8 @@ from ._loop import ClosedLoop, Law, simulate_loop
 from ._modules import Array
 from ._numbers import expect, numbers
 from ._outcomes import DesignCode
+from ._reachable import reachable
+from ._regulated_points import Regulate
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class StepResponseLinearity:
 def step_response_linearity(
     system: System, controller: Controller, *, law: FeedbackLinearization, base: float,
     steps: Sequence[float] = (-30.0, -20.0, -10.0, 10.0, 20.0, 30.0), duration: float = 600.0,
-    inputs: Mapping[str, float] | None = None,
+    inputs: Mapping[str, float] | None = None, regulate: Regulate = None,
 ) -> StepResponseLinearity:
     """Compare normalized set-point steps of the linearized loop with those of the same controller on a constant gain.
 
@@ -88,13 +90,15 @@ def step_response_linearity(
     law : FeedbackLinearization
         Linearizing feedback law of the first loop.
     base : float
-        Temperature of all cold faces before the steps, in steady state [K].
+        Temperature of all cold faces, or of what is regulated instead, before the steps, in steady state [K].
     steps : sequence of float, optional
         Sizes of the set-point steps [K].
     duration : float, optional
         Simulated time after the step [s].
     inputs : mapping, optional
         Ambients [K] and heaters [unit].
+    regulate : mapping of module to str, optional
+        Sensor or lump that a module regulates; default its cold face.
 
     Returns
     -------
@@ -120,18 +124,16 @@ def step_response_linearity(
     sizes = numbers(steps, "steps")
     if sizes.ndim != 1 or len(sizes) < 2 or not sizes.all():
         raise InputError(f"steps = {tuple(steps)!r}", where="argument steps", expected="at least two steps, none zero")
-    start = _hold(system, law, base, inputs)
-    at = np.array(list(start.temperatures.values()))
-    current = np.array([start.currents[name] for name in law.names])
+    at, current = _hold(system, law, base, inputs, regulate)
 
     def family(way: Law) -> list[ClosedLoop]:
         return [simulate_loop(system, controller, base + step, law=way, duration=duration, inputs=inputs, initial=at,
-                              current=current) for step in steps]
+                              current=current, regulate=regulate) for step in steps]
 
     linearized, plain = family(law), family(constant_gain(law, at, current))
     limited = [f"{step:+g} K" for step, loop in zip(steps, linearized, strict=True) if (loop.limit != "").any()]
     n = min(len(loop.time) for loop in (*linearized, *plain))
-    after, before = (np.array([(loop.cold[:n] - base) / step for step, loop in zip(steps, loops, strict=True)])
+    after, before = (np.array([(loop.regulated[:n] - base) / step for step, loop in zip(steps, loops, strict=True)])
                      for loops in (linearized, plain))
     outcome = DesignCode.COLLAPSED.outcome() if not limited else DesignCode.LIMITED.outcome(
         f"A limit was active in the steps {', '.join(limited)}:", remedy="lower the bandwidth or the steps.")
@@ -139,10 +141,16 @@ def step_response_linearity(
                                  float(np.ptp(after, axis=0).max()), float(np.ptp(before, axis=0).max()), outcome)
 
 
-def _hold(system: System, law: FeedbackLinearization, base: float, inputs: Mapping[str, float] | None) -> Equilibrium:
+def _hold(system: System, law: FeedbackLinearization, base: float, inputs: Mapping[str, float] | None,
+          regulate: Regulate) -> tuple[Array, Array]:
+    """Lumps and currents of the steady state with everything at the base."""
+    if regulate:
+        held = reachable(law, base, inputs=inputs, regulate=regulate)
+        held.require()
+        return np.array(list(held.temperatures.values())), np.array(list(held.current.values()))
     found = steady_state(system, dict(inputs or {}), setpoint=dict.fromkeys(law.names, base))
     stable = [e for e in found.equilibria if e.stable]
     if not stable:
         raise InputError(f"cold faces at {base:g} K cannot be held", where="argument base", expected="a temperature in "
                          "the range that rt.design.reachable gives", remedy=found.outcome.text)
-    return stable[0]
+    return np.array(list(stable[0].temperatures.values())), np.array([stable[0].currents[name] for name in law.names])

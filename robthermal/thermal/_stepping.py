@@ -97,6 +97,11 @@ class Stepper:
                 raise InputError(f"sensor {name!r} has a delay of {sensor.delay:g} s", where="argument system",
                                  expected="sensors without pure delay when stepping",
                                  remedy="Describe it by a time constant.")
+        return self.undelayed
+
+    @property
+    def undelayed(self) -> Array:
+        """Noise-free readings of all sensors now, as if none had a pure delay [K]."""
         source = self.state[source_states(self._eq)]
         gain = np.array([s.gain for s in self.system.sensors.values()])
         offset = np.array([s.offset for s in self.system.sensors.values()])

@@ -1,9 +1,14 @@
-"""The two-module setup, its law, cold side and a controller."""
+"""The two-module setup, its law, cold side and a controller; tests may import this folder's own machine."""
+
+import sys
+from pathlib import Path
 
 import module_systems
 import pytest
 
 import robthermal as rt
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(scope="session")

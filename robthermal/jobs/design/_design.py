@@ -15,6 +15,7 @@ from ...design import (
     FeedbackLinearization,
     GainObserver,
     Reachable,
+    RegulatedPoint,
     cold_side,
     collapse,
     feedback_linearization,
@@ -28,7 +29,16 @@ from ...thermal import System
 from ...verification import Certificate, verify
 from ..claims import Certification, Checked
 from ..request import Boxes
-from ._limits import Pairs, ambient_ends, candidates, certified_limits, check_given, contain, worst_runaway
+from ._limits import (
+    Pairs,
+    ambient_ends,
+    candidates,
+    certified_limits,
+    check_given,
+    coldest_faces,
+    contain,
+    worst_runaway,
+)
 from ._request import DesignRequest, celsius
 
 _LONG = 12.0  # simulated time in units of 1/bandwidth
@@ -54,7 +64,7 @@ class ControllerDesign:
     observer : GainObserver or None
         None without sensors.
     reach : Reachable
-        How far the cold faces can be brought within the limits.
+        How far the cold faces, or what is regulated instead, can be brought within the limits.
     loop : ClosedLoop
         Simulated step from rest to the set-points, with the observer and its sensors' noise.
     collapse : Collapse or None
@@ -69,6 +79,11 @@ class ControllerDesign:
     reach: Reachable
     loop: ClosedLoop
     collapse: Collapse | None
+
+    @property
+    def points(self) -> dict[str, RegulatedPoint]:
+        """What every module regulates."""
+        return self.request.points(self.law.system)
 
     @property
     def holds(self) -> bool:
@@ -121,7 +136,8 @@ def design_system(system: System, request: DesignRequest,
     request.check(system)
     progress("asking whether the set-points can be held")
     free = feedback_linearization(system, current_limits=_asked(system, request))  # refusals before the long work
-    controller = pid(cold_side(free), bandwidth=request.bandwidth, sample_time=request.sample_time)
+    plant = cold_side(free, regulate=request.regulate)
+    controller = pid(plant, bandwidth=request.bandwidth, sample_time=request.sample_time)
     kalman = _kalman(system, request)
     possible = _reach(free, request)
     if not possible.outcome:
@@ -153,12 +169,13 @@ def design_system(system: System, request: DesignRequest,
     progress("verifying every certificate")
     checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
                     for key, title, cert, required in found)
-    boxes = Boxes(request.temperature, request.ambient, pairs, None, request.setpoint, request.method)
+    boxes = Boxes(request.temperature, request.ambient, pairs, None, coldest_faces(system, request),
+                  request.method)
     certification = Certification(system, boxes, checked, certified, fold, safe)
     progress("simulating the step to the set-points")
     target = [request.setpoint[name] for name in law.names]
     loop = simulate_loop(system, controller, target, law=law, duration=2 * _LONG / request.bandwidth, observer=watcher,
-                         noise_seed=0 if watcher else None)
+                         noise_seed=0 if watcher else None, regulate=request.regulate)
     progress("comparing steps with and without the law")
     return ControllerDesign(request, certification, law, controller, watcher, reach, loop,
                             _collapse(law, controller, request, reach))
@@ -173,7 +190,7 @@ def _asked(system: System, request: DesignRequest) -> Pairs:
 
 def _reach(law: FeedbackLinearization, request: DesignRequest) -> Reachable:
     """Whether the set-points are held, at the worst end of the ambient ranges."""
-    found = [reachable(law, request.setpoint, inputs=at) for at in ambient_ends(request)]
+    found = [reachable(law, request.setpoint, inputs=at, regulate=request.regulate) for at in ambient_ends(request)]
     return next((r for r in found if not r.outcome), found[0])
 
 
@@ -229,12 +246,12 @@ def _collapse(law: FeedbackLinearization, controller: PID, request: DesignReques
     passive, target = (float(np.mean(list(part.values()))) for part in (reach.passive, reach.setpoint))
     base, size = 0.5 * (passive + target), min(0.5 * abs(target - passive), _LARGEST_STEP)
     done = None
-    if size < _SMALLEST_STEP or not reachable(law, base).outcome:
+    if size < _SMALLEST_STEP or not reachable(law, base, regulate=request.regulate).outcome:
         return None
     for _ in range(_TRIES):
         steps = (-size, -0.5 * size, 0.5 * size, size)
         done = collapse(law.system, controller, law=law, base=base, steps=steps,
-                        duration=_LONG / request.bandwidth)
+                        duration=_LONG / request.bandwidth, regulate=request.regulate)
         if done.outcome:
             return done
         size /= 2

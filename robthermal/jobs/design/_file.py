@@ -18,9 +18,10 @@ _LAW = ("T = (x_hot + x_cold)/2 - reference_temperature, S = seebeck.value + see
         "q = v - K (x_hot - x_cold); a = S x_cold/R; s = max(2 q/R, -a^2); I = -s/(a + sqrt(a^2 + s)); "
         "clip I to current_limits; v_achieved = K (x_hot - x_cold) + R I^2/2 - S x_cold I. "
         "Positive I cools the cold face. Temperatures in kelvin: measured, or the observer's estimate.")
-_PI = ("v = proportional (r - x_cold) + z, then the law gives I and v_achieved, then "
-       "z <- z + sample_time integral (r - x_cold) + (1 - exp(-sample_time/tracking_time)) (v_achieved - v). "
-       "Start with z = v_achieved of the current that flows.")
+_PI = ("v = proportional (r - y) + z, then the law gives I and v_achieved, then "
+       "z <- z + sample_time integral (r - y) + (1 - exp(-sample_time/tracking_time)) (v_achieved - v). "
+       "Start with z = v_achieved of the current that flows. y is what the module regulates: the reading of a sensor "
+       "at this sample as it is, or the temperature of a lump, measured or the observer's estimate.")
 _OBSERVER = ("x <- A_d x + Gamma f + L (y - C x); y = reference + (reading - offset - reference)/gain; C x is x at the "
              "sensors' lumps; f = B w + modules + nonlinear links, w: heaters, then ambients. A module adds S x_hot I "
              "+ R I^2/2 - (K - conductance.value)(x_hot - x_cold) to its hot lump and -S x_cold I + R I^2/2 + "
@@ -77,8 +78,12 @@ def _properties(part: Module) -> dict[str, Any]:
 
 
 def _gains(result: ControllerDesign, i: int) -> dict[str, Any]:
-    c = result.controller
-    return {"proportional": {"value": float(c.proportional[i]), "unit": "W/K"},
+    c, point = result.controller, list(result.points.values())[i]
+    return {"regulates": {"kind": point.kind, "name": point.name, "lump": point.lump, "gain": point.gain,
+                          **{key: {"value": value, "unit": unit} for key, value, unit in (
+                              ("offset", point.offset, "K"), ("time_constant", point.time_constant, "s"),
+                              ("delay", point.delay, "s"))}},
+            "proportional": {"value": float(c.proportional[i]), "unit": "W/K"},
             "integral": {"value": float(c.integral[i]), "unit": "W/(K s)"},
             "tracking_time": {"value": float(c.tracking_time[i]), "unit": "s"}}
 

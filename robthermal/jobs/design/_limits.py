@@ -17,6 +17,7 @@ from ...certify import (
     runaway_free,
     usable_current,
 )
+from ...design import feedback_linearization, reachable
 from ...errors import InputError
 from ...thermal import System
 from ..request import Method
@@ -29,8 +30,22 @@ _FINE = 0.01  # of a range
 
 def worst_runaway(system: System, request: DesignRequest) -> Runaway:
     """Runaway limit at the end of the ambient ranges where it is smallest."""
-    found = [runaway(system, setpoint=request.setpoint, ambient=at) for at in ambient_ends(request)]
+    found = [runaway(system, setpoint=cold_faces(system, request, at), ambient=at) for at in ambient_ends(request)]
     return min(found, key=lambda limit: min(limit.current.values()))
+
+
+def cold_faces(system: System, request: DesignRequest, ambient: Mapping[str, float]) -> dict[str, float]:
+    """Temperatures of the cold faces while the set-points are held in these ambients [K]."""
+    if not request.regulate:
+        return request.setpoint
+    free = feedback_linearization(system)
+    return reachable(free, request.setpoint, inputs=ambient, regulate=request.regulate).faces
+
+
+def coldest_faces(system: System, request: DesignRequest) -> dict[str, float]:
+    """The same at the end of the ambient ranges where they are coldest [K]."""
+    found = [cold_faces(system, request, at) for at in ambient_ends(request)]
+    return {name: min(faces[name] for faces in found) for name in request.setpoint}
 
 
 def ambient_ends(request: DesignRequest) -> list[dict[str, float]]:
@@ -80,7 +95,7 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
     given = {**dict.fromkeys(system.modules, (0.0, 0.0)), **(request.current or {})}
     if request.current and not _contained(system, request, given):
         usable = usable_current(system, temperature=request.temperature, ambient=request.ambient,
-                                setpoint=request.setpoint, lower="reported", method=_fast(request))
+                                setpoint=coldest_faces(system, request), lower="reported", method=_fast(request))
         name, (low, high) = max(request.current.items(), key=lambda item: max(-item[1][0], item[1][1]))
         raise InputError("with these currents no box below the upper end of the temperature box is proven never to be "
                          "left", where=f"--current {name}={low:g}:{high:g}",

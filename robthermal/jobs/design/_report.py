@@ -144,11 +144,11 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
 
 def _controller_section(result: ControllerDesign) -> Section:
     c, law, fold = result.controller, result.law, result.certification.runaway
-    rows = [{"module": name, "set-point [°C]": result.request.setpoint[name] - ZERO_CELSIUS,
+    rows = [{"module": name, "regulates": point.name, "set-point [°C]": result.request.setpoint[name] - ZERO_CELSIUS,
              "lower limit [A]": law.current_low[i], "upper limit [A]": law.current_high[i],
              "needed [A]": result.reach.current[name], "I* [A]": fold.current[name] if fold else float("nan"),
              "Kp [W/K]": c.proportional[i], "Ki [W/(K s)]": c.integral[i]}
-            for i, name in enumerate(law.names)]
+            for i, (name, point) in enumerate(result.points.items())]
     own = " The limits are those that were asked for." if result.request.current else (
         f" The upper limits are the usable ones: the smallest of {BELOW_FOLD:g} I*, the contraction limit, the file's "
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
@@ -166,9 +166,9 @@ def _step_section(result: ControllerDesign) -> Section:
         axes[0].set_title("")
         for limit in {*result.law.current_low, *result.law.current_high}:
             axes[1].axhline(limit, color="#888888", linestyle=":", linewidth=0.8)
-        figure = Figure.draw(axes[0].figure, alt="Cold faces and currents over time after a step to the set-points.",
-                             caption="Above: cold faces (lines) and set-points (dashed). Below: currents and their "
-                             "limits (dotted).")
+        figure = Figure.draw(axes[0].figure, alt="Temperatures and currents over time after a step to the set-points.",
+                             caption="Above: what is regulated (lines), set-points (dashed), and cold faces where "
+                             "something else is regulated (dotted). Below: currents and their limits (dotted).")
     seen = "estimated from noisy readings" if result.observer else "taken as measured: the file has no sensors"
     text = (f"Simulated from rest at ambient temperature on the nonlinear model; the temperatures are {seen}. "
             f"{result.loop.outcome.text}")

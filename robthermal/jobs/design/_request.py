@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..._celsius import ZERO_CELSIUS
+from ...design import RegulatedPoint, feedback_linearization, regulated_points
 from ...errors import InputError
 from ...thermal import System
 from ..request import Method, boxes_from_text
@@ -20,7 +21,7 @@ class DesignRequest:
     Parameters
     ----------
     setpoint : dict
-        Module to temperature of its cold face [K]; every module.
+        Module to temperature of its cold face, or of what it regulates instead [K]; every module.
     current : dict
         Module to (lower, upper) [A]; modules that are left out get the largest range that is certified.
     ambient : dict
@@ -35,6 +36,9 @@ class DesignRequest:
         What the observer reads; empty for no observer.
     method : str
         Norm of the contraction: "energy", "sum", "max", "lyapunov".
+    regulate : dict
+        Module to the sensor or lump that it regulates; modules that are left out regulate their cold face. With a
+        lag, offset or distance to the module these are part of the loop.
 
     Examples
     --------
@@ -52,6 +56,17 @@ class DesignRequest:
     sample_time: float = 1.0
     sensors: tuple[str, ...] = ()
     method: Method = "energy"
+    regulate: dict[str, str] | None = None
+
+    def points(self, system: System) -> dict[str, RegulatedPoint]:
+        """What every module regulates.
+
+        Parameters
+        ----------
+        system : System
+            To be controlled.
+        """
+        return {point.module: point for point in regulated_points(feedback_linearization(system), self.regulate)}
 
     def check(self, system: System) -> None:
         """Refuse what does not fit a system.
@@ -88,8 +103,9 @@ class DesignRequest:
                 raise InputError("the range is beyond the current_limits of the system file", where=where,
                                  expected=f"within {declared[0]:g}:{declared[1]:g}")
         low, high = self.temperature
+        points = self.points(system)
         for name, value in self.setpoint.items():
-            if not low <= value <= high:
+            if not low <= points[name].temperature(value) <= high:
                 raise InputError(f"{name} at {celsius(value)} is outside of the box {celsius(low)} to {celsius(high)}",
                                  where="--setpoint", expected="a set-point inside it",
                                  remedy="Widen the box with --temperature, or move the set-point.")
@@ -102,7 +118,7 @@ class DesignRequest:
 def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: Sequence[str] = (),
                      ambient: Sequence[str] = (), temperature: tuple[float, float] | None = None,
                      bandwidth: float = 0.02, sample_time: float = 1.0, sensors: str | None = None,
-                     method: str = "energy") -> DesignRequest:
+                     method: str = "energy", regulate: Sequence[str] = ()) -> DesignRequest:
     """Request from command-line values.
 
     Parameters
@@ -121,6 +137,8 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
         Names, separated by commas; default the first sensor on every lump that does not lag.
     method : str
         "energy", "sum", "max" or "lyapunov".
+    regulate : sequence of str
+        ``MODULE=NAME`` of a sensor or lump; default the cold face of every module.
 
     Returns
     -------
@@ -144,9 +162,20 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
     targets = boxes.setpoint or dict.fromkeys(system.modules, boxes.temperature[0])
     limits = {name: pair for name, pair in (boxes.current or {}).items() if name in named}
     request = DesignRequest(targets, limits, boxes.ambient, boxes.temperature, bandwidth, sample_time,
-                            _sensors(system, sensors, sample_time), boxes.method)
+                            _sensors(system, sensors, sample_time), boxes.method, _regulate(regulate))
     request.check(system)
     return request
+
+
+def _regulate(texts: Sequence[str]) -> dict[str, str] | None:
+    found = {}
+    for text in texts:
+        module, equals, name = text.partition("=")
+        if not (module and equals and name) or module in found:
+            raise InputError(f"{text!r}", where="--regulate", expected="MODULE=NAME, every module at most once, for "
+                             "example m1=T_stage")
+        found[module] = name
+    return found or None
 
 
 def _sensors(system: System, text: str | None, sample_time: float) -> tuple[str, ...]:
