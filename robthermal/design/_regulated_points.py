@@ -102,6 +102,13 @@ def regulated_points(law: FeedbackLinearization, regulate: Regulate = None) -> t
     ------
     InputError
         Unknown modules, sensors or lumps; a name that is a lump, and a sensor on another one; a sensor of gain 0.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> law = rt.design.feedback_linearization(rt.systems.two_module())
+    >>> [point.lump for point in rt.design.regulated_points(law, {"m1": "T15"})]
+    ['x15', 'x12']
     """
     given = dict(regulate or {})
     for module in given:

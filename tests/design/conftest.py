@@ -1,14 +1,9 @@
-"""The two-module setup, its law, cold side and a controller; tests may import this folder's own machine."""
-
-import sys
-from pathlib import Path
+"""The two-module setup, its law, cold side and a controller."""
 
 import module_systems
 import pytest
 
 import robthermal as rt
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,7 @@
 import control
 import numpy as np
 import pytest
-from distant import GAIN, JOINT, LAG, LEAK, OFFSET, PLATE, PLATE_LEAK, ROOM, STAGE, held, loop, machine
+from distant_plate import GAIN, JOINT, LAG, LEAK, OFFSET, PLATE, PLATE_LEAK, ROOM, STAGE, held, loop, machine
 
 import robthermal as rt
 
@@ -120,7 +120,7 @@ def test_an_unreachable_reading_is_refused_with_the_range(law):
     """Beyond the coldest steady plate, from a scan of the plain machine over the current."""
     answer = rt.design.reachable(law, 240.0, regulate=REGULATE)
     assert answer.outcome.code == "unreachable"
-    from distant import rates
+    from distant_plate import rates
     from scipy.optimize import root
     coldest, x = ROOM, np.full(4, ROOM)
     for current in np.linspace(0.0, 3.0, 301):
