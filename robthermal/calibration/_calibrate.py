@@ -32,6 +32,7 @@ from ..fitting import (
     refuse_short,
     scaled,
     scipy_loss,
+    smallest_noise,
 )
 from ..identify import FrequencyResponse
 from ..signals import Record
@@ -93,8 +94,8 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
     loss : {"linear", "soft_l1", "huber"}
         The last two resist glitches: beyond 1.345 standard deviations a residual counts linearly.
     noise : mapping or float, optional
-        Standard deviation of the sensors [K]. Default: as declared in the system, but not below step/√12 of a quantized
-        reading; where the declaration is 0 it is estimated from the residuals.
+        Standard deviation of the sensors [K; V of a voltage]. Default: as declared in the system, but not below
+        step/√12 of a quantized reading; where the declaration is 0 it is estimated from the residuals.
     max_iterations : int
         Limit of the optimizer's steps.
     method : {"output_error", "prediction_error"}
@@ -203,7 +204,8 @@ def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict
     except Diverged as error:
         raise InputError(f"the model runs away at the starting values: {error}", where="argument system",
                          remedy="Start closer to the truth: system.with_parameters({...}).") from None
-    return {name: estimated_noise(problem.data, residuals, name, loss) for name in unknown}
+    return {name: estimated_noise(problem.data, residuals, name, loss, smallest_noise(problem.system, name))
+            for name in unknown}
 
 
 def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: Start, loss: Loss) -> Fit:

@@ -186,9 +186,7 @@ def unobservable(system: System, sensors: Sequence[str]) -> tuple[str, ...]:
     """
     check_system(system)
     for name in _names(sensors):
-        if name not in system.sensors:
-            raise InputError(f"there is no sensor {name!r}", where="argument sensors",
-                             expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
+        system.thermometer(name, "argument sensors")
     eq = Equations(system)
     warm = np.full(len(system.lumps), next(iter(system.ambients.values())).temperature)
     root = np.sqrt(eq.capacity)

@@ -117,12 +117,10 @@ def place_sensors(system: System, *, current: Mapping[str, Interval], temperatur
     (1, True)
     """
     check_system(system)
-    quick = (name for name, sensor in system.sensors.items() if sensor.time_constant + sensor.delay <= sample_time)
+    quick = (name for name, sensor in system.thermometers.items() if sensor.time_constant + sensor.delay <= sample_time)
     names = tuple(dict.fromkeys([*keep, *(quick if candidates is None else candidates)]))
     for name in names:
-        if name not in system.sensors:
-            raise InputError(f"there is no sensor {name!r}", where="argument candidates",
-                             expected="some of " + (", ".join(system.sensors) or "none: the system has no sensors"))
+        system.thermometer(name, "argument candidates")
     least = max(len(set(keep)), 1)
     if not isinstance(largest, int) or not least <= largest <= len(names):
         raise InputError(f"largest = {largest!r}", where="argument largest", expected=f"{least} to {len(names)}")

@@ -89,7 +89,7 @@ def check_polarity(system: System, record: Record) -> Polarity:
     """
     check_system(system)
     expect(record, Record, "record", "rt.read_record")
-    sensors = [name for name in system.sensors if name in record.output_names]
+    sensors = [name for name in system.thermometers if name in record.output_names]
     driven = [name for name in system.modules if name in record.input_names and np.ptp(record[name]) > 0]
     if not sensors or not driven:
         raise InputError("no sensor of the system" if not sensors else "no module current that changes",

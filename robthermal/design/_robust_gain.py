@@ -148,7 +148,7 @@ def helpful_sensors(model: ObserverModel, found: list[Block], factor: float) -> 
     """Further sensors of the system each of which, added alone, lets the error decay; the most helpful first."""
     system = model.system
     taken = {system.sensors[name].lump for name in model.sensors}
-    quick = [name for name, sensor in system.sensors.items()
+    quick = [name for name, sensor in system.thermometers.items()
              if sensor.lump not in taken and sensor.time_constant + sensor.delay <= model.sample_time]
     margin = {name: find_norm(ObserverModel.of(system, [*model.sensors, name], model.sample_time), found, factor).margin
               for name in quick}

@@ -10,7 +10,6 @@ from ._data import refuse_short as refuse_short
 from ._free_run import FreeRun as FreeRun
 from ._free_run import free_run as free_run
 from ._noise import LOSSES as LOSSES
-from ._noise import SMALLEST as SMALLEST
 from ._noise import Loss as Loss
 from ._noise import declared_noise as declared_noise
 from ._noise import estimated_noise as estimated_noise
@@ -18,6 +17,7 @@ from ._noise import quantum as quantum
 from ._noise import scipy_loss as scipy_loss
 from ._noise import score as score
 from ._noise import score_slope as score_slope
+from ._noise import smallest_noise as smallest_noise
 from ._operating_point import OperatingPoint as OperatingPoint
 from ._problem import Problem as Problem
 from ._problem import Weigh as Weigh

@@ -27,7 +27,7 @@ class Data:
     columns : ndarray of int
         Their places in `System.sensor_names`.
     readings : ndarray, shape (n, n_sensors)
-        What they read [K].
+        What they read [K, or V].
     missing : ndarray of bool, shape (n, n_sensors), optional
         Readings that count for nothing.
     """
@@ -61,7 +61,7 @@ def _one(system: System, record: Record, where: str) -> Data:
                          expected="one of " + (", ".join(system.sensor_names) or "(the system has no sensor)"),
                          remedy="Name the output columns like the sensors of the system.")
     readings = np.column_stack([record[name] for name in sensors])
-    low = readings.min(axis=0)
+    low = np.where([system.sensors[name].quantity == "temperature" for name in sensors], readings.min(axis=0), np.inf)
     if low.min() < 150.0:
         raise InputError(f"sensor {sensors[int(low.argmin())]!r} reads {low.min():.6g} K", where=f"argument {where}",
                          expected="kelvin inside a Record", remedy="Add 273.15, or read the file with its unit.")

@@ -15,6 +15,7 @@ from ._problem import Problem, scaled
 from ._ranges import NONE
 from ._start import Start, initial_of
 
+_UNKNOWN = {"K": 1.0, "V": 0.05}  # noise nobody declared, of a first guess
 _HEAD = 0.1  # part of a validation record that may be used for its initial temperatures
 
 
@@ -29,7 +30,7 @@ class FreeRun:
     initial_temperatures : ndarray, shape (n_lumps,)
         Where the model started [K].
     residual : ndarray, shape (n, n_sensors)
-        Measured − modelled of every sensor [K].
+        Measured − modelled of every sensor [K, or V].
     """
 
     one: Data
@@ -38,12 +39,12 @@ class FreeRun:
 
     @property
     def modelled(self) -> Floats:
-        """What the model reads, (n, n_sensors) [K]."""
+        """What the model reads, (n, n_sensors) [K, or V]."""
         return self.one.readings - self.residual
 
     @property
     def by_sensor(self) -> dict[str, Floats]:
-        """Residual (n,) of every sensor [K]."""
+        """Residual (n,) of every sensor [K, or V]."""
         return {name: self.residual[:, i] for i, name in enumerate(self.one.sensors)}
 
 
@@ -61,7 +62,7 @@ def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]
     start : {"free", "measured", "system"}
         Initial lump temperatures, as in `calibrate`.
     noise : mapping
-        Standard deviation of the sensors [K], weights of the first tenth; 1 K where it is unknown or 0.
+        Standard deviation of the sensors [K], weights of the first tenth; 1 K or 0.05 V where it is unknown or 0.
     """
     initial = initial_of(system, one, start)
     whole = Problem(system, [one], NONE, [initial])
@@ -69,7 +70,7 @@ def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]
     if initial.n_free:
         n_head = max(2, round(_HEAD * len(one.readings)))
         head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head])
-        weights = scaled(np.array([noise.get(name) or 1.0 for name in one.sensors]))
+        weights = scaled(np.array([noise.get(name) or _UNKNOWN[system.sensors[name].unit] for name in one.sensors]))
         problem = Problem(system, [head], NONE, [initial], [weights])
         v = least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds, x_scale="jac").x
     return FreeRun(one, whole.temperatures(v)[0], whole.residuals(v)[0])

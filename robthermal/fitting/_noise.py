@@ -1,4 +1,4 @@
-"""Weights and losses: what a residual of one kelvin is worth."""
+"""Weights and losses: what a residual of one kelvin, or one volt, is worth."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ._data import Data
 
 Loss = Literal["linear", "soft_l1", "huber"]
 LOSSES = ("linear", "soft_l1", "huber")
-SMALLEST = 1e-4  # K: the simulation's own truncation; nothing is known better
+_SMALLEST = {"K": 1e-4, "V": 1e-6}  # the simulation's own truncation (of modules of 10 mV/K): nothing is known better
 _TUNING = 1.345  # Huber (1964): 95 % efficient for Gaussian noise
 
 
 def declared_noise(system: System, data: list[Data], noise: Mapping[str, float] | float | None) -> dict[str, float]:
-    """Standard deviation of every sensor in the data [K]; 0 where it has to be estimated."""
+    """Standard deviation of every sensor in the data [K or V]; 0 where it has to be estimated."""
     used = [name for name in system.sensor_names if any(name in one.sensors for one in data)]
     given = _given(used, noise)
     out = {}
     for name in used:
         out[name] = given.get(name, system.sensors[name].noise)
         if name not in given and out[name]:
-            out[name] = max(out[name], floor(data, name))
+            out[name] = max(out[name], floor(data, name, smallest_noise(system, name)))
     return out
 
 
@@ -41,31 +41,36 @@ def _given(used: list[str], noise: Mapping[str, float] | float | None) -> dict[s
                              expected="one of " + ", ".join(used))
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0:
             raise InputError(f"the noise of {name!r} is {value!r}", where="argument noise",
-                             expected="a positive standard deviation [K]",
+                             expected="a positive standard deviation [K, or V of a voltage]",
                              remedy="Leave it out to have it estimated from the residuals.")
     return given
 
 
 def quantum(readings: Floats) -> float:
-    """Step of a quantized reading [K], 0 if it is not quantized."""
+    """Step of a quantized reading [K or V], 0 if it is not quantized."""
     levels = np.unique(np.round(readings, 9))
     if levels.size < 2 or 4 * levels.size > readings.size:
         return 0.0
     return float(np.median(np.diff(levels)))
 
 
-def floor(data: list[Data], name: str) -> float:
-    """Least credible noise of a sensor [K]: rounding to steps q is an error of q/√12."""
+def smallest_noise(system: System, name: str) -> float:
+    """Below this, the simulation's own error is larger than the noise of a sensor [K or V]."""
+    return _SMALLEST[system.sensors[name].unit]
+
+
+def floor(data: list[Data], name: str, smallest: float) -> float:
+    """Least credible noise of a sensor [K or V]: rounding to steps q is an error of q/√12."""
     steps = [quantum(one.readings[:, one.sensors.index(name)]) for one in data if name in one.sensors]
-    return max(max(steps) / math.sqrt(12.0), SMALLEST)
+    return max(max(steps) / math.sqrt(12.0), smallest)
 
 
-def estimated_noise(data: list[Data], residuals: list[Floats], name: str, loss: Loss) -> float:
-    """Noise of a sensor from its residuals [K]: root mean square, or its robust equivalent under a robust loss."""
+def estimated_noise(data: list[Data], residuals: list[Floats], name: str, loss: Loss, smallest: float) -> float:
+    """Noise of a sensor from its residuals [K or V]: root mean square, or its robust equivalent under a robust loss."""
     own = [r[:, one.sensors.index(name)] for one, r in zip(data, residuals, strict=True) if name in one.sensors]
     e = np.concatenate(own)
     scale = math.sqrt(float(np.mean(e**2))) if loss == "linear" else 1.4826 * float(np.median(np.abs(e)))
-    return max(scale, floor(data, name))
+    return max(scale, floor(data, name, smallest))
 
 
 def score(e: Floats, loss: Loss) -> Floats:

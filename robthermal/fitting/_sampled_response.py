@@ -17,7 +17,8 @@ def sampled_response(system: System, frequencies: Floats, sample_time: float, op
     """Response (n_f, n_y, n_u) of the linearization, inputs held over each sample, delays included.
 
     With x(k+1) = Φ x(k) + Γ u(k), a delay of d samples and f seconds reads y(k) = C x(t_(k-d) - f): the state between
-    samples, Φ(h-f) x(k-d-1) + Γ(h-f) u(k-d-1). A factor e^(-iωf) would be that of an input that is not held.
+    samples, Φ(h-f) x(k-d-1) + Γ(h-f) u(k-d-1). A voltage follows the current of its
+    own sample: D u(k-d), or D u(k-d-1) with a fraction. A factor e^(-iωf) would be that of an input that is not held.
     """
     whole, parts = np.divmod(_delays(system, outputs, inputs) + _ROUNDING * sample_time, sample_time)
     parts = np.where(parts > 2 * _ROUNDING * sample_time, parts, 0.0)
@@ -27,6 +28,7 @@ def sampled_response(system: System, frequencies: Floats, sample_time: float, op
     plant = plants[0.0]
     C = np.asarray(plant.C)[[plant.output_labels.index(name) for name in outputs]]
     columns = [plant.input_labels.index(name) for name in inputs]
+    D = np.asarray(plant.D)[[plant.output_labels.index(name) for name in outputs]][:, columns]
     held = {part: (np.asarray(one.A), np.asarray(one.B)[:, columns]) for part, one in plants.items()}
     step, push = held[0.0]
     out = np.empty((frequencies.size, len(outputs), len(inputs)), np.complex128)
@@ -35,7 +37,7 @@ def sampled_response(system: System, frequencies: Floats, sample_time: float, op
         x = np.linalg.solve(z * np.eye(len(step)) - step, push.astype(complex))
         for part, (phi, gamma) in held.items():
             own = parts == part
-            y = C @ x if part == 0.0 else C @ (phi @ x + gamma) / z
+            y = C @ x + D if part == 0.0 else (C @ (phi @ x + gamma) + D) / z
             out[first:first + _CHUNK][:, own] = (y * z**-whole)[:, own]
     return out
 

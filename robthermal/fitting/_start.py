@@ -48,7 +48,8 @@ def initial_of(system: System, one: Data, start: Start) -> Initial:
     mean = first_temperatures(system if start == "system" else _without_initial(system), one)
     if start != "free":
         return Initial(mean, 0.0)
-    return Initial(mean, max(SIGMA, float(np.ptp(one.readings[0]))))
+    warm = [T for name, T in zip(one.sensors, one.readings[0], strict=True) if name in system.thermometers]
+    return Initial(mean, max(SIGMA, float(np.ptp(warm)) if warm else 0.0))
 
 
 def first_temperatures(system: System, one: Data) -> Floats:

@@ -23,7 +23,7 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
 
     A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
     deviations (from the median absolute deviation), by more than 4 quantization steps, and by more than 6 times the
-    spread of its neighbors: a real swing moves them too.
+    spread of its neighbors: a real swing moves them too. Voltages (unit "V") jump with their current and are left out.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
     {'T1': array([20])}
     """
     _require_record(record)
-    found = {name: glitch_rows(record[name]) for name in record.output_names}
+    found = {name: glitch_rows(record[name]) for name in record.output_names if record.units.get(name) != "V"}
     return {name: rows for name, rows in found.items() if rows.size}
 
 
@@ -55,7 +55,7 @@ def median_filter(record: Record, window: float) -> Record:
     Parameters
     ----------
     record : Record
-        Its inputs stay as they are.
+        Its inputs stay as they are, and its voltages (unit "V"), which jump with their current.
     window : float
         Width [s]; the median is over all samples within half of it. At the ends the first and last sample are repeated.
 
@@ -82,7 +82,8 @@ def median_filter(record: Record, window: float) -> Record:
     samples = window_samples(window, record.sample_time, record.n_samples, "window")
     outputs = np.empty_like(record.outputs)
     for i in range(outputs.shape[1]):
-        outputs[:, i] = filtered(record.outputs[:, i], samples)
+        keep = record.units.get(record.output_names[i]) == "V"
+        outputs[:, i] = record.outputs[:, i] if keep else filtered(record.outputs[:, i], samples)
     return record._changed(outputs=outputs, notes=(*record.notes, filter_note(window, samples)))
 
 

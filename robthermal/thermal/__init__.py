@@ -55,6 +55,7 @@ from ._steady import SteadyState as SteadyState
 from ._steady import steady_state as steady_state
 from ._stepping import Stepper as Stepper
 from ._system import System as System
+from ._voltage import voltage_slopes as voltage_slopes
 from .effects import AddedEffect as AddedEffect
 from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Effect`
 from .effects import add_effect as add_effect
@@ -67,4 +68,5 @@ __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "Dat
            "System", "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
            "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
            "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
-           "steady_state", "system_from_matrices", "time_constants", "trajectory", "write_modelica", "write_system"]
+           "steady_state", "system_from_matrices", "time_constants", "trajectory",
+           "voltage_slopes", "write_modelica", "write_system"]

@@ -146,7 +146,7 @@ def _measured(eq: Equations, record: Record) -> dict[str, float]:
     """First reading of every sensor in the record, as temperature of its lump."""
     reference = eq.nominal()[len(eq.system.inputs) + len(eq.system.modules)]
     readings: dict[str, float] = {}
-    for name, sensor in eq.system.sensors.items():
+    for name, sensor in eq.system.thermometers.items():
         if name in record.output_names:
             readings.setdefault(sensor.lump, reference + (record[name][0] - sensor.offset - reference) / sensor.gain)
     return readings

@@ -19,6 +19,7 @@ from ._sensors import source_states
 from ._steady import exogenous_point
 from ._system import System, equations
 from ._terms import Array
+from ._voltage import voltages
 
 
 def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
@@ -40,8 +41,9 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     -------
     control.StateSpace
         Deviations from the operating point; inputs, states and outputs carry the names of the system (a lagged sensor
-        or drive adds a state "NAME_lag"; without sensors the outputs are all lumps). Delays are not part of a state
-        space; a hysteresis, a periodic load and a conductance step are taken as in `Equations.heat`.
+        or drive adds a state "NAME_lag"; the voltage of a module has a feedthrough, its resistance; without sensors the
+        outputs are all lumps). Delays are not part of a state space; a hysteresis, a periodic load and a conductance
+        step are taken as in `Equations.heat`.
 
     Raises
     ------
@@ -66,10 +68,10 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
         both[:len(A)] = np.hstack([A, B]) * sample_time
         exact = expm(both)[:len(A)]
         A, B = exact[:, :len(A)], exact[:, len(A):]
-    C, outputs = _outputs(eq, len(A))
+    C, D, outputs = _outputs(eq, len(A), x, u)
     drives = [system.exogenous_names[column] for column in Layout(eq).drives]
     states = [*system.lump_names, *(f"{name}_lag" for name in (*Layout(eq).sensors, *drives))]
-    return control.ss(A, B, C, np.zeros((len(C), B.shape[1])), dt=sample_time, name=system.name,
+    return control.ss(A, B, C, D, dt=sample_time, name=system.name,
                       inputs=list(system.exogenous_names), outputs=outputs, states=states)
 
 
@@ -135,11 +137,20 @@ def _matrices(eq: Equations, x: Array, u: Array) -> tuple[Array, Array]:
     return A, B
 
 
-def _outputs(eq: Equations, n_states: int) -> tuple[Array, list[str]]:
-    sensors = eq.system.sensors
+def _outputs(eq: Equations, n_states: int, x: Array, u: Array) -> tuple[Array, Array, list[str]]:
+    """C and D: a thermometer reads a state, a voltage the faces of its module and the current."""
+    sensors, layout, volts, sources = eq.system.sensors, Layout(eq), voltages(eq), source_states(eq)
     if not sensors:
-        return np.eye(len(eq.capacity), n_states), list(eq.system.lump_names)
-    C = np.zeros((len(sensors), n_states))
-    for row, (state, sensor) in enumerate(zip(source_states(eq), sensors.values(), strict=True)):
-        C[row, state] = sensor.gain
-    return C, list(sensors)
+        return np.eye(len(eq.capacity), n_states), np.zeros((len(eq.capacity), u.size)), list(eq.system.lump_names)
+    C, D = np.zeros((len(sensors), n_states)), np.zeros((len(sensors), u.size))
+    per_column, w = eq.drives.slopes(u), eq.drives(u)
+    for row, (name, sensor) in enumerate(sensors.items()):
+        if name not in volts:
+            C[row, sources[name]] = sensor.gain
+            continue
+        volt = volts[name]
+        C[row, volt.hot], C[row, volt.cold], per_ampere = sensor.gain * np.array(volt.slopes(x, w[volt.column]))
+        lagged = layout.drives.get(volt.column)
+        at = (C, lagged) if lagged is not None else (D, volt.column)
+        at[0][row, at[1]] = per_ampere * per_column[volt.column]
+    return C, D, list(sensors)

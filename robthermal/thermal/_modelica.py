@@ -69,7 +69,7 @@ def format_modelica(system: System, name: str = "") -> str:
     for link in system.links:
         _link(system, text, link, heats)
     for module, part in system.modules.items():
-        _module(text, module, part, heats)
+        _module(system, text, module, part, heats)
     for lead in system.leads:
         resistance = text.parameter(f"R_{lead.name}", lead.resistance, "Ohm")
         heats[lead.lump].append(f"+ {resistance} * {_driven(text, lead.module)}^2")
@@ -91,7 +91,7 @@ def _columns(system: System, text: Text) -> None:
     for ambient in system.ambients:
         text.column("input", ambient, "K", f"ambient {ambient}")
     for sensor in system.sensors:
-        text.column("output", sensor, "K", f"reading of sensor {sensor}")
+        text.column("output", sensor, system.sensors[sensor].unit, f"reading of sensor {sensor}")
     first = next(iter(system.ambients.values())).temperature
     for lump, part in system.lumps.items():
         text.state(lump, "K", first if part.initial is None else part.initial, f"temperature of lump {lump}")
@@ -159,7 +159,7 @@ def _seen(system: System, text: Text, end: str, other: str) -> str:
     return f"({text[end]} + {text.known(f'gradient {other}')})"
 
 
-def _module(text: Text, name: str, module: Module, heats: dict[str, list[str]]) -> None:
+def _module(system: System, text: Text, name: str, module: Module, heats: dict[str, list[str]]) -> None:
     """Evers (5.4)-(5.5), (5.13), corrected: S, R, K at the mean temperature of the faces."""
     hot, cold, current = text[module.hot], text[module.cold], _driven(text, name)
     reference = text.parameter(f"{name}_T_ref", module.reference_temperature, "K")
@@ -170,6 +170,10 @@ def _module(text: Text, name: str, module: Module, heats: dict[str, list[str]]) 
                                           ("K", "W/K", module.conductance)))
     thomson = text.parameter(f"{name}_thomson", module.thomson, "V/K")
     split = text.parameter(f"{name}_split", module.joule_split, "1")
+    if any(sensor.module == name for sensor in system.sensors.values()):
+        difference = f"({S} - {thomson}) * ({hot} - {cold})"
+        text.know(f"open circuit {name}", text.variable(f"{name}_open", "V", difference, "voltage without current"))
+        text.know(f"resistance {name}", R)
     joule = text.variable(f"{name}_joule", "W", f"{R} * {current}^2 / 2", "half of the Joule heat")
     taken = text.variable(f"{name}_taken", "W", f"{thomson} * {current} * ({hot} - {cold}) / 2", "half Thomson heat")
     leak = text.variable(f"{name}_leak", "W", f"{K} * ({hot} - {cold})", "conducted heat")
@@ -198,6 +202,14 @@ def _heater(system: System, text: Text, name: str, heats: dict[str, list[str]]) 
 
 
 def _sensor(system: System, text: Text, name: str, sensor: Sensor, heats: dict[str, list[str]]) -> None:
+    gain = text.parameter(f"{name}_gain", sensor.gain, "1")
+    offset = text.parameter(f"{name}_offset", sensor.offset, sensor.unit)
+    if sensor.module:
+        lead = text.parameter(f"{name}_lead", sensor.lead_resistance or 0.0, "Ohm")
+        resistance, current = text.known(f"resistance {sensor.module}"), _driven(text, sensor.module)
+        opened = text.known(f"open circuit {sensor.module}")
+        text.equation(f"{text[name]} = {gain} * ({opened} + ({resistance} + {lead}) * {current}) + {offset}")
+        return
     if sensor.self_heating:
         heats[sensor.lump].append(f"+ {text.parameter(f'{name}_self_heating', sensor.self_heating, 'W')}")
     source = text[sensor.lump]
@@ -206,8 +218,6 @@ def _sensor(system: System, text: Text, name: str, sensor: Sensor, heats: dict[s
         source = text.lag(f"{name}_lagged", "K", tau, source, source)
     if sensor.delay:
         source = f"delay({source}, {text.parameter(f'{name}_delay', sensor.delay, 's')})"
-    gain = text.parameter(f"{name}_gain", sensor.gain, "1")
-    offset = text.parameter(f"{name}_offset", sensor.offset, "K")
     nominal = text.known("nominal")
     text.equation(f"{text[name]} = {nominal} + {gain} * ({source} - {nominal}) + {offset}")
 

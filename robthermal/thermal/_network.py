@@ -29,9 +29,13 @@ def check_network(system: System) -> None:
     _links_exist(system)
     _modules_exist(system)
     _effects_exist(system)
-    for table, parts in (("inputs", system.inputs), ("sensors", system.sensors)):
-        for name, part in parts.items():
-            _known(part.lump, system.lumps, f"[{table}.{name}] lump", "a lump")
+    for name, heater in system.inputs.items():
+        _known(heater.lump, system.lumps, f"[inputs.{name}] lump", "a lump")
+    for name, sensor in system.sensors.items():
+        if sensor.module:
+            _known(sensor.module, system.modules, f"[sensors.{name}] module", "a module")
+        else:
+            _known(sensor.lump, system.lumps, f"[sensors.{name}] lump", "a lump")
     _path_to_ambient(system)
     _fit_is_possible(system)
 

@@ -25,7 +25,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
                 "hysteresis.time_constant", *_DRIVE),
     "leads": ("resistance",),
-    "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating"),
+    "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating", "lead_resistance"),
 }
 LISTED = ("links", "leads")  # tables that are lists of named parts
 

@@ -1,10 +1,10 @@
-"""The parts of a thermal system: ambients, lumps, links, heaters, thermoelectric modules, sensors."""
+"""The parts of a thermal system: ambients, lumps, links, heaters, thermoelectric modules, measured outputs."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ._effect_parts import Condensation as Condensation
 from ._effect_parts import Drive as Drive
@@ -216,35 +216,71 @@ class Module(Part):
 
 
 class Sensor(Part):
-    """A temperature sensor: reading = T_ref + gain (T_lagged - T_ref) + offset.
+    """A measured output: the temperature of a lump, or the voltage of a thermoelectric module.
 
-    T_ref is the first ambient's nominal temperature.
+    A temperature reads T_ref + gain (T_lagged - T_ref) + offset, T_ref the first ambient's nominal temperature. A
+    voltage reads gain V + offset with V = (S - thomson) (T_hot - T_cold) + (R + lead_resistance) I, positive where
+    positive current enters: without current S (T_hot - T_cold), and V I (without leads) is the heat that the two faces
+    reject together.
 
     Parameters
     ----------
     lump : str
-        What it measures.
+        Whose temperature it measures; empty for a voltage.
+    module : str
+        Module whose voltage it measures; empty for a temperature.
+    quantity : {"temperature", "voltage"}
+        What it measures; a sensor of a module measures its voltage.
     noise : float
-        Standard deviation [K]; 0 means not declared.
+        Standard deviation of the reading [K or V]; 0 means not declared.
     time_constant : float
-        Time constant of the first-order lag [s].
+        Time constant of the first-order lag of a thermometer [s].
     offset : float
-        Constant error added to the reading [K].
+        Constant error added to the reading [K or V].
     gain : float
-        Factor on the distance from T_ref [-].
+        Factor on the distance from T_ref, or on the voltage [-].
     delay : float
-        Pure time delay of the reading [s].
+        Pure time delay of a thermometer [s].
     self_heating : float
-        Heat of the sensor into its lump [W].
+        Heat of a thermometer into its lump [W].
+    lead_resistance : float, optional
+        Resistance of the wires between the module and the terminals where the voltage is read [Ω]; it heats no lump.
     """
 
-    lump: Name
+    lump: str = Field(default="", max_length=200)
+    module: str = Field(default="", max_length=200)
+    quantity: Literal["temperature", "voltage"] = "temperature"
     noise: NonNegative = 0.0
     time_constant: NonNegative = 0.0
     offset: Finite = 0.0
     gain: Positive = 1.0
     delay: NonNegative = 0.0
     self_heating: Finite = 0.0
+    lead_resistance: NonNegative | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the reading: "K" or "V"."""
+        return "V" if self.quantity == "voltage" else "K"
+
+    @model_validator(mode="after")
+    def _one_quantity(self) -> Sensor:
+        if bool(self.lump) == bool(self.module):
+            raise ValueError("key 'lump' is missing: name the lump whose temperature is read, or the module whose "
+                             "voltage is" if not self.lump else "names a lump and a module: it measures one of them")
+        voltage = bool(self.module)
+        if "quantity" in self.model_fields_set and voltage != (self.quantity == "voltage"):
+            raise ValueError(f'quantity = "{self.quantity}" of a {"module" if voltage else "lump"}: a lump has a '
+                             "temperature, a module a voltage")
+        if voltage:
+            object.__setattr__(self, "quantity", "voltage")
+        wrong = [key for key in (("time_constant", "delay", "self_heating") if voltage else ("lead_resistance",))
+                 if getattr(self, key)]
+        if wrong:
+            raise ValueError(f"{wrong[0]} does not belong to a {self.quantity}: "
+                             + ("a voltage is read at once and heats nothing" if voltage else
+                                "it is that of the wires of a module"))
+        return self
 
 
 class FitRange(Part):

@@ -1,23 +1,30 @@
-"""Sensor readings from states: lag (a state), delay, gain about the reference, offset; and their derivatives."""
+"""Sensor readings from states and drives, and their derivatives.
+
+A thermometer reads its lump: lag (a state), delay, gain about the reference, offset. The voltage of a module follows
+from the temperatures of its faces and from the current of the same row of the record, at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import lfilter
 
 from ._equations import Equations
 from ._layout import Layout
+from ._parts import Sensor
 from ._terms import Array
+from ._voltage import voltages
 
 Rates = tuple[Array, Array] | None
 
 
-def source_states(eq: Equations) -> list[int]:
-    """State that every sensor reads: its lag state if it has one, else its lump."""
+def source_states(eq: Equations) -> dict[str, int]:
+    """State that every thermometer reads: its lag state if it has one, else its lump."""
     lags = Layout(eq).sensors
-    return [lags.get(name, eq.index[sensor.lump]) for name, sensor in eq.system.sensors.items()]
+    return {name: lags.get(name, eq.index[sensor.lump]) for name, sensor in eq.system.thermometers.items()}
 
 
 def reference(eq: Equations) -> float:
@@ -25,51 +32,109 @@ def reference(eq: Equations) -> float:
     return next(iter(eq.system.ambients.values())).temperature
 
 
-def read_sensors(eq: Equations, states: Array, rates: Rates, h: float) -> Array:
-    """Noise-free readings (n, n_sensors) [K]."""
+def currents(eq: Equations, states: Array, w: Array, column: int) -> Array:
+    """Current of a column of the drives (...): the state of its lag if it has one."""
+    lags = Layout(eq).drives
+    return states[..., lags[column]] if column in lags else w[..., column]
+
+
+def read_sensors(eq: Equations, states: Array, rates: Rates, w: Array, h: float) -> Array:
+    """Noise-free readings (n, n_sensors) [K or V] from states (n, n_states) and drives w (n, n_w) of every sample."""
     T_ref, columns = reference(eq), []
-    for state, sensor in zip(source_states(eq), eq.system.sensors.values(), strict=True):
+    sources, volts = source_states(eq), voltages(eq)
+    for name, sensor in eq.system.sensors.items():
+        if name in volts:
+            current = currents(eq, states, w, volts[name].column)
+            columns.append(sensor.gain * volts[name].value(states, current) + sensor.offset)
+            continue
+        state = sources[name]
         source = _delayed(states[:, state], _of(rates, state), sensor.delay, h)
         columns.append(T_ref + sensor.gain * (source - T_ref) + sensor.offset)
     return np.column_stack(columns) if columns else np.zeros((len(states), 0))
 
 
-def reading_slopes(eq: Equations, states: Array, rates: Rates, slopes: Array, rate_slopes: Rates, names: Sequence[str],
-                   h: float) -> Array:
-    """Derivative (n, n_sensors, n_parameters) of the readings, given that of the states (n, n_states, n_parameters)."""
-    T_ref = reference(eq)
-    first = eq.system.ambient_names[0]
+def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes: Array, rate_slopes: Rates,
+                   held: Mapping[str, Array], names: Sequence[str], h: float) -> Array:
+    """Derivative (n, n_sensors, n_parameters) of the readings.
+
+    Given are that of the states (n, n_states, n_parameters), and by name that of the drives (n, n_w) of every sample.
+    """
     out = np.empty((len(states), len(eq.system.sensors), len(names)))
-    for i, (state, (name, sensor)) in enumerate(zip(source_states(eq), eq.system.sensors.items(), strict=True)):
-        out[:, i] = sensor.gain * _delayed(slopes[:, state], _of(rate_slopes, state), sensor.delay, h)
-        for column, parameter in enumerate(names):
-            if parameter == f"sensors.{name}.offset":
-                out[:, i, column] += 1.0
-            elif parameter == f"sensors.{name}.gain":
-                out[:, i, column] += _delayed(states[:, state], _of(rates, state), sensor.delay, h) - T_ref
-            elif parameter == f"sensors.{name}.delay" and rates is not None:
-                step = 1e-4 * h
-                later = _delayed(states[:, state], _of(rates, state), sensor.delay + step, h)
-                sooner = _delayed(states[:, state], _of(rates, state), max(sensor.delay - step, 0.0), h)
-                out[:, i, column] += sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
-            elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rates is not None:
-                out[1:, i, column] -= sensor.gain * rates[1][1:, state]  # a short lag τ reads x - τ ẋ
-            elif parameter == f"ambients.{first}.temperature":
-                out[:, i, column] += 1.0 - sensor.gain
+    sources, volts = source_states(eq), voltages(eq)
+    for i, (name, sensor) in enumerate(eq.system.sensors.items()):
+        if name in volts:
+            out[:, i] = _voltage_slopes(eq, name, states, w, slopes, held, names)
+        else:
+            out[:, i] = sensor.gain * _delayed(slopes[:, sources[name]], _of(rate_slopes, sources[name]),
+                                               sensor.delay, h)
+            _add_own_slopes(out[:, i], eq, name, sensor, states[:, sources[name]], _of(rates, sources[name]), names, h)
     return out
 
 
-def read_sampled(eq: Equations, sources: Array, h: float) -> Array:
-    """Readings from the sampled temperature (n, n_sensors) of every sensor's lump, for large networks.
+def _voltage_slopes(eq: Equations, name: str, states: Array, w: Array, slopes: Array, held: Mapping[str, Array],
+                    names: Sequence[str]) -> Array:
+    """Derivative (n, n_parameters) of the reading of a voltage."""
+    volt, sensor = voltages(eq)[name], eq.system.sensors[name]
+    current = currents(eq, states, w, volt.column)
+    lag = Layout(eq).drives.get(volt.column)
+    none = np.zeros(len(states))
+    by_current = slopes[:, lag] if lag is not None else np.column_stack(
+        [held[parameter][:, volt.column] if parameter in held else none for parameter in names])
+    out = volt.along(states, current, slopes, by_current)
+    for column, parameter in enumerate(names):
+        out[:, column] += volt.parameter(parameter, states, current)
+    out *= sensor.gain
+    for column, parameter in enumerate(names):
+        if parameter == f"sensors.{name}.offset":
+            out[:, column] += 1.0
+        elif parameter == f"sensors.{name}.gain":
+            out[:, column] += volt.value(states, current)
+    return out
 
-    The lump is taken as linear between samples, for which the lag is exact.
+
+def _add_own_slopes(out: Array, eq: Equations, name: str, sensor: Sensor, x: Array, rate: Rates, names: Sequence[str],
+                    h: float) -> None:
+    """Add what the parameters of a thermometer, and the reference, change at fixed temperatures x (n,)."""
+    T_ref, first = reference(eq), eq.system.ambient_names[0]
+    for column, parameter in enumerate(names):
+        if parameter == f"sensors.{name}.offset":
+            out[:, column] += 1.0
+        elif parameter == f"sensors.{name}.gain":
+            out[:, column] += _delayed(x, rate, sensor.delay, h) - T_ref
+        elif parameter == f"sensors.{name}.delay" and rate is not None:
+            step = 1e-4 * h
+            later = _delayed(x, rate, sensor.delay + step, h)
+            sooner = _delayed(x, rate, max(sensor.delay - step, 0.0), h)
+            out[:, column] += sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
+        elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rate is not None:
+            out[1:, column] -= sensor.gain * rate[1][1:]  # a short lag τ reads x - τ ẋ
+        elif parameter == f"ambients.{first}.temperature":
+            out[:, column] += 1.0 - sensor.gain
+
+
+def lumps_read(eq: Equations) -> list[int]:
+    """Lumps that some sensor reads, each once, in their order."""
+    faces = [place for volt in voltages(eq).values() for place in (volt.hot, volt.cold)]
+    return sorted({*faces, *(eq.index[sensor.lump] for sensor in eq.system.thermometers.values())})
+
+
+def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h: float) -> Array:
+    """Readings from the sampled temperatures (n, n_kept) of some lumps and the inputs u, for large networks.
+
+    Lumps are taken as linear between samples, for which the lag is exact.
     """
-    T_ref, columns = reference(eq), []
-    for source, sensor in zip(sources.T, eq.system.sensors.values(), strict=True):
+    T_ref, columns, at = reference(eq), [], {lump: place for place, lump in enumerate(kept)}
+    volts = {name: replace(volt, hot=at[volt.hot], cold=at[volt.cold]) for name, volt in voltages(eq).items()}
+    for name, sensor in eq.system.sensors.items():
+        if name in volts:
+            current = eq.drives(u)[:, volts[name].column]
+            columns.append(sensor.gain * volts[name].value(sampled, current) + sensor.offset)
+            continue
+        source = sampled[:, at[eq.index[sensor.lump]]]
         seen = _lag(source, sensor.time_constant, h) if sensor.time_constant else source
         seen = _delayed_linear(seen[:, None], sensor.delay, h)[:, 0]
         columns.append(T_ref + sensor.gain * (seen - T_ref) + sensor.offset)
-    return np.column_stack(columns) if columns else np.zeros((len(sources), 0))
+    return np.column_stack(columns) if columns else np.zeros((len(sampled), 0))
 
 
 def _lag(x: Array, tau: float, h: float) -> Array:

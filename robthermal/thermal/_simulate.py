@@ -20,7 +20,7 @@ from ._jumps import jump_slopes, rates
 from ._layout import Layout
 from ._schedule import Schedule, schedule
 from ._sensitivity import Sensitivity
-from ._sensors import read_sampled, read_sensors, reading_slopes
+from ._sensors import lumps_read, read_sampled, read_sensors, reading_slopes
 from ._system import System, equations
 from ._terms import Array
 
@@ -41,7 +41,7 @@ class Trajectory:
     lumps : ndarray, shape (n, n_lumps)
         Temperatures of all lumps [K].
     readings : ndarray, shape (n, n_sensors)
-        Noise-free sensor readings [K].
+        Noise-free sensor readings [K, or V].
     stored, ambient_heat, heater_heat, electrical_energy : ndarray
         Cumulative energies [J]: heat stored in all lumps (n,), received from every ambient (n, n_ambients), from every
         heater (n, n_inputs), electrical energy taken up by every module with its leads (n, n_modules).
@@ -80,7 +80,7 @@ class Trajectory:
         return self.stored - received
 
     def __getitem__(self, name: str) -> Array:
-        """Temperature of a lump or reading of a sensor by name [K]."""
+        """Temperature of a lump or reading of a sensor by name [K, or V]."""
         if name in self.system.lumps:
             return self.lumps[:, self.system.lump_names.index(name)]
         if name in self.system.sensors:
@@ -118,7 +118,8 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     Returns
     -------
     Record
-        Same inputs; outputs are the noise-free readings of all sensors [K] (of all lumps if the system has no sensor).
+        Same inputs; outputs are the noise-free readings of all sensors [K, or V] (of all lumps if the system has no
+        sensor). The voltage of a row is that at the current of the same row.
 
     Raises
     ------
@@ -143,14 +144,15 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
         run = trajectory(system, record, initial=initial, tolerance=tolerance)
         readings = run.readings if system.sensors else run.lumps
     else:  # keep only what the sensors read
-        measured = [system.lump_names.index(s.lump) for s in system.sensors.values()] or range(len(system.lumps))
+        measured = lumps_read(eq) or list(range(len(system.lumps)))
         u = held_inputs(eq, record)
         refuse_memory(eq)
         kept = run_implicit(eq, start_lumps(eq, record, initial), u, record.sample_time, tolerance,
                             np.array(measured, np.intp)).lumps
-        readings = read_sampled(eq, kept, record.sample_time) if system.sensors else kept
+        readings = read_sampled(eq, measured, kept, u, record.sample_time) if system.sensors else kept
+    volts = {name: unit for name, unit in system.sensor_units.items() if unit == "V"}
     return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
-                  input_names=record.input_names, output_names=system.sensor_names or system.lump_names,
+                  input_names=record.input_names, output_names=system.sensor_names or system.lump_names, units=volts,
                   start_time=record.start_time, name=f"simulation of {system.name}")
 
 
@@ -204,8 +206,7 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     refuse_memory(eq)
     start = start_lumps(eq, record, initial)
     run = run_implicit(eq, start, u, record.sample_time, tolerance, everything)
-    measured = run.lumps[:, [system.lump_names.index(s.lump) for s in system.sensors.values()]]
-    readings = read_sampled(eq, measured, record.sample_time)
+    readings = read_sampled(eq, everything.tolist(), run.lumps, u, record.sample_time)
     return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
                       run.heater_heat, run.electrical_energy, run.source_heat, (),
                       partial(_refuse_large, system), "implicit")
@@ -232,7 +233,7 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
     path = by.run(start_state(eq, record, initial, plan), plan)
     states = path.z[at, :layout.n_free]
     derivative = _Derivative(record, initial, by, plan, path)
-    readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, h)
+    readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, plan.w[at], h)
     lumps, meters = states[:, :n], path.z[at]
     return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
                       meters[:, layout.ambient_meters], meters[:, layout.heater_meters],
@@ -262,9 +263,9 @@ class _Derivative:
         held = held_slopes(eq, self.record, names, plan)
         along = Sensitivity(by, names, held, jump_slopes(by, names, self.path.z, plan))
         slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))[at]
-        return reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, slopes,
-                              _rate_slopes(along, states, plan, slopes) if self.delayed else None, names,
-                              self.record.sample_time)
+        return reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
+                              _rate_slopes(along, states, plan, slopes) if self.delayed else None,
+                              {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time)
 
 
 def _around(plan: Schedule) -> tuple[Array, Array]:

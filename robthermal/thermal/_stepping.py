@@ -14,7 +14,7 @@ from ._equations import Equations
 from ._exponential import Integrator
 from ._parts import Input
 from ._schedule import schedule
-from ._sensors import reference, source_states
+from ._sensors import read_sensors
 from ._simulate import is_small
 from ._steady import exogenous_point
 from ._system import System, equations
@@ -81,7 +81,8 @@ class Stepper:
         start = _start(self._eq, initial)
         self.state = np.zeros(self._integrator.nz)
         self.state[:len(start)] = start
-        settle(self._eq, self._integrator.layout, self.state, self._eq.drives(self._eq.nominal()), 0.0)
+        self._w = self._eq.drives(self._eq.nominal())
+        settle(self._eq, self._integrator.layout, self.state, self._w, 0.0)
         self.time = 0.0
 
     @property
@@ -91,7 +92,7 @@ class Stepper:
 
     @property
     def readings(self) -> Array:
-        """Noise-free readings of all sensors now [K]."""
+        """Noise-free readings of all sensors now [K, or V]; see `undelayed`."""
         for name, sensor in self.system.sensors.items():
             if sensor.delay:
                 raise InputError(f"sensor {name!r} has a delay of {sensor.delay:g} s", where="argument system",
@@ -101,12 +102,9 @@ class Stepper:
 
     @property
     def undelayed(self) -> Array:
-        """Noise-free readings of all sensors now, as if none had a pure delay [K]."""
-        source = self.state[source_states(self._eq)]
-        gain = np.array([s.gain for s in self.system.sensors.values()])
-        offset = np.array([s.offset for s in self.system.sensors.values()])
-        T_ref = reference(self._eq)
-        return T_ref + gain * (source - T_ref) + offset
+        """Noise-free readings of all sensors now, as if none had a pure delay [K]; voltages at the currents of the
+        last step [V]."""
+        return read_sensors(self._eq, self.state[None], None, self._w[None], self.sample_time)[0]
 
     def step(self, inputs: Mapping[str, float] | None = None, load: Mapping[str, float] | None = None) -> Array:
         """Advance one sample.
@@ -140,6 +138,7 @@ class Stepper:
             why = str(error).partition(": ")[2]
             raise Diverged(f"the simulation runs away at {self.time:.6g} s: {why}", time=self.time) from None
         self.time += self.sample_time
+        self._w = self._eq.drives(u)
         return self.lumps
 
 

@@ -109,6 +109,46 @@ class System(Part):
         return tuple(self.sensors)
 
     @property
+    def thermometers(self) -> dict[str, Sensor]:
+        """Sensors that measure the temperature of a lump, in file order."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.quantity == "temperature"}
+
+    def thermometer(self, name: str, where: str) -> Sensor:
+        """Sensor by name, refusing one that measures no temperature.
+
+        Parameters
+        ----------
+        name : str
+            Name of the sensor.
+        where : str
+            Argument that named it, for messages.
+
+        Returns
+        -------
+        Sensor
+
+        Raises
+        ------
+        InputError
+            There is no such sensor, or it reads the voltage of a module.
+        """
+        if name not in self.sensors:
+            raise InputError(f"there is no sensor {name!r}", where=where,
+                             expected="some of " + (", ".join(self.thermometers) or "none: the system has no sensors"))
+        sensor = self.sensors[name]
+        if sensor.quantity != "temperature":
+            raise InputError(f"sensor {name!r} reads the voltage of module {sensor.module!r}, not a temperature",
+                             where=where,
+                             expected="some of " + (", ".join(self.thermometers) or "none: there is no thermometer"),
+                             remedy="Leave it out here: voltages serve simulation, calibration and diagnosis.")
+        return sensor
+
+    @property
+    def sensor_units(self) -> dict[str, str]:
+        """Unit of every sensor's reading inside a record: "K", or "V" for the voltage of a module."""
+        return {name: sensor.unit for name, sensor in self.sensors.items()}
+
+    @property
     def exogenous_names(self) -> tuple[str, ...]:
         """Everything that drives the system, in the order of `u`: heaters, module currents, ambients."""
         return self.input_names + self.module_names + self.ambient_names

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Outcome
-from ...fitting import SMALLEST, Data, declared_noise, quantum
+from ...fitting import Data, declared_noise, quantum, smallest_noise
 from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ._glitches import counted
@@ -125,7 +125,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     levels = declared_noise(system, data, noise)
     rough = {name: _rough(data, name) for name in levels}
     unknown = tuple(name for name, level in levels.items() if not level)
-    _refuse_invisible({name: rough[name] for name in unknown})
+    _refuse_invisible(system, {name: rough[name] for name in unknown})
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
@@ -140,12 +140,13 @@ def _refuse_short(data: Sequence[Data]) -> None:
                              expected=f"at least {_SHORTEST}", remedy="Measure longer, or sample faster.")
 
 
-def _refuse_invisible(rough: Mapping[str, float]) -> None:
+def _refuse_invisible(system: System, rough: Mapping[str, float]) -> None:
     """Noise that is not declared has to be visible."""
     for name, level in rough.items():
-        if level < SMALLEST:
+        if level < smallest_noise(system, name):
             raise InputError(f"the noise of sensor {name!r} is not declared, and none is visible in the record",
-                             where=f"[sensors.{name}] noise", expected="a positive standard deviation [K]",
+                             where=f"[sensors.{name}] noise",
+                             expected=f"a positive standard deviation [{system.sensors[name].unit}]",
                              remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
 
 

@@ -364,7 +364,7 @@ def expected_rms(fit: Refit, data: Sequence[RecordData] | None = None) -> float:
         A, P = path.steps[0], np.zeros(path.M.shape[1:])
         Q = gathered(path, disturbance)
         for k in range(len(A)):
-            total += float(np.trace(path.C @ P @ path.C.T)) + spread
+            total += float(np.trace(path.C[k] @ P @ path.C[k].T)) + spread
             P = A[k] @ P @ A[k].T + Q[k]
         count += path.one.readings.size
     return float(np.sqrt(total / count)) if count else 1.0

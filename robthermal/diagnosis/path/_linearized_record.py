@@ -18,7 +18,7 @@ from scipy.linalg import expm
 
 from ...errors import InputError
 from ...fitting import residual
-from ...thermal import Equations, System, Trajectory, trajectory
+from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response
 from ._linearized import Unknowns
@@ -159,7 +159,8 @@ class LinearizedRecord:
         trials : sequence of Candidate
             Effects with trial values.
         """
-        signed = [(i, trial, trial.effect.signature) for i, trial in enumerate(trials)]
+        signed = [(i, trial, None if self._changes_voltage(trial) else trial.effect.signature)
+                  for i, trial in enumerate(trials)]
         linear = [(i, trial, signature) for i, trial, signature in signed if signature is not None]
         out = np.zeros((*self.one.readings.shape, len(trials)))
         for first in range(0, len(linear), _BLOCK):
@@ -172,6 +173,11 @@ class LinearizedRecord:
                 run = trajectory(trial.add(self.system, step), self.one.record)
                 out[..., i] = (run.readings - self.readings)[:, self.one.columns] / step
         return out
+
+    def _changes_voltage(self, trial: Candidate) -> bool:
+        """Whether an effect acts on a module whose voltage is read: beside its heat, it changes a reading at once."""
+        read = {self.system.sensors[name].module for name in self.one.sensors}
+        return any(name in self.system.modules and name in read for name in trial.where)
 
     def splines(self, lump: int) -> Array:
         """As `Linearized.splines`: a spline in time of 1 W.
@@ -241,13 +247,16 @@ class LinearizedRecord:
 
     @cached_property
     def C(self) -> Array:
-        """What the sensors in the record read of the states, (n_sensors, n_z)."""
-        C = np.zeros((len(self.one.sensors), self.M.shape[1]))
+        """What the sensors in the record read of the states, (n, n_sensors, n_z); that of voltages varies."""
+        C = np.zeros((len(self.x), len(self.one.sensors), self.M.shape[1]))
         for i, name in enumerate(self.one.sensors):
             sensor = self.system.sensors[name]
+            if sensor.module:
+                C[:, i, :self.x.shape[1]] = voltage_slopes(self.equations, name, self.x, self.u)
+                continue
             state = (self.x.shape[1] + self.lags.index(name) if name in self.lags
                      else self.system.lump_names.index(sensor.lump))
-            C[i, state] = sensor.gain
+            C[:, i, state] = sensor.gain
         return C
 
     def heat_of(self, system: System) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ class SlowNoise:
         wide_A, wide_Q = np.zeros((*n, nz + ns, nz + ns)), np.zeros((*n, nz + ns, nz + ns))
         wide_A[..., :nz, :nz], wide_A[..., nz:, nz:] = A, self.pole * np.eye(ns)
         wide_Q[..., :nz, :nz], wide_Q[..., nz:, nz:] = Q, (1.0 - self.pole**2) * self.covariance
-        return wide_A, np.hstack([C, np.eye(ns)]), wide_Q
+        return wide_A, np.concatenate([C, np.broadcast_to(np.eye(ns), (*C.shape[:-1], ns))], axis=-1), wide_Q
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +61,8 @@ class Whitener:
     ----------
     A : ndarray, shape (n, n_z, n_z)
         Transition of every sample.
-    C : ndarray, shape (n_sensors, n_z)
-        Readings of the states.
+    C : ndarray, shape (n, n_sensors, n_z)
+        Readings of the states, sample by sample.
     gains : ndarray, shape (n, n_z, n_sensors)
         Gains of the Kalman filter.
     roots : ndarray, shape (n, n_sensors, n_sensors)
@@ -99,7 +99,7 @@ class Whitener:
     @cached_property
     def _blocks(self) -> tuple[Array, Array]:
         """Of `_BLOCK` samples at once: (δ̂, readings) to the δ̂ after them, and to their z; the last is filled up."""
-        (n, n_z), n_sensors = self.A.shape[:2], self.C.shape[0]
+        (n, n_z), n_sensors = self.A.shape[:2], self.C.shape[1]
         inject, weighed = self.A @ self.gains, self.roots @ self.C
         sample = np.zeros((-(-n // _BLOCK), _BLOCK, n_z + n_sensors, n_z + n_sensors))
         sample.reshape(-1, *sample.shape[2:])[:n] = np.block([[self.A - inject @ self.C, inject],
@@ -133,19 +133,20 @@ def whitener(path: LinearizedRecord, noise: Array, disturbance: Array, slow: Slo
     n, R = len(A), np.broadcast_to(np.diag(noise**2), (len(A), noise.size, noise.size))
     if path.one.missing is not None:
         R = R + _IGNORED**2 * path.one.missing[:, :, None] * np.eye(noise.size)
-    roots = np.zeros((n, len(C), len(C)))
+    n_sensors = C.shape[1]
+    roots = np.zeros((n, n_sensors, n_sensors))
     if slow is None and not disturbance.any():
         roots[:] = np.linalg.inv(np.linalg.cholesky(R))
-        return Whitener(A, C, np.zeros((n, A.shape[1], len(C))), roots)
+        return Whitener(A, C, np.zeros((n, A.shape[1], n_sensors)), roots)
     Q, P = gathered(path, disturbance), np.zeros(A.shape[1:])
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
         P = block_diag(P, slow.covariance)
-    gains = np.zeros((n, A.shape[1], len(C)))
+    gains = np.zeros((n, A.shape[1], n_sensors))
     for k in range(n):
-        S = C @ P @ C.T + R[k]
+        S = C[k] @ P @ C[k].T + R[k]
         root = np.linalg.inv(np.linalg.cholesky(S))
-        gain = P @ C.T @ (root.T @ root)
+        gain = P @ C[k].T @ (root.T @ root)
         gains[k], roots[k] = gain, root
         P = A[k] @ (P - gain @ S @ gain.T) @ A[k].T + Q[k]
         P = 0.5 * (P + P.T)
@@ -173,7 +174,7 @@ def settled_cost(path: LinearizedRecord, r: Array, noise: Array, disturbance: Ar
 
     Good enough for noise levels, and a hundred times faster than the time-varying filter.
     """
-    A, C, R = path.steps[0].mean(axis=0), path.C, np.diag(noise**2)
+    A, C, R = path.steps[0].mean(axis=0), path.C.mean(axis=0), np.diag(noise**2)
     Q = gathered(path, disturbance, path.M.mean(axis=0))
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)

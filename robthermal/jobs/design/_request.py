@@ -182,13 +182,11 @@ def _sensors(system: System, text: str | None, sample_time: float) -> tuple[str,
     if text is not None:
         names = tuple(name.strip() for name in text.split(","))
         for name in names:
-            if name not in system.sensors:
-                raise InputError(f"there is no sensor {name!r}", where="--sensors",
-                                 expected="some of " + (", ".join(system.sensors) or "none: the file has no sensors"))
+            system.thermometer(name, "--sensors")
         return names
-    first = {sensor.lump: name for name, sensor in reversed(system.sensors.items())
+    first = {sensor.lump: name for name, sensor in reversed(system.thermometers.items())
              if not sensor.time_constant and not sensor.delay}
-    return tuple(name for name in system.sensors if name in first.values())
+    return tuple(name for name in system.thermometers if name in first.values())
 
 
 def celsius(kelvin: float) -> str:

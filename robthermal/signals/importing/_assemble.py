@@ -44,7 +44,7 @@ def make_records(
     median_filter: float | None,
     system: SystemLike | None,
 ) -> tuple[Record, ...]:
-    driven, read = values.of("input", "current", "ambient"), values.of("sensor", "output")
+    driven, read = values.of("input", "current", "ambient"), values.of("sensor", "voltage", "output")
     made: list[tuple[Array, Array]] = []
     glitches: dict[str, int] = {}
     notes: list[str] = []
@@ -59,6 +59,9 @@ def make_records(
         Y = np.empty((part.samples, len(read)))
         for k, c in enumerate(read):
             column = values.column(c)
+            if c.role == "voltage":  # jumps with its current, in both directions and at once
+                Y[:, k] = part.linear(column) if np.isnan(column[part.rows]).any() else part.held(column)
+                continue
             found = glitch_rows(column[part.rows][np.isfinite(column[part.rows])])
             if found.size:
                 glitches[c.name] = glitches.get(c.name, 0) + int(found.size)
@@ -164,7 +167,7 @@ def make_report(
             ImportedColumn(
                 header,
                 channel.name,
-                {"output": "sensor"}.get(channel.role, channel.role),
+                {"output": "sensor", "voltage": "sensor"}.get(channel.role, channel.role),
                 channel.unit_read.name if channel.unit_read else "",
                 channel.unit,
                 channel.scale,

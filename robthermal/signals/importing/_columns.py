@@ -16,7 +16,13 @@ from ._units import Unit, split_header, unit_of
 Limits = tuple[float, float] | None
 _LISTED = 200  # characters of a list of headers in a message
 _SI = {"temperature": "K", "current": "A", "power": "W", "voltage": "V", "resistance": "ohm", "percent": "%"}
-_KINDS = {"input": "heater", "current": "module current", "ambient": "ambient", "sensor": "sensor"}
+_KINDS = {
+    "input": "heater",
+    "current": "module current",
+    "ambient": "ambient",
+    "sensor": "sensor",
+    "voltage": "module voltage",
+}
 
 
 class SystemLike(Protocol):
@@ -47,13 +53,13 @@ class Channel:
     name : str
         In the record.
     role : str
-        "input", "current", "ambient" or "sensor".
+        "input", "current", "ambient", "sensor" or "voltage" (of a module).
     place : int
         Column of the table.
     unit_read : Unit or None
         Unit of the cells; None where neither header nor declaration says one.
     unit : str
-        Unit that is kept: "K", "A", "W", or the input's own; "" where nobody says.
+        Unit that is kept: "K", "A", "V", "W", or the input's own; "" where nobody says.
     scale, offset : float
         Value = scale · cell + offset, before a unit is converted; declared, or 1 and 0.
     scaled : bool
@@ -78,11 +84,12 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
     InputError
         A heater or current without a column, a mapped name that the system does not have, units that do not fit.
     """
+    volts = dict(getattr(system, "sensor_units", {}))
     roles = {
         **dict.fromkeys(system.input_names, "input"),
         **dict.fromkeys(system.module_names, "current"),
         **dict.fromkeys(system.ambient_names, "ambient"),
-        **dict.fromkeys(system.sensor_names, "sensor"),
+        **{name: "voltage" if volts.get(name) == "V" else "sensor" for name in system.sensor_names},
     }
     for name in choice.columns:
         if name not in roles:
@@ -222,15 +229,16 @@ def _channel(
                 )
             unit = unit_of(choice.record.temperature_unit or default)
         return Channel(name, role, place, unit, "K", *scaling)
-    if role == "current":
-        if unit is not None and unit.quantity != "current" and not scaling[2]:
+    if role in ("current", "voltage"):
+        kept = _SI[role]
+        if unit is not None and unit.quantity != role and not scaling[2]:
             raise InputError(
-                f"the current {name!r} is in [{unit.name}]",
+                f"the {role} {name!r} is in [{unit.name}]",
                 where=where,
-                expected="A or mA",
+                expected=f"{kept} or m{kept}",
                 remedy=f"Another column? Write --column '{name}=HEADER'.",
             )
-        return Channel(name, role, place, unit, "A", *scaling)
+        return Channel(name, role, place, unit, kept, *scaling)
     return _input(name, place, unit, own, gain, scaling, where)
 
 

@@ -51,7 +51,8 @@ def read_values(table: Table, channels: tuple[Channel, ...], choice: Declared, c
                 expected="numbers",
                 remedy="Leave it out, or name another column with --column.",
             )
-        refuse_codes(table, header, raw, choice.record)
+        if channel.role != "voltage":  # a voltage may jump anywhere with its current
+            refuse_codes(table, header, raw, choice.record)
         if (
             channel.unit == "K"
             and channel.unit_read is not None
@@ -83,10 +84,10 @@ def find_parts(table: Table, clock: Clock, values: Values, choice: Declared) -> 
     for rows in runs(table, clock, choice.record):
         kept, stamps = single(table, clock, rows, values.kept, choice.record)
         pieces.append((kept, clock.seconds[kept] if stamps is None else stamps))
-    driven, read = values.columns("input", "current"), values.columns("ambient", "sensor", "output")
+    driven, read = values.columns("input", "current"), values.columns("ambient", "sensor", "voltage", "output")
     headers = tuple(
         tuple(table.headers[c.place] for c in values.of(*roles))
-        for roles in (("input", "current"), ("ambient", "sensor", "output"))
+        for roles in (("input", "current"), ("ambient", "sensor", "voltage", "output"))
     )
     parts = parts_of(table, pieces, driven, read, choice.record, (headers[0], headers[1]))
     say_resampled(table, parts, {c.name: values.column(c) for c in values.of("ambient", "sensor")})

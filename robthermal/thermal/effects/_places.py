@@ -25,8 +25,8 @@ def lumps_without(key: str) -> Callable[[System], list[Where]]:
 
 
 def sensors(system: System) -> list[Where]:
-    """Every sensor."""
-    return [(name,) for name in system.sensors]
+    """Every thermometer."""
+    return [(name,) for name in system.thermometers]
 
 
 def driven(system: System) -> list[Where]:

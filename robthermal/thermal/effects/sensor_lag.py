@@ -12,7 +12,7 @@ _add = numbers("sensors", time_constant="time_constant")
 
 
 def _places(system: System) -> list[Where]:
-    return [(name,) for name, sensor in system.sensors.items() if not sensor.time_constant]
+    return [(name,) for name, sensor in system.thermometers.items() if not sensor.time_constant]
 
 
 def _lagged(record: RecordContext, where: Where, values: Values) -> Response:
