@@ -93,8 +93,8 @@ SURFACE = {
         ModuleParameters Natural Periodic PolynomialFit Polynomials Reduction Sensor SteadyState Step Stepper
         System ThermalCode Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error
         linearize load_curve materials module_from_datasheet module_from_polynomials parse_system read_matrices
-        read_system reduce simulate steady_state system_from_matrices time_constants trajectory write_modelica
-        write_system
+        read_system reduce simulate steady_state system_from_matrices time_constants trajectory voltage_slopes
+        write_modelica write_system
     """,
     "verification": """
         Certificate Verdict claim_sentence establish machine_hash not_certified same_system verify

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,26 +13,42 @@ from ..signals import Record
 from ._score import Score
 
 Column = tuple[Record, dict[str, NDArray[np.float64]], Score]
+_SHOWN = {"K": ("temperature [°C]", ZERO_CELSIUS), "V": ("voltage [V]", 0.0)}
 
 
-def draw(columns: list[Column], n_fitted: int) -> NDArray[Any]:
-    """Readings above residuals, one column per record."""
+def draw(columns: list[Column], n_fitted: int, units: Mapping[str, str]) -> NDArray[Any]:
+    """Readings above residuals, one column per record; voltages below temperatures, on axes of their own."""
     # Imported here: matplotlib is slow to load, and most programs never draw.
     import matplotlib.pyplot as plt
 
-    size = (4.0 + 3.5 * len(columns), 5.0)
-    _, axes = plt.subplots(2, len(columns), sharex="col", squeeze=False, layout="constrained", figsize=size,
-                           height_ratios=(2, 1))
+    present = {units.get(name, "K") for _, residuals, _ in columns for name in residuals}
+    kinds = [unit for unit in _SHOWN if unit in present] or ["K"]
+    size = (4.0 + 3.5 * len(columns), 5.0 * len(kinds))
+    _, axes = plt.subplots(2 * len(kinds), len(columns), sharex="col", squeeze=False, layout="constrained",
+                           figsize=size, height_ratios=(2, 1) * len(kinds))
     for place, (record, residuals, score) in enumerate(columns):
-        above, below = axes[:, place]
-        for i, (name, residual) in enumerate(residuals.items()):
-            above.plot(record.time, record[name] - ZERO_CELSIUS, ".", color=f"C{i}", markersize=2, alpha=0.4)
-            label = f"{name}, {score.rmse[name]:.3g} K"
-            above.plot(record.time, record[name] - residual - ZERO_CELSIUS, color=f"C{i}", label=label)
-            below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
-        above.set(title=f"{'fitted' if place < n_fitted else 'validation'}: {score.record}", ylabel="temperature [°C]")
-        above.legend(fontsize="small", title="model, RMSE")
-        below.set(xlabel="time [s]", ylabel="measured − model [K]")
-        below.axhline(0.0, color="black", linewidth=0.5)
+        for row, unit in enumerate(kinds):
+            above, below = axes[2 * row:2 * row + 2, place]
+            own = {name: residual for name, residual in residuals.items() if units.get(name, "K") == unit}
+            _pair(above, below, record, own, score, unit)
+        title = f"{'fitted' if place < n_fitted else 'validation'}: {score.record}"
+        axes[0, place].set(title=title)
+        axes[-1, place].set(xlabel="time [s]")
     grid: NDArray[Any] = axes
     return grid
+
+
+def _pair(above: Any, below: Any, record: Record, residuals: Mapping[str, NDArray[np.float64]], score: Score,
+          unit: str) -> None:
+    """Readings of one unit, and their residuals below."""
+    label, zero = _SHOWN[unit]
+    for i, (name, residual) in enumerate(residuals.items()):
+        above.plot(record.time, record[name] - zero, ".", color=f"C{i}", markersize=2, alpha=0.4)
+        above.plot(record.time, record[name] - residual - zero, color=f"C{i}",
+                   label=f"{name}, {score.rmse[name]:.3g} {unit}")
+        below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
+    above.set(ylabel=label)
+    if residuals:
+        above.legend(fontsize="small", title="model, RMSE")
+    below.set(ylabel=f"measured − model [{unit}]")
+    below.axhline(0.0, color="black", linewidth=0.5)

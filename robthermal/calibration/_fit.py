@@ -51,11 +51,11 @@ class Fit(Estimates):
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
     noise : dict
-        Standard deviation every sensor was weighted with [K].
+        Standard deviation every sensor was weighted with [K or V].
     data, validation_data : tuple of Record
         What was fitted, and what was only compared.
     residuals, validation_residuals : tuple of dict
-        Measured − modelled, per record and sensor, (n,) [K], free run.
+        Measured − modelled, per record and sensor, (n,) [K or V], free run.
     initial_temperatures, validation_temperatures : tuple of dict
         Per record and lump [K].
     train, validation : tuple of Score
@@ -77,12 +77,12 @@ class Fit(Estimates):
 
     @property
     def rmse(self) -> dict[str, float]:
-        """Free-run root mean square residual by sensor over all training records [K]."""
+        """Free-run root mean square residual by sensor over all training records [K or V]."""
         return rmse_by_sensor(self.residuals)
 
     @property
     def validation_rmse(self) -> dict[str, float]:
-        """Free-run root mean square residual by sensor over all validation records [K]; empty without any."""
+        """Free-run root mean square residual by sensor over all validation records [K or V]; empty without any."""
         return rmse_by_sensor(self.validation_residuals)
 
     def plot(self) -> NDArray[Any]:
@@ -90,12 +90,12 @@ class Fit(Estimates):
 
         Returns
         -------
-        ndarray of matplotlib.axes.Axes, shape (2, n_records)
-            Training records first, then validation.
+        ndarray of matplotlib.axes.Axes, shape (2, n_records), or (4, n_records) with voltages
+            Training records first, then validation; voltages [V] and their residuals stand below the temperatures.
         """
         fitted = zip(self.data, self.residuals, self.train, strict=True)
         unseen = zip(self.validation_data, self.validation_residuals, self.validation, strict=True)
-        return draw([*fitted, *unseen], len(self.data))
+        return draw([*fitted, *unseen], len(self.data), self.system.sensor_units)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but signals, ready for JSON: no infinities, no arrays.
@@ -113,10 +113,11 @@ class Fit(Estimates):
         }
 
     def __str__(self) -> str:
-        lines = self._lines()
+        lines, units = self._lines(), self.system.sensor_units
         for kind, scores in (("fitted", self.train), ("validation", self.validation)):
             for one in scores:
-                lines.append(f"{kind} {one.record}: " + ", ".join(f"{name} {e:.3g} K" for name, e in one.rmse.items()))
+                said = (f"{name} {e:.3g} {units.get(name, 'K')}" for name, e in one.rmse.items())
+                lines.append(f"{kind} {one.record}: " + ", ".join(said))
         return "\n".join([*lines, str(self.outcome)])
 
 

@@ -19,7 +19,7 @@ class Score:
     record : str
         Name of the record.
     rmse : dict
-        Root mean square residual (measured − modelled) by sensor [K].
+        Root mean square residual (measured − modelled) by sensor [K or V].
     fit_percent : dict
         100 (1 - ‖y - ŷ‖ / ‖y - mean y‖), by sensor [%], as in Matlab's `compare`; nan for a constant signal.
     """
@@ -30,7 +30,7 @@ class Score:
 
 
 def score_of(one: Data, residual: Floats) -> Score:
-    """Score of residuals (n, n_sensors) [K]."""
+    """Score of residuals (n, n_sensors) [K or V]."""
     by_sensor = {name: residual[:, i] for i, name in enumerate(one.sensors)}
     percent = {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)}
     return Score(one.label, rmse_by_sensor([by_sensor]), percent)

@@ -70,6 +70,15 @@ def test_simulation_of_the_text_is_ours(effects, full, drive):
     compare(system, drive(n=8, seed=3), 2e-4)
 
 
+def test_voltages_are_outputs_of_the_text(full, drive):
+    volt = {"volt": {"module": "tem", "gain": 1.02, "offset": 0.01, "lead_resistance": 0.1}}
+    system = rt.System(**{**dict(full), "sensors": {**full.sensors, **volt}})
+    system = rt.thermal.add_effect(system, "thomson", ["tem"], {"coefficient": 2e-3}).system
+    system = rt.thermal.add_effect(system, "input_lag", ["tem"], {"time_constant": 3.0}).system
+    assert 'output Real volt(unit="V")' in rt.thermal.format_modelica(system)
+    compare(system.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3), 2e-4)
+
+
 def test_every_effect_of_the_catalog_is_tested():
     assert set(EFFECTS) == {effect for group in GROUPS for effect in group}
     assert set(EFFECTS) | {"missing_ambient_link"} == set(rt.thermal.effects())
