@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from ..errors import InputError, Outcome
-from ._checks import kelvin, positive
 from ._outcomes import ThermalCode
 from ._parts import Linear, Module
+from ._rating import Rating
 
-_HIGHEST_DT = 90.0  # single-stage modules reach about 80 K
-_HIGHEST_I = 200.0
 _AGREE = 0.1  # sheets that disagree with themselves by more are told apart; published rows reach 16 %
 
 
@@ -164,37 +160,21 @@ def module_from_datasheet(*, v_max: float, i_max: float, dt_max: float, t_hot: f
     Qmax        0.04694     1.8072    0.48552   0.002511   Vmax -9.2 %
     The two inversions differ by more than 10 %: ...
     """
-    v_max, i_max = positive(v_max, "argument v_max", "V"), positive(i_max, "argument i_max", "A")
-    t_hot = kelvin(t_hot, "argument t_hot")
-    dt_max = _difference(dt_max, t_hot)
-    if i_max > _HIGHEST_I:
-        raise InputError(f"{i_max:g} A is more than any single module takes: it looks like milliampere",
-                         where="argument i_max", expected="ampere", remedy="Divide by 1000.")
-    voltage = _parameters(v_max / t_hot, i_max, dt_max, t_hot)
-    if q_max is None or bool(np.isnan(q_max)):  # a missing entry of a table of datasheets is NaN
-        return DatasheetFit(v_max, i_max, dt_max, None, t_hot, voltage, None, None, None,
+    sheet = Rating(t_hot, v_max, i_max, dt_max, q_max)
+    voltage = _parameters(sheet.v_max / sheet.t_hot, sheet)
+    if sheet.q_max is None:
+        return DatasheetFit(sheet.v_max, sheet.i_max, sheet.dt_max, None, sheet.t_hot, voltage, None, None, None,
                             ThermalCode.UNCHECKED.outcome())
-    q_max = positive(q_max, "argument q_max", "W")
-    heat = _parameters(2 * q_max / (i_max * (t_hot + dt_max)), i_max, dt_max, t_hot)
-    q_misfit = 0.5 * voltage.seebeck * i_max * (t_hot + dt_max) / q_max - 1
-    v_misfit = heat.seebeck * t_hot / v_max - 1
-    return DatasheetFit(v_max, i_max, dt_max, q_max, t_hot, voltage, heat, q_misfit, v_misfit, _outcome(q_misfit))
+    heat = _parameters(2 * sheet.q_max / (sheet.i_max * (sheet.t_hot + sheet.dt_max)), sheet)
+    q_misfit = 0.5 * voltage.seebeck * sheet.i_max * (sheet.t_hot + sheet.dt_max) / sheet.q_max - 1
+    v_misfit = heat.seebeck * sheet.t_hot / sheet.v_max - 1
+    return DatasheetFit(sheet.v_max, sheet.i_max, sheet.dt_max, sheet.q_max, sheet.t_hot, voltage, heat, q_misfit,
+                        v_misfit, _outcome(q_misfit))
 
 
-def _parameters(S: float, i_max: float, dt_max: float, t_hot: float) -> ModuleParameters:
+def _parameters(S: float, sheet: Rating) -> ModuleParameters:
     """R and K from S: at dTmax the current is optimal, I = S Tc/R, and the heat balance closes without load."""
-    t_cold = t_hot - dt_max
-    return ModuleParameters(S, S * t_cold / i_max, S * t_cold * i_max / (2 * dt_max))
-
-
-def _difference(value: float, t_hot: float) -> float:
-    dt_max = positive(value, "argument dt_max", "K")
-    if dt_max > _HIGHEST_DT:
-        raise InputError(f"{dt_max:g} K: single-stage modules do not exceed about 80 K", where="argument dt_max",
-                         expected="a temperature difference in kelvin",
-                         remedy="A difference in Fahrenheit is divided by 1.8; one that a shop converted like a "
-                         f"temperature was {(dt_max - 32) / 1.8:.1f} K. Multi-stage modules need another model.")
-    return dt_max
+    return ModuleParameters(S, S * sheet.t_cold / sheet.i_max, S * sheet.t_cold * sheet.i_max / (2 * sheet.dt_max))
 
 
 def _outcome(misfit: float) -> Outcome:

@@ -84,7 +84,7 @@ def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
             states[k, j] = A[k - 1] @ states[k - 1, j]
             states[j, k] = states[k, j].T
         states[k, k] = A[k - 1] @ states[k - 1, k - 1] @ A[k - 1].T + Q[k - 1]
-    dense = np.block([[C @ states[j, k] @ C.T + (np.diag(noise**2) if j == k else 0.0) for k in range(n)]
+    dense = np.block([[C[j] @ states[j, k] @ C[k].T + (np.diag(noise**2) if j == k else 0.0) for k in range(n)]
                       for j in range(n)])
     w = whitener(path, noise, disturbance)
     columns = np.zeros((len(A), 2, 2 * n))
@@ -92,7 +92,7 @@ def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
     L_inverse = w(columns)[:n].reshape(2 * n, 2 * n)
     assert np.allclose(L_inverse @ dense @ L_inverse.T, np.eye(2 * n), atol=1e-9)
     assert not np.allclose(dense, np.diag(np.diag(dense)), atol=1e-6)  # otherwise the test could not fail
-    begun = replace(w, A=w.A[:37], gains=w.gains[:37], roots=w.roots[:37])  # what comes after does not matter
+    begun = replace(w, A=w.A[:37], C=w.C[:37], gains=w.gains[:37], roots=w.roots[:37])  # what comes after does not matter
     assert np.allclose(begun(columns[:37]), w(columns)[:37], rtol=0, atol=1e-12)
 
 

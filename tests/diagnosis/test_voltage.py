@@ -1,0 +1,90 @@
+"""Diagnosis with the voltage of a module among the readings: signatures, whitening, verdicts in volts."""
+
+import numpy as np
+import pytest
+from voltage_rig import drive, system
+
+import robthermal as rt
+from robthermal.diagnosis.data import as_measured
+from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_record, whitener
+
+H = 4.0
+CURRENTS = np.repeat(np.random.default_rng(5).uniform(-1.0, 1.8, 30), 10)
+FIT = {"modules.m1.seebeck.value": {"lower": 0.03, "upper": 0.08},
+       "modules.m1.resistance.value": {"lower": 1.0, "upper": 4.0},
+       "modules.m1.conductance.value": {"lower": 0.1, "upper": 1.5}}
+
+
+def plain(**numbers: float) -> rt.System:
+    """The rig with constant properties, which calibration may change."""
+    made = system().with_parameters({"modules.m1.seebeck.slope": 0.0, "modules.m1.resistance.slope": 0.0} | numbers)
+    return rt.System(**{**dict(made), "fit": FIT})
+
+
+def logged(machine: rt.System, seed: int) -> rt.Record:
+    """What the rig logs: a simulation with the noise of its sensors."""
+    rng = np.random.default_rng(seed)
+    run = rt.thermal.simulate(machine, drive(CURRENTS if seed % 2 else CURRENTS[::-1], H), initial=295.15)
+    return run.with_outputs(run.outputs + rng.standard_normal(run.outputs.shape) * [0.02, 0.002])
+
+
+@pytest.fixture(scope="module")
+def path() -> LinearizedRecord:
+    made = rt.System(**{**dict(plain()), "lumps": {"hot": {"capacity": 70.0, "initial": 295.15, "disturbance": 0.05},
+                                                   "cold": {"capacity": 35.0, "initial": 295.15, "disturbance": 0.02}}})
+    return linearized_record(made, as_measured(made, logged(made, 1), "records")[0])
+
+
+EFFECTS = ["seebeck_slope", "resistance_slope", "conductance_slope", "thomson", "joule_split", "heat_source",
+           "natural_convection", "radiation", "missing_link", "lead_heating", "input_gain", "input_offset", "hysteresis",
+           "sensor_offset", "sensor_gain", "ambient_gradient"]
+
+
+def test_signatures_are_what_a_small_effect_does_to_volts_and_kelvin(path: LinearizedRecord) -> None:
+    tried = rt.diagnosis.candidates(path.system, EFFECTS)
+    assert {one.effect.name for one in tried} >= {"thomson", "resistance_slope", "heat_source", "lead_heating"}
+    errors = {}
+    for one in tried:
+        size = one.effect.size
+        step = 1e-3 * min(size.upper, 1e-3 if size.unit in ("V/K", "V/K²", "Ω/K", "W/K²") else 1.0)
+        shape = {q.name: (q.grid[0] if isinstance(q.grid, tuple) and q.grid else q.lower) for q in
+                 one.effect.quantities[1:]}
+        trial = one.at(shape) if hasattr(one, "at") else one
+        changed = rt.thermal.trajectory(trial.add(path.system, step), path.one.record, tolerance=1e-8).readings
+        before = rt.thermal.trajectory(path.system, path.one.record, tolerance=1e-8).readings
+        truth, found = (changed - before) / step, path.columns([trial])[..., 0]
+        scale = np.abs(truth).max(axis=0) + 1e-9
+        errors[one.effect.name, one.where] = (np.abs(found - truth).max(axis=0) / scale).tolist()
+    assert {key: error for key, error in errors.items() if max(error) > 0.03} == {}
+
+
+def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
+    noise, disturbance, n = np.array([0.02, 0.002]), np.array([0.05, 0.02]), 30
+    A, C, Q = path.steps[0], path.C, gathered(path, disturbance)
+    assert np.ptp(C[:, 1], axis=0).max() > 0  # what a voltage reads of the temperatures changes along the record
+    states = np.zeros((n, n, *A.shape[1:]))
+    for k in range(1, n):
+        for j in range(k):
+            states[k, j] = A[k - 1] @ states[k - 1, j]
+            states[j, k] = states[k, j].T
+        states[k, k] = A[k - 1] @ states[k - 1, k - 1] @ A[k - 1].T + Q[k - 1]
+    dense = np.block([[C[j] @ states[j, k] @ C[k].T + (np.diag(noise**2) if j == k else 0.0) for k in range(n)]
+                      for j in range(n)])
+    columns = np.zeros((len(A), 2, 2 * n))
+    columns[:n].reshape(2 * n, 2 * n)[:] = np.eye(2 * n)
+    L_inverse = whitener(path, noise, disturbance)(columns)[:n].reshape(2 * n, 2 * n)
+    assert np.allclose(L_inverse @ dense @ L_inverse.T, np.eye(2 * n), atol=1e-9)
+
+
+def test_a_right_model_is_consistent() -> None:
+    found = rt.diagnose(plain(), logged(plain(), 1), validation=logged(plain(), 2))
+    assert found.verdict == "consistent" and found.gap["train"].unit == "K"
+    assert found.gap["train"].after == pytest.approx(0.02, rel=0.15)  # of the thermometer: volts are no kelvin
+
+
+def test_a_slope_of_the_resistance_is_named() -> None:
+    hidden = plain(**{"modules.m1.resistance.slope": 0.02})
+    found = rt.diagnose(plain(), logged(hidden, 1), validation=logged(hidden, 2))
+    assert found.verdict == "named" and [one.effect for one in found.effects] == ["resistance_slope"]
+    slope, std = (getattr(found.effects[0].parameters["slope"], key) for key in ("value", "std"))
+    assert abs(slope - 0.02) < 4 * std and std < 0.002
