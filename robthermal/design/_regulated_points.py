@@ -127,6 +127,7 @@ def _point(law: FeedbackLinearization, module: str, name: str, named: bool) -> R
             raise InputError(f"there is no sensor or lump {name!r}", where=f"regulate {module}", expected="one of "
                              + ", ".join((*system.sensors, *system.lumps)))
         return RegulatedPoint(module, name, "lump", name)
+    system.thermometer(name, f"regulate {module}")
     if name in system.lumps and sensor.lump != name:
         raise InputError(f"{name!r} is a lump, and a sensor on another lump, {sensor.lump!r}",
                          where=f"regulate {module}", expected="a name that means one thing",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Complex, Floats
+from ..thermal import System
 
 
 @overload
@@ -44,6 +45,26 @@ def rmse(residuals: Iterable[Floats]) -> float:
     e = np.concatenate([np.ravel(r) for r in residuals])
     mean_square = float(np.mean(e**2))
     return math.inf if math.isnan(mean_square) else math.sqrt(mean_square)
+
+
+def counted(system: System, sensors: Iterable[str], all_sensors: Iterable[str]) -> NDArray[np.bool_]:
+    """Which sensors an rms over all of them counts: thermometers; voltages only where there is nothing else.
+
+    Parameters
+    ----------
+    system : System
+        System with the sensors.
+    sensors : iterable of str
+        Names of the sensors of one record.
+    all_sensors : iterable of str
+        Names of the sensors of all records that are counted together.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_sensors,)
+    """
+    warm = np.array([name in system.thermometers for name in sensors], bool)
+    return warm if any(name in system.thermometers for name in all_sensors) else ~warm
 
 
 def rmse_by_sensor(records: Iterable[Mapping[str, Floats]]) -> dict[str, float]:

@@ -1,7 +1,8 @@
 """Rated values of a thermoelectric module: what a datasheet says at one hot-side temperature, and what a module gives.
 
-With S, R, K at T_avg = (T_h + T_c)/2 and no load, the heat balance of the cold face is S T_c I - ½ R I² = K (T_h - T_c).
-Along it dT_c/dI = 0 where S T_c = R I: the current of the largest difference, whatever the slopes of S, R, K. Hence
+With S, R, K at T_avg = (T_h + T_c)/2 and no load, the heat balance of the cold face is
+S T_c I - ½ R I² = K (T_h - T_c). Along it dT_c/dI = 0 where S T_c = R I: the current of the largest difference,
+whatever the slopes of S, R, K. Hence
 ½ S² T_c²/R = K (T_h - T_c) there, and the voltage is S T_h.
 """
 
@@ -94,7 +95,8 @@ def _difference(value: float, t_hot: float) -> float:
     figure = 2 * dt_max / (t_hot - dt_max) ** 2
     if figure > _HIGHEST_FIGURE:
         raise InputError(f"{dt_max:g} K at a hot side of {t_hot:g} K means a figure of merit of {figure:.2g} 1/K",
-                         where="argument dt_max", expected=f"below {_HIGHEST_FIGURE:g} 1/K; the best modules reach 0.0033",
+                         where="argument dt_max",
+                         expected=f"below {_HIGHEST_FIGURE:g} 1/K; the best modules reach 0.0033",
                          remedy="Is the hot side in another unit, or is it a multi-stage module?")
     return dt_max
 
@@ -169,7 +171,7 @@ class Properties:
         Parameters
         ----------
         t_hot : float
-            Hot-side temperature [K].
+            Hot-side temperature of the column [K].
         i_max : float, optional
             Current at which Qmax is meant [A]; default the current of the largest difference of these properties.
         """

@@ -205,11 +205,16 @@ def _inverted(basis: Basis, columns: tuple[Rating, ...], S: Array) -> Inversion:
     if S.min() <= 0:
         raise InputError(f"Qmax of the columns gives S = {S.min():.3g} V/K", where="argument ratings",
                          expected="a positive Seebeck coefficient", remedy="Check the columns; or use one of them.")
-    lines = [np.polyfit(T - middle, value, 1) if len(columns) > 1 else (0.0, value[0]) for value in (S, R, K)]
-    properties = Properties(*(Linear(value=float(at), slope=float(slope)) for slope, at in lines), middle)
+    properties = Properties(_line(T - middle, S), _line(T - middle, R), _line(T - middle, K), middle)
     predicted = tuple(properties.rated(one.t_hot, one.i_max) for one in columns)
     return Inversion(basis, properties, predicted,
                      tuple(misfit(found, one) for found, one in zip(predicted, columns, strict=True)))
+
+
+def _line(above: Array, values: Array) -> Linear:
+    """Straight line through the columns, by least squares; one column has no slope."""
+    slope, at = np.polyfit(above, values, 1) if values.size > 1 else (0.0, values[0])
+    return Linear(value=float(at), slope=float(slope))
 
 
 def _seebeck_from_heat(columns: tuple[Rating, ...]) -> Array:

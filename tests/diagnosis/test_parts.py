@@ -92,7 +92,8 @@ def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
     L_inverse = w(columns)[:n].reshape(2 * n, 2 * n)
     assert np.allclose(L_inverse @ dense @ L_inverse.T, np.eye(2 * n), atol=1e-9)
     assert not np.allclose(dense, np.diag(np.diag(dense)), atol=1e-6)  # otherwise the test could not fail
-    begun = replace(w, A=w.A[:37], C=w.C[:37], gains=w.gains[:37], roots=w.roots[:37])  # what comes after does not matter
+    # what comes after does not matter
+    begun = replace(w, A=w.A[:37], C=w.C[:37], gains=w.gains[:37], roots=w.roots[:37])
     assert np.allclose(begun(columns[:37]), w(columns)[:37], rtol=0, atol=1e-12)
 
 

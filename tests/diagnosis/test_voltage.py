@@ -32,12 +32,13 @@ def logged(machine: rt.System, seed: int) -> rt.Record:
 def path() -> LinearizedRecord:
     made = rt.System(**{**dict(plain()), "lumps": {"hot": {"capacity": 70.0, "initial": 295.15, "disturbance": 0.05},
                                                    "cold": {"capacity": 35.0, "initial": 295.15, "disturbance": 0.02}}})
+    made = made.with_parameters({"modules.m1.resistance.slope": 0.01, "modules.m1.seebeck.slope": 5e-5})
     return linearized_record(made, as_measured(made, logged(made, 1), "records")[0])
 
 
 EFFECTS = ["seebeck_slope", "resistance_slope", "conductance_slope", "thomson", "joule_split", "heat_source",
-           "natural_convection", "radiation", "missing_link", "lead_heating", "input_gain", "input_offset", "hysteresis",
-           "sensor_offset", "sensor_gain", "ambient_gradient"]
+           "natural_convection", "radiation", "missing_link", "lead_heating", "input_gain", "input_offset",
+           "hysteresis", "sensor_offset", "sensor_gain", "ambient_gradient"]
 
 
 def test_signatures_are_what_a_small_effect_does_to_volts_and_kelvin(path: LinearizedRecord) -> None:
@@ -46,10 +47,8 @@ def test_signatures_are_what_a_small_effect_does_to_volts_and_kelvin(path: Linea
     errors = {}
     for one in tried:
         size = one.effect.size
-        step = 1e-3 * min(size.upper, 1e-3 if size.unit in ("V/K", "V/K²", "Ω/K", "W/K²") else 1.0)
-        shape = {q.name: (q.grid[0] if isinstance(q.grid, tuple) and q.grid else q.lower) for q in
-                 one.effect.quantities[1:]}
-        trial = one.at(shape) if hasattr(one, "at") else one
+        step = min(1e-4 * size.upper, size.typical)
+        trial = one.trials(path)[0]
         changed = rt.thermal.trajectory(trial.add(path.system, step), path.one.record, tolerance=1e-8).readings
         before = rt.thermal.trajectory(path.system, path.one.record, tolerance=1e-8).readings
         truth, found = (changed - before) / step, path.columns([trial])[..., 0]
@@ -61,7 +60,7 @@ def test_signatures_are_what_a_small_effect_does_to_volts_and_kelvin(path: Linea
 def test_whitener_inverts_the_dense_covariance(path: LinearizedRecord) -> None:
     noise, disturbance, n = np.array([0.02, 0.002]), np.array([0.05, 0.02]), 30
     A, C, Q = path.steps[0], path.C, gathered(path, disturbance)
-    assert np.ptp(C[:, 1], axis=0).max() > 0  # what a voltage reads of the temperatures changes along the record
+    assert np.ptp(C[:, 1], axis=0).max() > 1e-4  # V/K: what a voltage reads of the temperatures changes
     states = np.zeros((n, n, *A.shape[1:]))
     for k in range(1, n):
         for j in range(k):
@@ -86,5 +85,5 @@ def test_a_slope_of_the_resistance_is_named() -> None:
     hidden = plain(**{"modules.m1.resistance.slope": 0.02})
     found = rt.diagnose(plain(), logged(hidden, 1), validation=logged(hidden, 2))
     assert found.verdict == "named" and [one.effect for one in found.effects] == ["resistance_slope"]
-    slope, std = (getattr(found.effects[0].parameters["slope"], key) for key in ("value", "std"))
+    slope, std, _ = found.effects[0].values["slope"]
     assert abs(slope - 0.02) < 4 * std and std < 0.002

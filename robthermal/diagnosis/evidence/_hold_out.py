@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from ...errors import Diverged, InputError, Outcome
-from ...fitting import Start, free_run, refuse_same, rmse
+from ...fitting import Start, counted, free_run, refuse_same, rmse
 from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
@@ -33,7 +33,8 @@ class Gap:
     noise : float
         What sensor noise and random heat alone would give.
     unit : str
-        "K", or "standard deviations" of a frequency response's noise where there is no record.
+        "K"; "V" where records hold voltages alone; or "standard deviations" of a frequency response's noise where there
+        is no record.
     """
 
     before: float
@@ -182,8 +183,12 @@ def _validation_gap(before: Refit, after: Refit, data: Sequence[DataSet],
     if not residuals:
         return Gap(response_rms(before, data), response_rms(after, data), 1.0, "standard deviations")
     records = records_of(data)
-    return Gap(rmse(e for one in residuals for e in one.before.values()),
-               rmse(e for one in residuals for e in one.after.values()), expected_rms(after, records))
+    every = [name for one in records for name in one.sensors]
+    kept = [name for name, own in zip(every, counted(after.system, every, every), strict=True) if own]
+    before_them = rmse(e for one in residuals for name, e in one.before.items() if name in kept)
+    after_them = rmse(e for one in residuals for name, e in one.after.items() if name in kept)
+    unit = "K" if any(name in after.system.thermometers for name in kept) else "V"
+    return Gap(before_them, after_them, expected_rms(after, records), unit)
 
 
 def _residuals(before: Refit, after: Refit, records: Sequence[RecordData]) -> tuple[ValidationResiduals, ...]:
@@ -357,14 +362,16 @@ def expected_rms(fit: Refit, data: Sequence[RecordData] | None = None) -> float:
         structure, v = _over(fit, data, "measured")
         paths = structure.paths(v)
     total, count = 0.0, 0
+    every = [name for path in linearized_records(paths) for name in path.one.sensors]
     for path in linearized_records(paths):
         noise, disturbance = fit.levels.of(path, fit.floor)
         slow = fit.levels.slow(path, fit.floor)
-        spread = float(noise @ noise) + (0.0 if slow is None else float(slow.std @ slow.std))
+        own = counted(fit.system, path.one.sensors, every)
+        spread = float(noise[own] @ noise[own]) + (0.0 if slow is None else float(slow.std[own] @ slow.std[own]))
         A, P = path.steps[0], np.zeros(path.M.shape[1:])
         Q = gathered(path, disturbance)
         for k in range(len(A)):
-            total += float(np.trace(path.C[k] @ P @ path.C[k].T)) + spread
+            total += float(np.trace(path.C[k][own] @ P @ path.C[k][own].T)) + spread
             P = A[k] @ P @ A[k].T + Q[k]
-        count += path.one.readings.size
+        count += len(path.one.readings) * int(own.sum())
     return float(np.sqrt(total / count)) if count else 1.0

@@ -102,7 +102,8 @@ def _conditions(fit: Refit) -> tuple[str, ...]:
     for name in dict.fromkeys(name for path in paths for name in path.one.sensors):
         kept = [(path.one.readings[:, path.one.sensors.index(name)], size) for path, size in
                 zip(paths, sizes, strict=True) if name in path.one.sensors]
-        out.append(_worst(f"{name} [K]", [value for value, _ in kept], [size for _, size in kept]))
+        unit = fit.system.sensors[name].unit
+        out.append(_worst(f"{name} [{unit}]", [value for value, _ in kept], [size for _, size in kept]))
     out.append(_frequency(fit))
     return tuple(out)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import Outcome
-from ...fitting import rmse
+from ...fitting import counted, rmse
 from ...thermal import System
 from ..data import NoiseEstimate
 from ..effects import Candidate
@@ -149,11 +149,18 @@ class Refit:
     def rms(self) -> float:
         """Root mean square of the free-run residual over all sensors of the records [K].
 
+        Voltages count where no record holds a temperature; then it is in volts.
+
         Without any record: of the whitened residual of the responses, in standard deviations of their noise.
         """
         if not self.records:
             return rmse([self.z[:self.n_readings]])
-        return rmse(path.residual for path in self.records)
+        return rmse(path.residual[:, counted(self.system, path.one.sensors, self._read)] for path in self.records)
+
+    @property
+    def _read(self) -> list[str]:
+        """Sensors of all records."""
+        return [name for path in self.records for name in path.one.sensors]
 
     @property
     def records(self) -> tuple[LinearizedRecord, ...]:
@@ -169,7 +176,9 @@ class Refit:
     @property
     def unit(self) -> str:
         """Unit of `rms`."""
-        return "K" if self.records else "standard deviations"
+        if not self.records:
+            return "standard deviations"
+        return "K" if any(name in self.system.thermometers for name in self._read) else "V"
 
     def testable(self, tested: Iterable[Candidate]) -> list[Candidate]:
         """Candidates that these data may show.

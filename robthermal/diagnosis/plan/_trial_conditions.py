@@ -46,7 +46,7 @@ def trial_conditions(fit: Refit) -> TrialConditions | None:
     for one in records_of(fit.structure.data):
         return TrialConditions(one, fit.structure.data.index(one), fit.floor, fit.levels)
     first, system = responses_of(fit.structure.data)[0], fit.system
-    noise = {name: sensor.noise for name, sensor in system.sensors.items() if sensor.noise}
+    noise = {name: sensor.noise for name, sensor in system.thermometers.items() if sensor.noise}
     found = steady_state(system, first.operating_point)
     if not noise or not found.equilibria:
         return None
