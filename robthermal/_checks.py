@@ -58,7 +58,7 @@ def finite_number(value: object, where: str, unit: str = "") -> float:
     value : object
         What the caller gave.
     where : str
-        Name of the argument, for the message.
+        Name of the argument, or its place in words ("lump 'x' capacity"), for the message.
     unit : str
         Unit of the argument, for the message.
 
@@ -76,14 +76,18 @@ def finite_number(value: object, where: str, unit: str = "") -> float:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.integer, np.floating)):
-        raise InputError(f"{where} is {quoted(value)}, not a number", where=f"argument {where}", expected=expected)
+        raise InputError(f"{where} is {quoted(value)}, not a number", where=_place(where), expected=expected)
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise InputError(f"{where} is {number}, not finite", where=f"argument {where}", expected=expected)
+        raise InputError(f"{where} is {number}, not finite", where=_place(where), expected=expected)
     return number
+
+
+def _place(where: str) -> str:
+    return where if " " in where else f"argument {where}"
 
 
 def positive_number(value: object, where: str, unit: str = "") -> float:
@@ -94,7 +98,7 @@ def positive_number(value: object, where: str, unit: str = "") -> float:
     value : object
         What the caller gave.
     where : str
-        Name of the argument, for the message.
+        Name of the argument, or its place in words ("lump 'x' capacity"), for the message.
     unit : str
         Unit of the argument, for the message.
 
@@ -110,7 +114,7 @@ def positive_number(value: object, where: str, unit: str = "") -> float:
     """
     number = finite_number(value, where, unit)
     if number <= 0.0:
-        raise InputError(f"{where} is {number!r}", where=f"argument {where}",
+        raise InputError(f"{where} is {quoted(value)}", where=_place(where),
                          expected=f"a positive number{f' [{unit}]' if unit else ''}")
     return number
 
@@ -123,7 +127,7 @@ def whole_number(value: object, where: str, least: int) -> int:
     value : object
         What the caller gave.
     where : str
-        Name of the argument, for the message.
+        Name of the argument, or its place in words, for the message.
     least : int
         Smallest number that is accepted.
 
@@ -139,6 +143,6 @@ def whole_number(value: object, where: str, least: int) -> int:
     """
     number = finite_number(value, where)
     if number != int(number) or number < least:
-        raise InputError(f"{where} is {quoted(value)}", where=f"argument {where}",
+        raise InputError(f"{where} is {quoted(value)}", where=_place(where),
                          expected=f"a whole number of at least {least}")
     return int(number)

@@ -97,11 +97,11 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., tuple[Path,
     (folder / "setup.toml").write_text(SYSTEM, encoding="utf-8")
 
     def made(hidden: Callable[[float, np.ndarray], np.ndarray]) -> tuple[Path, Path, Path]:
-        train, unseen = (folder / f"{hidden.__name__}_{kind}.csv" for kind in ("train", "unseen"))
+        train, validation = (folder / f"{hidden.__name__}_{kind}.csv" for kind in ("train", "validation"))
         if not train.exists():
             measure(train, hidden, 1, 400)
-            measure(unseen, hidden, 2, 200)
-        return folder / "setup.toml", train, unseen
+            measure(validation, hidden, 2, 200)
+        return folder / "setup.toml", train, validation
 
     return made
 
@@ -116,10 +116,10 @@ def free_run(system: Path, record: Path) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def out(files: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    system, train, unseen = files(across)
+    system, train, validation = files(across)
     found = rt.read_system(system)
-    result = rt.jobs.diagnose_records(found, (system, train, unseen), [rt.read_record(train, found)],
-                                      [rt.read_record(unseen, found)])
+    result = rt.jobs.diagnose_records(found, (system, train, validation), [rt.read_record(train, found)],
+                                      [rt.read_record(validation, found)])
     folder = tmp_path_factory.mktemp("named") / "out"
     rt.jobs.write_diagnosis(result, folder)
     return folder
@@ -135,11 +135,11 @@ class TestNamed:
         size = found["effects"][0]["parameters"]["conductance"]
         assert abs(size["value"] - 0.12) < 4 * size["std"] and size["unit"] == "W/K"
 
-    def test_augmented_toml_closes_the_gap_on_unseen_data(self, out: Path, files: Any) -> None:
+    def test_augmented_toml_closes_the_gap_on_validation_data(self, out: Path, files: Any) -> None:
         """The files alone, free runs by another way than the diagnosis's own."""
-        system, _, unseen = files(across)
+        system, _, validation = files(across)
         gap = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["gap"]["validation"]
-        before, after = (np.sqrt(np.mean(free_run(file, unseen) ** 2)) for file in (system, out / "augmented.toml"))
+        before, after = (np.sqrt(np.mean(free_run(file, validation) ** 2)) for file in (system, out / "augmented.toml"))
         assert before > 0.2 and after == pytest.approx(gap["after"], rel=0.1) and after < 0.012
 
     def test_junit_and_summary_are_tests_not_proofs(self, out: Path) -> None:
@@ -154,16 +154,16 @@ class TestNamed:
         page = (out / "report.html").read_text(encoding="utf-8")
         for words in ("Diagnosis report", "✓</span> NAMED", "missing_ambient_link(block, room)", "accepted, ΔBIC",
                       "which it resembles", "no more than noise", "Residual before and after", "train: across_train",
-                      "validation: across_unseen", "Where the misfit sits", "What could not have been seen",
-                      "Next experiment", "SHA-256 of across_unseen.csv", "nothing here is proven"):
+                      "validation: across_validation", "Where the misfit sits", "What could not have been seen",
+                      "Next experiment", "SHA-256 of across_validation.csv", "nothing here is proven"):
             assert words in page, words
         assert "ertified" not in page and "CERTIFIED" not in page and "robthermal verify" not in page
 
 
 def test_consistent_is_yes(run: Run, files: Any, tmp_path: Path) -> None:
-    system, train, unseen = files(nothing)
+    system, train, validation = files(nothing)
     out = tmp_path / "out"
-    status, said, warned = run("diagnose", system, train, "--validation", unseen, "--out", out, "--json")
+    status, said, warned = run("diagnose", system, train, "--validation", validation, "--out", out, "--json")
     assert (status, warned) == (0, "")
     found = json.loads(said)
     assert found["verdict"] == "consistent" and found["effects"] == [] and found["out"] == str(out)
@@ -180,9 +180,9 @@ def test_without_validation_the_report_says_so(run: Run, files: Any, tmp_path: P
 
 
 def test_ambiguous_is_no_and_lists_the_others(run: Run, files: Any, tmp_path: Path) -> None:
-    system, train, unseen = files(constant)
+    system, train, validation = files(constant)
     out = tmp_path / "out"
-    status, said, _ = run("diagnose", system, train, "--validation", unseen, "--out", out, "--json")
+    status, said, _ = run("diagnose", system, train, "--validation", validation, "--out", out, "--json")
     found = json.loads(said)
     assert (status, found["verdict"]) == (1, "ambiguous")
     names = {found["effects"][0]["effect"], *(other["effect"] for other in found["alternatives"][0])}
@@ -194,7 +194,7 @@ def test_ambiguous_is_no_and_lists_the_others(run: Run, files: Any, tmp_path: Pa
     assert "✗</span> AMBIGUOUS" in page and "these records cannot tell it from" in page
 
 
-def test_what_does_not_hold_on_unseen_records_has_no_name(run: Run, files: Any, tmp_path: Path) -> None:
+def test_what_does_not_hold_on_validation_records_has_no_name(run: Run, files: Any, tmp_path: Path) -> None:
     system, train, _ = files(nothing)
     out = tmp_path / "out"
     status, said, _ = run("diagnose", system, train, "--validation", files(across)[2], "--out", out)
@@ -237,11 +237,11 @@ class TestBadInput:
 
 def test_a_frequency_response_and_its_operating_point(files: Any, run: Run, tmp_path: Path) -> None:
     """Estimated by `robthermal frf`; hidden: a path to the room, which a response cannot tell from convection."""
-    system, train, unseen = files(across)
+    system, train, validation = files(across)
     assert run("frf", train, "--system", system, "--out", tmp_path / "frf.json")[0] == 0
     words = ("diagnose", system, tmp_path / "frf.json", "--operating-point", "heater=5.25", "--operating-point",
              "room=25", "--out", tmp_path / "found", "--json")
-    status, _, warned = run(*words, "--validation", unseen)
+    status, _, warned = run(*words, "--validation", validation)
     assert status == 2 and "a frequency response" in warned
     status, said, _ = run(*words)
     found = json.loads(said)
@@ -253,8 +253,8 @@ def test_a_frequency_response_and_its_operating_point(files: Any, run: Run, tmp_
 
 
 def test_days_with_a_gain_of_their_own(files: Any, run: Run, tmp_path: Path) -> None:
-    system, train, unseen = files(nothing)
-    table = np.loadtxt(unseen, delimiter=",", skiprows=1)
+    system, train, validation = files(nothing)
+    table = np.loadtxt(validation, delimiter=",", skiprows=1)
     table[:, 1] /= 1.05  # on this day the heater gave 5 % more than recorded
     other = tmp_path / "day2.csv"
     np.savetxt(other, table, delimiter=",", header="time,heater,Tp,Tb", comments="", fmt="%.9g")

@@ -16,10 +16,13 @@ from pathlib import Path
 from types import ModuleType
 
 import grimp
+import numpy as np
 import pytest
 from importlinter import cli as import_linter
 from numpydoc.docscrape import NumpyDocString
 from packaging.requirements import Requirement
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 import robthermal as rt
 
@@ -59,6 +62,18 @@ def test_no_import_cycles() -> None:
     graph = import_graph()
     uses = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     assert set(TopologicalSorter(uses).static_order()) >= set(graph.modules)  # a cycle raises and is named
+
+
+def test_few_circles_are_closed_by_imports_for_type_checkers() -> None:
+    """A class and what draws or writes it name one another; more than these, and the files are no longer apart."""
+    graph = grimp.build_graph("robthermal", cache_dir=None)
+    uses = {module: sorted(graph.find_modules_directly_imported_by(module)) for module in sorted(graph.modules)}
+    names = list(uses)
+    matrix = csr_array([[other in found for other in names] for found in map(set, uses.values())])
+    _, label = connected_components(matrix, directed=True, connection="strong")
+    circles = [[name for name, own in zip(names, label, strict=True) if own == one]
+               for one, size in enumerate(np.bincount(label)) if size > 1]
+    assert len(circles) <= 4, "\n".join(", ".join(circle) for circle in circles)
 
 
 def test_no_package_goes_through_the_front_door() -> None:

@@ -101,13 +101,13 @@ def runs(folder: Path) -> tuple[rt.Record, rt.Record]:
     return simulated(1), simulated(2, second=False)
 
 
-def diagnose(training: rt.Record, unseen: rt.Record, effects: tuple[str, ...] = EFFECTS) -> rt.diagnosis.Diagnosis:
+def diagnose(training: rt.Record, validation: rt.Record, effects: tuple[str, ...] = EFFECTS) -> rt.diagnosis.Diagnosis:
     """Diagnose the window of the training run, with the run on heater 1 alone held out."""
-    room = float(np.mean([rest_value(training), rest_value(unseen)]))
-    return rt.diagnose(nominal(room), means(training).between(*WINDOW), validation=means(unseen), effects=effects)
+    room = float(np.mean([rest_value(training), rest_value(validation)]))
+    return rt.diagnose(nominal(room), means(training).between(*WINDOW), validation=means(validation), effects=effects)
 
 
-def calibrated(system: rt.System, training: rt.Record, unseen: rt.Record) -> rt.calibration.Fit:
+def calibrated(system: rt.System, training: rt.Record, validation: rt.Record) -> rt.calibration.Fit:
     """Every conductance, gain and lag of a system, fitted to the whole training run by its free run.
 
     The diagnosis weighs short times more, because draughts are random; a model for free runs is fitted to a free run.
@@ -116,18 +116,18 @@ def calibrated(system: rt.System, training: rt.Record, unseen: rt.Record) -> rt.
              *(f"sensors.{name}.time_constant" for name, sensor in system.sensors.items() if sensor.time_constant)]
     ranges = {name: (0.2 * system.parameter(name), 5.0 * system.parameter(name)) for name in names}
     return rt.calibrate(system, without_glitches(training), parameters=ranges, loss="soft_l1",
-                        noise=STEP / 12**0.5, validation=without_glitches(unseen))
+                        noise=STEP / 12**0.5, validation=without_glitches(validation))
 
 
 def main(folder: Path) -> None:
     """Print the diagnosis and what it is worth on the run it has not seen."""
-    training, unseen = runs(folder)
-    found = diagnose(training, unseen)
+    training, validation = runs(folder)
+    found = diagnose(training, validation)
     print(found)
     print("alternatives:", found.alternatives)
     print("\nfree-run RMSE of T1/T2 [K]     training run    heater 1 alone")
     for what, system in (("convection only", found.nominal.system), ("with the effects", found.fit.system)):
-        fit = calibrated(system, training, unseen)
+        fit = calibrated(system, training, validation)
         scores = (f"{rmse['T1']:.2f}/{rmse['T2']:.2f}" for rmse in (fit.rmse, fit.validation_rmse))
         print(f"{what:<29} {next(scores):>13} {next(scores):>17}")
 

@@ -144,8 +144,8 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
                          remedy="Leave it out: a record brings its own inputs.")
     ranges = chosen_ranges(system, parameters)
     training = as_data(system, data, "data")
-    unseen = as_data(system, validation, "validation") if validation is not None else []
-    refuse_same(training, unseen)
+    held_out = as_data(system, validation, "validation") if validation is not None else []
+    refuse_same(training, held_out)
     _refuse_double_start(ranges, initial)
     starts = [initial_of(system, one, initial) for one in training]
     refuse_short(training, len(ranges.names))
@@ -155,7 +155,7 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
     if filtered:
         _refuse_unknown_noise(levels)
     solution = _solve(problem, levels, loss, max_iterations, filtered)
-    return _result(problem, solution, unseen, initial, loss)
+    return _result(problem, solution, held_out, initial, loss)
 
 
 @dataclass(frozen=True)
@@ -208,14 +208,14 @@ def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict
             for name in unknown}
 
 
-def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: Start, loss: Loss) -> Fit:
+def _result(problem: Problem, solution: Solution, held_out: list[Data], initial: Start, loss: Loss) -> Fit:
     ranges, v = problem.ranges, solution.v
     values = problem.parameters(v)
     known = information(problem, v, loss)
     slopes = ranges.slopes(values)
     residuals = problem.residuals(v)
     system = problem.system.with_parameters(ranges.assigned(values))
-    checks = [free_run(system, one, initial, solution.noise) for one in unseen]
+    checks = [free_run(system, one, initial, solution.noise) for one in held_out]
     fit = Fit(
         system=system,
         parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
@@ -227,7 +227,7 @@ def _result(problem: Problem, solution: Solution, unseen: list[Data], initial: S
         logarithmic=ranges.logarithmic, degrees_of_freedom=known.degrees_of_freedom, covariance_scale=known.scale,
         noise=solution.noise,
         data=tuple(one.record for one in problem.data),
-        validation_data=tuple(one.record for one in unseen),
+        validation_data=tuple(one.record for one in held_out),
         residuals=tuple(_by_sensor(one, r) for one, r in zip(problem.data, residuals, strict=True)),
         validation_residuals=tuple(run.by_sensor for run in checks),
         initial_temperatures=tuple(_by_lump(system, T) for T in problem.temperatures(v)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .._arrays import Floats
-from ..errors import Outcome
+from ..errors import InputError, Outcome
+from ..export import plain
 from ..thermal import System
 from ._outcomes import CalibrationCode
-from ._parameter_ranges import Set, ranges_of
+from ._parameter_ranges import Set, check_request, factor
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -109,8 +109,36 @@ class Estimates:
         -----
         Seber and Wild, *Nonlinear Regression*, 1989, section 5.1; derivation in the documentation, "Calibration".
         """
-        ends = zip(self.parameters, *ranges_of(self, confidence, set), strict=True)
+        ends = zip(self.parameters, *self._ends(confidence, set), strict=True)
         return {own: (float(low), float(high)) for name, low, high in ends for own in name.split(" = ")}
+
+    def _ends(self, confidence: float, shape: str) -> tuple[Floats, Floats]:
+        """Lower and upper ends (p,) of the ranges, in the unit of each parameter.
+
+        In the coordinates q of the optimizer (logarithms of positive parameters) the ends are q̂ ± c s, s the standard
+        deviation, which leaves positive parameters positive; then cut at the bounds. Parameters that neither data nor
+        prior determine have their bounds.
+        """
+        check_request(confidence, shape)
+        self._expect_covariance()
+        values = np.array(list(self.parameters.values()))
+        slopes = np.where(self.logarithmic, values, 1.0)
+        reach = factor(shape, int(np.sum(~self.bounded)), self.degrees_of_freedom, confidence) * np.sqrt(
+            np.diag(self.covariance) * self.covariance_scale) / slopes
+        with np.errstate(over="ignore"):  # beyond every bound, at which it is cut
+            low, high = (np.where(self.logarithmic, values * np.exp(np.where(self.logarithmic, side, 0.0)),
+                                  values + side) for side in (-reach, reach))
+        low, high = np.clip(low, self.lower, self.upper), np.clip(high, self.lower, self.upper)
+        return np.where(self.bounded, self.lower, low), np.where(self.bounded, self.upper, high)
+
+    def _expect_covariance(self) -> None:
+        if self.outcome.code == CalibrationCode.NOT_CONVERGED.code:
+            raise InputError("the calibration did not converge: its covariance is that of no estimate",
+                             where="fit.ranges",
+                             remedy=f"{self.outcome.text} Or give the certificate parameters= yourself.")
+        if not np.isfinite(self.covariance).all():
+            raise InputError("the calibration has no covariance", where="fit.ranges",
+                             remedy="Calibrate with data, or give parameters=.")
 
     def range_table(self, confidence: float = 0.95) -> pd.DataFrame:
         """Estimates with their simultaneous ranges ("ellipsoid"), for reports.
@@ -125,7 +153,7 @@ class Estimates:
         pandas.DataFrame
             Index: parameter. Columns: value, std, low, high, determined (by the data), ends_at ("" or which bound).
         """
-        low, high = ranges_of(self, confidence, "ellipsoid")
+        low, high = self._ends(confidence, "ellipsoid")
         at = np.array([["", "upper bound"], ["lower bound", "both bounds"]])
         columns = {"value": list(self.parameters.values()), "std": list(self.std.values()), "low": low, "high": high,
                    "determined": [name not in self.undetermined_parameters for name in self.parameters],
@@ -169,13 +197,6 @@ class Estimates:
             "iterations": self.iterations,
             "outcome": vars(self.outcome),
         }
-
-
-def plain(value: Any) -> float | bool | None:
-    """A number ready for JSON."""
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    return float(value) if math.isfinite(value) else None
 
 
 def outcome_of(fit: Estimates, converged: bool) -> Outcome:

@@ -8,9 +8,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .._arrays import Floats
+from ..export import plain
 from ..fitting import rmse_by_sensor
 from ..signals import Record
-from ._estimates import Estimates, plain
+from ._estimates import Estimates
 from ._figure import draw
 from ._score import Score
 from ._whiteness import Whiteness
@@ -94,8 +95,8 @@ class Fit(Estimates):
             Training records first, then validation; voltages [V] and their residuals stand below the temperatures.
         """
         fitted = zip(self.data, self.residuals, self.train, strict=True)
-        unseen = zip(self.validation_data, self.validation_residuals, self.validation, strict=True)
-        return draw([*fitted, *unseen], len(self.data), self.system.sensor_units)
+        held_out = zip(self.validation_data, self.validation_residuals, self.validation, strict=True)
+        return draw([*fitted, *held_out], len(self.data), self.system.sensor_units)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but signals, ready for JSON: no infinities, no arrays.

@@ -65,14 +65,16 @@ def loop(system: System, *, current: Currents, temperature: Temperatures, sample
         Claim it only for trajectories on which no face of a module moves further than this within a sample [K]; by an
         older proof, which reaches less far without such an assumption.
     gain : array_like, shape (n_lumps, n_sensors), optional
-        L of an observer x̂⁺ = A_d x̂ + Γ f(x̂, I) + L (y - C x̂), as in `observer`: law and controller then read its
-        estimates, for plant "continuous". The plant moves continuously, only the observer's model holds the heat.
+        L of an observer x̂⁺ = A_d x̂ + Γ f(x̂, I) + L (y - C x̂), as in `observer`: feedback law and controller then
+        read its estimates, for plant "continuous". The plant moves continuously, only the observer's model
+        holds the heat.
     sensors : sequence of str
         What that observer reads.
     parameters : mapping, optional
         Uncertain conductances of links, {"links.NAME.conductance": (lower, upper)} [W/K], for plant "continuous" and
-        without observer. What the law knows (the modules) and what is not offered here (capacities, natural convection,
-        radiation) is refused by name; what no loop depends on (a sensor that is not read, a start) is ignored.
+        without observer. What the feedback law knows (the modules) and what is not offered here (capacities, natural
+        convection, radiation) is refused by name; what no loop depends on (a sensor that is not read, a start)
+        is ignored.
     large : bool
         Search a dense P for more than 40 lumps too, which may take hours.
 

@@ -25,7 +25,7 @@ def check_loop_parameters(system: System, parameters: Mapping[str, Interval] | N
     plant : {"continuous", "held"}
         Plant of the claim, as in `loop`.
     observer : bool
-        Whether law and controller read estimates.
+        Whether the linearizing feedback law and the controller read estimates.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def check_loop_parameters(system: System, parameters: Mapping[str, Interval] | N
     for name in box:
         if name.startswith("links.") and name.endswith(".conductance"):
             continue
-        why = ": the law is made of the module's own numbers" if name.startswith("modules.") else ""
+        why = ": the feedback law is made of the module's own numbers" if name.startswith("modules.") else ""
         raise InputError(f"{name!r} cannot be uncertain in a loop{why}", where="argument parameters",
                          expected="conductances of links",
                          remedy="Leave it out here. With its range rt.certify.runaway_free and usable_current claim "

@@ -258,7 +258,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
            as_json: Json = False) -> None:
-    """Design a controller: certified current limits, linearizing law, PI, observer, certificates, report.
+    """Design a controller: certified current limits, linearizing feedback law, PI, observer, certificates, report.
 
     Example: robthermal design setup.toml --setpoint m1=5 --setpoint m2=5 --bandwidth 0.02 --out design
     """

@@ -87,9 +87,9 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         {ambient: (lower, upper)} [K], {lump: (lower, upper)} [W]: what else acts; default nominal, and the declared
         limits of the heaters, or none where `temperature` is given.
     observer : GainObserver, optional
-        Where the law and the controller use estimates. If the loop is too large, or no proof is found for the plant
-        in continuous time, the claim is about the *sampled model* of the observer, the heat of the modules held over a
-        sample, not about the machine between the samples, and the outcome says so.
+        Where the linearizing feedback law and the controller use estimates. If the loop is too large, or no
+        proof is found for the plant in continuous time, the claim is about the *sampled model* of the observer, the
+        heat of the modules held over a sample, not about the machine between the samples, and the outcome says so.
     drift : float, optional
         As in `rt.certify.loop`.
     parameters : mapping, optional
@@ -105,8 +105,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     Raises
     ------
     InputError
-        Voltage or slew limits, no current limits, a module the law does not drive, another kind of controller, sample
-        times that differ.
+        Voltage or slew limits, no current limits, a module the feedback law does not drive, another kind of controller,
+        sample times that differ.
 
     Examples
     --------
@@ -185,16 +185,17 @@ def _outcome(loop: Certificate, stays: Certificate, estimate: Certificate | None
 
 def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:
     if law.system != system:
-        raise InputError("the law was built for another system", where="argument law", expected="the plant's own",
-                         remedy="Build it with rt.design.feedback_linearization(system).")
+        raise InputError("the feedback law was built for another system", where="argument law",
+                         expected="the plant's own", remedy="Build it with rt.design.feedback_linearization(system).")
     if set(law.names) != set(system.module_names):
         raise InputError(f"the feedback law drives {', '.join(law.names)}", where="argument law",
                          expected="every module: " + ", ".join(system.module_names))
     if np.isfinite([law.voltage_low, law.voltage_high]).any() or np.isfinite(law.slew).any():
-        raise InputError("the law has a voltage or slew limit", where="argument law", expected="current limits only")
+        raise InputError("the feedback law has a voltage or slew limit", where="argument law",
+                         expected="current limits only")
     if not np.isfinite([law.current_low, law.current_high]).all():
-        raise InputError("the law has no current limits", where="argument law", expected="a range for every module",
-                         remedy="Give current_limits=(lower, upper).")
+        raise InputError("the feedback law has no current limits", where="argument law",
+                         expected="a range for every module", remedy="Give current_limits=(lower, upper).")
     return {name: (float(low), float(high)) for name, low, high in
             zip(law.names, law.current_low, law.current_high, strict=True)}
 

@@ -15,7 +15,9 @@ from ._numbers import expect
 
 @dataclass(frozen=True)
 class ConstantGain:
-    """I = I0 - g (v - v0), g = abs(dI/dv): the tangent of the law at one operating point, with the law's limits.
+    """The tangent of the linearizing feedback law at one operating point, with its limits.
+
+    I = I0 - g (v - v0), g = abs(dI/dv).
 
     Parameters
     ----------

@@ -80,8 +80,9 @@ class Controller(ABC):
 def expect_modules(count: int, heat: Array) -> None:
     """Refuse a loop with another number of modules: one gain would silently act for all."""
     if len(heat) != count:
-        raise InputError(f"a controller of {count} modules for a law of {len(heat)}", where="argument controller",
-                         expected="one made for the cold side of the same law", remedy="rt.design.cold_side(law).")
+        raise InputError(f"a controller of {count} modules for a feedback law of {len(heat)}",
+                         where="argument controller", expected="one made for the cold side of the same law",
+                         remedy="rt.design.cold_side(law).")
 
 
 def expect_controller(controller: object) -> None:

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..export import Program, comment, identifier, number, write_export
-from ._matrices import Matrices, dot, matrices
+from ._matrices import Matrices, Steps, dot, matrices
 from ._modules import Array
-
-if TYPE_CHECKING:
-    from ._controller import Controller
 
 FORMAT = "robthermal-controller/1"
 _TEST_SAMPLES = 64
@@ -62,7 +59,7 @@ static inline void {p}_advance({p}_state *s, const {p}_seen *e, const double wan
 """
 
 
-def export(controller: Controller, path: str | Path, name: str) -> None:
+def export(controller: Steps, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
     M = matrices(controller)
     kind = type(controller).__name__

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from .._celsius import ZERO_CELSIUS
 from ..export import Program, comment, doubles, identifier, write_export
-
-if TYPE_CHECKING:
-    from ._linearization import FeedbackLinearization
+from ._modules import Array, ModuleSet
 
 FORMAT = "robthermal-law/1"
 LIMITS = ("", "slew", "optimum", "voltage", "current", "fault")  # numbered as in the C source
@@ -92,12 +90,51 @@ static inline int {p}_step(const double wanted[{m}], const double hot[{m}], cons
 """
 
 
-def export(law: FeedbackLinearization, path: str | Path, name: str) -> None:
+class Law(Protocol):
+    """What is written of a linearizing feedback law, see `FeedbackLinearization`."""
+
+    @property
+    def modules(self) -> ModuleSet:
+        """Driven modules."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names, in the order of the heats."""
+
+    @property
+    def current_low(self) -> Array:
+        """Smallest currents [A]."""
+
+    @property
+    def current_high(self) -> Array:
+        """Largest currents [A]."""
+
+    @property
+    def voltage_low(self) -> Array:
+        """Smallest voltages [V]."""
+
+    @property
+    def voltage_high(self) -> Array:
+        """Largest voltages [V]."""
+
+    @property
+    def slew(self) -> Array:
+        """Largest changes of current [A/s]."""
+
+    def bounds(self, temperatures: Array) -> Any:
+        """Coldest heats, for the test vector."""
+
+    def command(self, v: Array, temperatures: Array, *, previous: Array | None = None,
+                sample_time: float | None = None) -> Any:
+        """Currents, voltages and heats, for the test vector."""
+
+
+def export(law: Law, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
     write_export(path, lambda: _document(law, name), lambda: _program(law, name))
 
 
-def _rows(law: FeedbackLinearization) -> dict[str, dict[str, float]]:
+def _rows(law: Law) -> dict[str, dict[str, float]]:
     """Numbers of every module, in the order of the C struct."""
     limits = (law.current_low, law.current_high, law.voltage_low, law.voltage_high, law.slew)
     keys = ("current_low", "current_high", "voltage_low", "voltage_high", "slew")
@@ -110,14 +147,14 @@ def _rows(law: FeedbackLinearization) -> dict[str, dict[str, float]]:
     return found
 
 
-def _document(law: FeedbackLinearization, name: str) -> dict[str, Any]:
+def _document(law: Law, name: str) -> dict[str, Any]:
     """Module after module; a limit that is not there is infinite."""
     modules = [{"name": module, "hot": part.hot, "cold": part.cold, **row}
                for (module, row), part in zip(_rows(law).items(), law.modules.parts, strict=True)]
     return {"format": FORMAT, "name": name, "modules": modules}
 
 
-def _program(law: FeedbackLinearization, name: str) -> Program:
+def _program(law: Law, name: str) -> Program:
     """Inputs of the test: wanted, hot, cold, previous; outputs: current, voltage, achieved, limit."""
     p, m = identifier(name, "law"), len(law.names)
     body = _BODY.format(p=p, m=m, modules=",\n".join("    " + doubles(row.values()) for row in _rows(law).values()))
@@ -127,10 +164,10 @@ def _program(law: FeedbackLinearization, name: str) -> Program:
                    list(_test_vector(law)), 4 * m, f"    int limit[{m}];", call)
 
 
-def _test_vector(law: FeedbackLinearization) -> Iterator[list[float]]:
+def _test_vector(law: Law) -> Iterator[list[float]]:
     """Heats from beyond the coldest to beyond every heating limit; the slew limit is active in every other sample."""
     rng, m = np.random.default_rng(0), len(law.names)
-    x = np.full(len(law.system.lumps), 298.15)
+    x = np.full(len(law.modules.system.lumps), 298.15)
     for t in range(_TEST_SAMPLES):
         x[law.modules.cold] = rng.uniform(ZERO_CELSIUS, 298.15, m)
         x[law.modules.hot] = rng.uniform(298.15, 318.15, m)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..export import Program, comment, doubles, identifier, number, rows, write_export
 from ..thermal import format_system
 from ._export_heats import DRIVE, HEATS, INTEGERS, Heat, Row
+from ._modules import Array
+from ._observer_model import ObserverModel
 from ._observer_recursion import ObserverRecursion
-
-if TYPE_CHECKING:
-    from ._observer import GainObserver
 
 FORMAT = "robthermal-observer/1"
 _TEST_SAMPLES = 64
@@ -109,42 +108,41 @@ static inline int {p}_step({p}_state *s, const double readings[{n_y}], const dou
 """
 
 
-def export(observer: GainObserver, path: str | Path, name: str) -> None:
+def export(model: ObserverModel, gain: Array, method: str, path: str | Path, name: str) -> None:
     """Write a .c, .h, .mat or .json file."""
-    write_export(path, lambda: _document(observer, name), lambda: _program(observer, name))
+    write_export(path, lambda: _document(model, gain, method, name), lambda: _program(model, gain, method, name))
 
 
-def _document(observer: GainObserver, name: str) -> dict[str, Any]:
+def _document(model: ObserverModel, gain: Array, method: str, name: str) -> dict[str, Any]:
     """x⁺ = A x + G f + L (y - C x); f follows from the system, given as the text of its file."""
-    model = observer.model
-    return {"format": FORMAT, "name": name, "method": observer.method, "sample_time": model.sample_time,
+    return {"format": FORMAT, "name": name, "method": method, "sample_time": model.sample_time,
             "lumps": list(model.system.lump_names), "sensors": list(model.sensors),
             "inputs": list(model.system.exogenous_names), "A": model.A_d, "G": model.Gamma, "C": model.C,
-            "L": observer.gain, "system": format_system(model.system)}
+            "L": gain, "system": format_system(model.system)}
 
 
-def _program(observer: GainObserver, name: str) -> Program:
+def _program(model: ObserverModel, gain: Array, method: str, name: str) -> Program:
     """Inputs of the test: readings, inputs; outputs: the estimate after the step."""
-    p, system, recursion = identifier(name, "observer"), observer.model.system, ObserverRecursion.of(observer)
-    n, n_y, n_u = len(system.lumps), len(observer.sensors), len(system.exogenous_names)
+    p, system, recursion = identifier(name, "observer"), model.system, ObserverRecursion.of(model, gain)
+    n, n_y, n_u = len(system.lumps), len(model.sensors), len(system.exogenous_names)
     about = _ABOUT.format(
-        p=p, method=observer.method, h=observer.sample_time, lumps=comment(", ".join(system.lump_names)),
-        sensors=comment(", ".join(observer.sensors)), inputs=comment(", ".join(system.exogenous_names)))
+        p=p, method=method, h=model.sample_time, lumps=comment(", ".join(system.lump_names)),
+        sensors=comment(", ".join(model.sensors)), inputs=comment(", ".join(system.exogenous_names)))
     # the first row of the test starts at the readings' mean
     call = (f"        if (t == 0)\n            for (int k = 0; k < {n}; k++)\n                state.x[k] = in[0];\n"
             f"        {p}_step(&state, in, in + {n_y});\n        for (int k = 0; k < {n}; k++)\n"
             f"            out[k] = state.x[k];")
-    return Program(p, "OBSERVER_TEST", about, _body(p, observer, recursion), list(_test_vector(observer, recursion)),
+    return Program(p, "OBSERVER_TEST", about, _body(p, model, recursion), list(_test_vector(model, recursion)),
                    n_y + n_u, f"    {p}_state state = {{{{0}}}};", call)
 
 
-def _body(p: str, observer: GainObserver, recursion: ObserverRecursion) -> str:
-    system = observer.model.system
+def _body(p: str, model: ObserverModel, recursion: ObserverRecursion) -> str:
+    system = model.system
     n, n_u = len(system.lumps), len(system.exogenous_names)
     kinds = [(HEATS[kind], kind.removesuffix("Term").lower(), table) for kind, table in recursion.heats.items()]
     shaped = [(DRIVE, "drive", recursion.drives)] if recursion.drives else []
     return _BODY.format(
-        p=p, n=n, n_y=len(observer.sensors), n_u=n_u, n_w=n_u + 1,
+        p=p, n=n, n_y=len(model.sensors), n_u=n_u, n_w=n_u + 1,
         nodes=n + recursion.n_ambients, first_ambient=n_u - recursion.n_ambients, T_ref=number(recursion.T_ref),
         A=rows(recursion.A_d), G=rows(recursion.Gamma), L=rows(recursion.L), D=rows(recursion.D),
         sensor_rows=",\n".join(f"    {{{int(lump)}, {number(offset)}, {number(gain)}}}"
@@ -168,13 +166,13 @@ def _loop(p: str, heat: Heat, kind: str, table: list[Row]) -> str:
             f"        const struct {p}_{kind} *p = &{p}_{kind}_rows[k];\n{body}\n    }}\n")
 
 
-def _test_vector(observer: GainObserver, recursion: ObserverRecursion) -> Iterator[list[float]]:
+def _test_vector(model: ObserverModel, recursion: ObserverRecursion) -> Iterator[list[float]]:
     """Inputs within their ranges, readings that follow the estimate."""
-    system, rng = observer.model.system, np.random.default_rng(0)
+    system, rng = model.system, np.random.default_rng(0)
     ranges = [limits or (-1.0, 1.0) for limits in (*system.input_limits.values(), *system.current_limits.values())]
     x: Row = []
     for t in range(_TEST_SAMPLES):
-        y = rng.uniform(295.0, 301.0, len(observer.sensors)).tolist()
+        y = rng.uniform(295.0, 301.0, len(model.sensors)).tolist()
         x = x or [y[0]] * len(recursion.A_d)
         u = [float(rng.uniform(*pair)) * (t % 8 > 0) for pair in ranges]
         u += [float(part.temperature + rng.standard_normal()) for part in system.ambients.values()]

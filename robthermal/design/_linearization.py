@@ -356,7 +356,7 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
 
 
 def _refuse_effects(modules: ModuleSet) -> None:
-    """The law inverts S, R and K; it knows no other heat of a module, and no current but the one it commands."""
+    """The feedback law inverts S, R and K; it knows no other heat of a module, no current but its own."""
     for name in modules.system.effects:
         if name.startswith(tuple(f"modules.{module}." for module in modules.names)):
             raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the feedback law",

@@ -113,7 +113,8 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     duration : float
         Simulated time from the start [s].
     inputs : mapping, optional
-        Heaters [unit], ambients [K] and currents of modules the law does not drive [A], by name: a number or (n,).
+        Heaters [unit], ambients [K] and currents of modules the feedback law does not drive [A], by name: a
+        number or (n,).
     load : mapping of lump, optional
         Unmeasured heat into lumps [W]: a number or (n,).
     initial : array_like or mapping, optional

@@ -68,7 +68,8 @@ def linear_controller(plant: ColdSide, system: Any, *, sample_time: float) -> Li
     plant : ColdSide
         What it controls.
     system : control.StateSpace or control.TransferFunction
-        From the errors r - y of the cold faces [K] to the heats v [W], in the order of the law's modules. A continuous
+        From the errors r - y of the cold faces [K] to the heats v [W], in the order of the modules of the
+        linearizing feedback law. A continuous
         one is sampled exactly with held input; a discrete one must have this sample time.
     sample_time : float
         Time between two samples [s].

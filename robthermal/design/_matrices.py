@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,10 +12,22 @@ from ..errors import InputError
 from ._controller_input import ControllerInput
 from ._modules import Array
 
-if TYPE_CHECKING:
-    from ._controller import Controller
-
 _LINEAR = 1e-9  # relative: a controller whose matrices miss it by more is not linear
+
+
+class Steps(Protocol):
+    """What a controller does at a sample, see `Controller`."""
+
+    sample_time: float
+
+    def start(self, given: ControllerInput, heat: Array) -> Array:
+        """State at the start."""
+
+    def heat(self, state: Array, given: ControllerInput) -> Array:
+        """Wanted heats [W]."""
+
+    def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
+        """State at the next sample."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +91,12 @@ def dot(row: Array, values: list[float]) -> float:
     return total
 
 
-def matrices(controller: Controller) -> Matrices:
+def matrices(controller: Steps) -> Matrices:
     """Matrices of a controller, from its answers to unit vectors, without memory that nothing reads.
 
     Parameters
     ----------
-    controller : Controller
+    controller : Steps
         Linear in its memory and in what it sees.
     """
     own = getattr(controller, "matrices", None)

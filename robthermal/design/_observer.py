@@ -79,7 +79,7 @@ class GainObserver(Observer):
         InputError
             For another ending, or when the file cannot be written.
         """
-        export(self, path, name)
+        export(self.model, self.gain, self.method, path, name)
 
     def spectral_radius(self, current: Mapping[str, Interval], temperature: Temperatures) -> float:
         """Largest spectral radius of the error with currents and temperatures frozen at the corners of a box.

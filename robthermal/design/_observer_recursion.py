@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ._export_heats import DRIVE, HEATS, Row, drives, named, tables
-
-if TYPE_CHECKING:
-    from ._observer import GainObserver
+from ._modules import Array
+from ._observer_model import ObserverModel
 
 
 @dataclass(frozen=True)
@@ -43,19 +41,21 @@ class ObserverRecursion:
     heats: dict[str, list[Row]]
 
     @classmethod
-    def of(cls, observer: GainObserver) -> ObserverRecursion:
+    def of(cls, model: ObserverModel, gain: Array) -> ObserverRecursion:
         """Tables of an observer.
 
         Parameters
         ----------
-        observer : GainObserver
-            With a constant gain.
+        model : ObserverModel
+            What the observer predicts with.
+        gain : ndarray, shape (n_lumps, n_sensors)
+            Constant gain of its correction.
         """
-        model, eq = observer.model, observer.model.equations
+        eq = model.equations
         ambients = list(model.system.ambients.values())
         parts = [model.system.sensors[name] for name in model.sensors]
         sensors = [[float(i), part.offset, part.gain] for i, part in zip(model.indices(), parts, strict=True)]
-        return cls(model.A_d.tolist(), model.Gamma.tolist(), observer.gain.tolist(),
+        return cls(model.A_d.tolist(), model.Gamma.tolist(), gain.tolist(),
                    eq.D.toarray()[:, :eq.drives.one + 1].tolist(), sensors, ambients[0].temperature, len(ambients),
                    drives(eq), tables(eq))
 

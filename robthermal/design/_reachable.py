@@ -39,8 +39,8 @@ class Reachable:
     current : dict
         Currents that hold the set-points, or the limit if they are beyond it [A].
     binding : str
-        What sets the limit: "runaway" (no stable equilibrium beyond), the law's "current" or "voltage" limit, or ""
-        when the set-points are held and nothing binds up to three times as far.
+        What sets the limit: "runaway" (no stable equilibrium beyond), the "current" or "voltage" limit of the feedback
+        law, or "" when the set-points are held and nothing binds up to three times as far.
     outcome : Outcome
         "reachable", or "unreachable" with the reachable range.
     faces : dict

@@ -1,4 +1,4 @@
-"""Does the loop respond alike to small and large steps? Normalized step responses, with the law and without it."""
+"""Normalized responses to small and large steps, with the linearizing feedback law and without it: are they alike?"""
 
 from __future__ import annotations
 

@@ -74,6 +74,8 @@ def plain(content: Any) -> Any:
         return plain(content.tolist())
     if isinstance(content, (list, tuple)):
         return [plain(value) for value in content]
+    if isinstance(content, (np.bool_, np.integer)):
+        return content.item()
     if isinstance(content, (float, np.floating)):
         return float(content) if math.isfinite(content) else None
     return content

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 import pandas as pd
 
+from .._digits import in_table
 from ..errors import InputError
 
 MAX_ROWS = 200  # of a table on the page; a network may have 100 000 lumps, a reader has less time
@@ -134,13 +134,5 @@ def _cell(value: object, digits: int) -> str:
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
-        return _number(float(value), digits)
+        return in_table(float(value), digits)
     return "–" if value is None or value is pd.NaT or value is pd.NA else str(value)
-
-
-def _number(value: float, digits: int) -> str:
-    if np.isnan(value):
-        return "–"
-    if isfinite(value) and 10.0 ** digits <= abs(value) < 1e9:
-        return f"{value:.0f}"  # 86400, not 8.64e+04
-    return f"{value:.{digits}g}"

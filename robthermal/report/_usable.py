@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, Context
 from math import isfinite
 from typing import Literal
 
+from .._digits import towards_zero
 from ..errors import InputError
 
 BOUNDS = ("contraction", "invariance", "runaway", "rating")
@@ -157,7 +157,7 @@ def rounded_down(current: float) -> str:
     >>> rt.report.rounded_down(1.41159)
     '1.411'
     """
-    return f"{Context(prec=4, rounding=ROUND_DOWN).create_decimal(repr(float(current))).normalize():f}"
+    return towards_zero(current, 4)
 
 
 def shown(rows: Sequence[UsableRange]) -> list[tuple[str, UsableRange, UsableRange | None]]:

@@ -1,50 +1,28 @@
-"""Checks of plain arguments, one message each."""
+"""Checks of temperatures and other arguments of thermal systems, one message each."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from numbers import Integral
 from typing import Any
 
 from .._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN
+from .._checks import finite_number
 from ..errors import InputError
 from ._units import celsius_to_kelvin
 
 
-def positive(value: Any, where: str, unit: str) -> float:
-    """A finite number above zero."""
-    number = finite(value, where, unit)
-    if number <= 0:
-        raise InputError(f"{number:g} {unit} is not positive", where=where, expected=f"a number above 0 [{unit}]",
-                         remedy="Check the sign and the unit.")
-    return number
-
-
 def non_negative(value: Any, where: str, unit: str) -> float:
     """A finite number, zero or above."""
-    number = finite(value, where, unit)
+    number = finite_number(value, where, unit)
     if number < 0:
         raise InputError(f"{number:g} {unit} is negative", where=where, expected=f"0 or more [{unit}]",
                          remedy="Check the sign and the unit.")
     return number
 
 
-def finite(value: Any, where: str, unit: str) -> float:
-    """A finite number; text, booleans and NaN are refused."""
-    try:
-        number = math.nan if isinstance(value, str | bytes | bool) else float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(f"{value!r} is not a finite number", where=where, expected=f"a number [{unit}]",
-                         remedy="Give the value; leave nothing out.")
-    return number
-
-
 def kelvin(value: Any, where: str) -> float:
     """A temperature that is neither Celsius nor Fahrenheit by its size."""
-    number = finite(value, where, "K")
+    number = finite_number(value, where, "K")
     if number < LOWEST_KELVIN:
         raise InputError(f"{number:g} K is below {LOWEST_KELVIN:g} K: it looks like Celsius", where=where,
                          expected="kelvin", remedy="Add 273.15 to a temperature in degrees Celsius.")
@@ -61,11 +39,3 @@ def by_lump(values: Mapping[str, float], names: Sequence[str], argument: str) ->
         raise InputError(f"{argument} has no temperature for lump {missing[0]!r}", where=f"argument {argument}",
                          remedy="Give every lump a temperature [K].")
     return [values[name] for name in names]
-
-
-def whole(value: Any, where: str, lowest: int = 1) -> int:
-    """A whole number not below `lowest`."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < lowest:
-        raise InputError(f"{value!r} is not a whole number of at least {lowest}", where=where,
-                         expected=f"{lowest}, {lowest + 1}, …", remedy="Count again.")
-    return int(value)

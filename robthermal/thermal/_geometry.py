@@ -9,8 +9,9 @@ from typing import Any
 
 import pandas as pd
 
+from .._checks import positive_number, whole_number
 from ..errors import InputError
-from ._checks import kelvin, non_negative, positive, whole
+from ._checks import kelvin, non_negative
 from ._materials import Material, material_of
 from ._parts import Link
 from ._system import System
@@ -119,7 +120,7 @@ class Assembly:
             The name.
         """
         self._new(name)
-        self._pieces[name] = _Piece(positive(capacity, f"lump {name!r} capacity", "J/K"), free_ends=2**30)
+        self._pieces[name] = _Piece(positive_number(capacity, f"lump {name!r} capacity", "J/K"), free_ends=2**30)
         return name
 
     def rod(self, name: str, *, length: float, area: float, material: str | Material, lumps: int = 10,
@@ -156,9 +157,9 @@ class Assembly:
             A dimension that is not positive, a name used twice, an ambient that does not exist.
         """
         where = f"rod {name!r}"
-        n, stuff = whole(lumps, f"{where} lumps"), material_of(material, f"{where} material")
-        dx = positive(length, f"{where} length", "m") / n
-        section = positive(area, f"{where} area", "m²")
+        n, stuff = whole_number(lumps, f"{where} lumps", 1), material_of(material, f"{where} material")
+        dx = positive_number(length, f"{where} length", "m") / n
+        section = positive_number(area, f"{where} area", "m²")
         edge, film = non_negative(perimeter, f"{where} perimeter", "m"), non_negative(convection, where, "W/(m² K)")
         if film and not edge:
             raise InputError("convection without a perimeter", where=where, remedy="Give perimeter [m].")
@@ -251,7 +252,7 @@ class Assembly:
                              remedy="Correct the names.")
         per_area = non_negative(contact_resistance, f"{where} contact_resistance", "m² K/W")
         if convection is not None:
-            per_area += 1 / positive(convection, f"{where} convection", "W/(m² K)")
+            per_area += 1 / positive_number(convection, f"{where} convection", "W/(m² K)")
         resistance = sum(end.half or 0.0 for end in ends)
         if per_area:
             resistance += per_area / self._contact_area(area, ends, where)
@@ -344,7 +345,7 @@ class Assembly:
 
     def _contact_area(self, area: float | None, ends: Sequence[_Piece], where: str) -> float:
         if area is not None:
-            return positive(area, f"{where} area", "m²")
+            return positive_number(area, f"{where} area", "m²")
         known = [end.area for end in ends if end.area is not None]
         if not known:
             raise InputError("the contact has no area", where=where, remedy="Give area [m²].")

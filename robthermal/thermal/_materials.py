@@ -7,8 +7,8 @@ from dataclasses import astuple, dataclass, fields
 
 import pandas as pd
 
+from .._checks import positive_number
 from ..errors import InputError
-from ._checks import positive
 
 _INCROPERA = "Incropera and DeWitt, Fundamentals of Heat and Mass Transfer, appendix A, 300 K"
 
@@ -49,7 +49,7 @@ class Material:
 
     def __post_init__(self) -> None:
         for field, unit in (("conductivity", "W/(m K)"), ("density", "kg/m³"), ("specific_heat", "J/(kg K)")):
-            positive(getattr(self, field), f"material {self.name!r} {field}", unit)
+            positive_number(getattr(self, field), f"material {self.name!r} {field}", unit)
 
     @property
     def volumetric_heat(self) -> float:

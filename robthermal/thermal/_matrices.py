@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, issparse
 
+from .._checks import positive_number
 from ..errors import InputError, Outcome
-from ._checks import kelvin, positive
+from ._checks import kelvin
 from ._outcomes import ThermalCode
 from ._parts import Ambient, Input, Link, Lump, Sensor
 from ._system import System
@@ -111,7 +112,7 @@ def system_from_matrices(E: Any, A: Any, B: Any = None, *, ambients: Mapping[str
     n = capacity.size
     network = _network(A, n)
     heaters, to_ambient = _columns(B, n, tuple(inputs), tuple(ambients))
-    allowed = positive(tolerance, "argument tolerance", "-")
+    allowed = positive_number(tolerance, "tolerance", "-")
     links_to_ambient, residual = _close(network, to_ambient, len(ambients), allowed)
     names = _names(lump_names, n)
     system = System(

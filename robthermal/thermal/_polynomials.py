@@ -8,8 +8,9 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
+from .._checks import positive_number, whole_number
 from ..errors import InputError
-from ._checks import kelvin, positive, whole
+from ._checks import kelvin
 from ._parts import Linear, Module
 
 _SAMPLES = 81  # temperatures of the fit; more change its numbers by less than a tenth of its residual
@@ -71,8 +72,8 @@ class Polynomials:
         S, R, K : ndarray
             [V/K], [Ω], [W/K].
         """
-        n = (self.couples if couples is None else whole(couples, "argument couples")) / self.couples
-        size = (self.i_max if i_max is None else positive(i_max, "argument i_max", "A")) / self.i_max
+        n = (self.couples if couples is None else whole_number(couples, "couples", 1)) / self.couples
+        size = (self.i_max if i_max is None else positive_number(i_max, "i_max", "A")) / self.i_max
         T = np.asarray(temperature, float)
         S, R, K = (polyval(T, c) for c in (self.seebeck, self.resistance, self.conductance))
         return S * n, R * n / size, K * n * size

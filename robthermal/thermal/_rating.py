@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from .._checks import positive_number
 from ..errors import InputError
-from ._checks import kelvin, positive
+from ._checks import kelvin
 from ._parts import Linear, Module
 
 _HIGHEST_DT = 90.0  # single-stage modules reach about 80 K
@@ -61,8 +62,8 @@ class Rating:
     q_max: float | None = None
 
     def __post_init__(self) -> None:
-        values = {"v_max": positive(self.v_max, "argument v_max", "V"),
-                  "i_max": positive(self.i_max, "argument i_max", "A"), "t_hot": kelvin(self.t_hot, "argument t_hot")}
+        values = {"v_max": positive_number(self.v_max, "v_max", "V"),
+                  "i_max": positive_number(self.i_max, "i_max", "A"), "t_hot": kelvin(self.t_hot, "argument t_hot")}
         values["dt_max"] = _difference(self.dt_max, values["t_hot"])
         if values["i_max"] > _HIGHEST_I:
             raise InputError(f"{values['i_max']:g} A is more than any single module takes: it looks like milliampere",
@@ -70,7 +71,7 @@ class Rating:
         missing = self.q_max is None or self.q_max != self.q_max  # a missing entry of a table of datasheets is NaN
         for name, value in values.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "q_max", None if missing else positive(self.q_max, "argument q_max", "W"))
+        object.__setattr__(self, "q_max", None if missing else positive_number(self.q_max, "q_max", "W"))
         _refuse_contradiction(self)
 
     @property
@@ -85,7 +86,7 @@ class Rating:
 
 
 def _difference(value: float, t_hot: float) -> float:
-    dt_max = positive(value, "argument dt_max", "K")
+    dt_max = positive_number(value, "dt_max", "K")
     if dt_max > _HIGHEST_DT:
         hint = f"; {dt_max - 273.15:.4g} °C would be a temperature" if dt_max > 273.15 else ""
         raise InputError(f"{dt_max:g} K: single-stage modules do not exceed about 80 K{hint}", where="argument dt_max",

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._checks import positive_number
 from ..errors import Diverged, InputError
-from ._checks import by_lump, kelvin, positive
+from ._checks import by_lump, kelvin
 from ._drive import settle
 from ._equations import Equations
 from ._exponential import Integrator
@@ -71,7 +72,7 @@ class Stepper:
         if not is_small(self._eq):
             raise InputError(f"a network of {len(system.lumps)} lumps", where="argument system",
                              expected="a few hundred at most", remedy="Reduce the model first (rt.thermal.reduce).")
-        self.sample_time = positive(sample_time, "argument sample_time", "s")
+        self.sample_time = positive_number(sample_time, "sample_time", "s")
         for name in system.effects:
             if name.endswith(("drive.delay", "step.relative")):
                 raise InputError(f"{name} when stepping", where="argument system",

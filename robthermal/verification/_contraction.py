@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flint import fmpq
 
 from . import _energy, _lyapunov, _weighted
+from ._contraction_problem import Contraction
 from ._fields import margin_of
 from ._kind import Kind, Proof, working_precision
 from ._norm import NORMS, read_norm, say_rate
 from ._numbers import round_down, show
-from ._system import Region, ThermalSystem, read_region, read_system, say_region
-from ._uncertain import Parameters, read_parameters, say_subject, worst_system
-
-
-@dataclass(frozen=True)
-class Contraction:
-    """The exact problem of one contraction certificate."""
-
-    system: ThermalSystem
-    region: Region
-    method: str
-    rate: fmpq
-    margin: fmpq
-    weights: tuple[fmpq, ...]
-    matrix: tuple[tuple[fmpq, ...], ...]
-    parameters: Parameters = ()
+from ._system import read_region, read_system, say_region
+from ._uncertain import read_parameters, say_subject, worst_system
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:

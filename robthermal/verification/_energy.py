@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from flint import arb, fmpq
 
+from ._contraction_problem import Contraction
 from ._cost import longest
 from ._definite import eliminate, is_positive, is_semidefinite
 from ._kind import Proof
 from ._numbers import as_float, decimal, name_of, show
 from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
 from ._vertices import Cluster, Point, Vertex, clusters, count, describe, endpoints, hull, vertices
-
-if TYPE_CHECKING:
-    from ._contraction import Contraction
 
 Block = list[list[fmpq]]
 _MOST_PER_CLUSTER = 5_000

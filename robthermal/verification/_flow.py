@@ -14,7 +14,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq
 
@@ -23,13 +22,11 @@ from ._corners import Part, first_failure, is_positive
 from ._fields import Interval
 from ._growth import Growth, too_many_cases
 from ._law import fixed_slopes, free_slopes, unfit
+from ._loop_problem import Loop
 from ._lyapunov import MOST_WORK, Described, link_slopes
 from ._numbers import name_of, show
 from ._system import Module
 from ._vertices import Entries, ends
-
-if TYPE_CHECKING:
-    from ._loop import Loop
 
 _LARGEST = 80  # lumps: the exponentials are of twice this size
 Row = dict[int, arb]

@@ -15,7 +15,7 @@ from flint import fmpq
 from robthermal.errors import InputError
 
 from . import _weighted
-from ._contraction import Contraction
+from ._contraction_problem import Contraction
 from ._cost import too_many_corners
 from ._fields import Interval, get, intervals, kelvin_interval, mapping, no_other, not_negative, numbers
 from ._hash import short_hash

@@ -8,7 +8,7 @@ sample, for every limiter active or not, every temperature and current of the bo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from flint import arb, arb_mat, fmpq
@@ -21,49 +21,16 @@ from ._flow import flow_growth
 from ._growth import Growth
 from ._kind import Kind, Proof, working_precision
 from ._loop_growth import growth
+from ._loop_problem import Controller, Loop, Rows
 from ._lyapunov import MOST_ROWS, asymmetry
 from ._numbers import decimal, exact, name_of, round_down, show
 from ._observer import Sensor, read_sensors, say_sensors
-from ._system import Region, ThermalSystem, read_region, read_system, say_region
+from ._system import ThermalSystem, read_region, read_system, say_region
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 
-Rows = tuple[tuple[fmpq, ...], ...]
 _PLANTS = {"continuous": "continuous plant (currents held and temperatures moving continuously in between)",
            "held": "sampled model with held heat (x+ = A_d x + Γ f(x, I), the heat f of the modules held in between)"}
 _PIECES = 16
-
-
-@dataclass(frozen=True)
-class Controller:
-    """v = C z + D x, z+ = A z + B x + windup (achieved - v), set-points apart."""
-
-    A: Rows
-    B: Rows
-    C: Rows
-    D: Rows
-    windup: Rows
-
-
-@dataclass(frozen=True)
-class Loop:
-    """The exact problem of one loop certificate."""
-
-    system: ThermalSystem
-    region: Region
-    controller: Controller
-    sample_time: fmpq
-    plant: str
-    drift: fmpq | None
-    contraction: fmpq
-    margin: fmpq
-    matrix: Rows
-    pieces: int
-    weights: tuple[fmpq, ...]
-    sizes: tuple[fmpq, ...]
-    parameters: Parameters = ()
-    start: tuple[Rows, ...] = ()
-    sensors: tuple[Sensor, ...] | None = None
-    gain: Rows = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
@@ -106,7 +73,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Loop:
 
 
 def _observer(system: Any, network: ThermalSystem) -> tuple[tuple[Sensor, ...] | None, Rows]:
-    """Return sensors and gain of the observer whose estimates law and controller use, None without one."""
+    """Return sensors and gain of the observer whose estimates feedback law and controller use, None without one."""
     if "gain" not in system:
         return None, ()
     sensors = read_sensors(system, network)
@@ -114,7 +81,7 @@ def _observer(system: Any, network: ThermalSystem) -> tuple[tuple[Sensor, ...] |
 
 
 def _links_only(parameters: Parameters, plant: Any) -> Parameters:
-    """Refuse what the proof does not cover: the law knows the modules, the sampled model the network."""
+    """Refuse what the proof does not cover: the feedback law knows the modules, the sampled model the network."""
     for name, _ in parameters:
         if not name.startswith("links."):
             raise InputError("only conductances of links can be uncertain in a loop",

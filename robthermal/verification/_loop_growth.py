@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq
 
@@ -19,13 +18,11 @@ from ._definite import approximate, is_positive_preconditioned
 from ._fields import Interval
 from ._growth import Growth, too_many_cases
 from ._law import fixed_slopes, free_slopes, unfit, variation
+from ._loop_problem import Loop
 from ._lyapunov import MOST_WORK, link_slopes
 from ._numbers import name_of, show
 from ._system import Module
 from ._vertices import Entries, ends
-
-if TYPE_CHECKING:
-    from ._loop import Loop
 
 _LARGEST = 80  # lumps: the exponentials are of four times this size
 Row = list[arb]  # a linear function of (dx, dz)

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq
 
+from ._contraction_problem import Contraction
 from ._corners import Part, first_failure, is_positive
 from ._cost import product_up_to
 from ._fields import Interval
@@ -21,9 +21,6 @@ from ._numbers import decimal, name_of, show
 from ._slopes import exchange_slope, radiation_slope
 from ._system import Region, ThermalSystem
 from ._vertices import Cluster, Entries, Point, clusters, count, describe, hull, vertices
-
-if TYPE_CHECKING:
-    from ._contraction import Contraction
 
 PIECES = (1, 2, 4, 8)  # per current, the relaxation refined in turn
 MOST_ROWS = 400  # of a dense matrix: it and its products fill some 100 MB

@@ -9,19 +9,16 @@ Given x_j, the terms of different partners are independent, so partners are maxi
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from flint import fmpq
 
+from ._contraction_problem import Contraction
 from ._cost import too_many_corners
 from ._kind import Proof
 from ._numbers import name_of, round_down, show
 from ._slopes import exchange_slope, least_ambient_slope, radiation_slope
 from ._system import Link, Module, Quadratic, peak
 from ._vertices import ends
-
-if TYPE_CHECKING:
-    from ._contraction import Contraction
 
 _ENTRIES = {"hh": 0, "hc": 1, "cc": 2, "ch": 3}
 

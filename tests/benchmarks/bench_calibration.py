@@ -65,8 +65,8 @@ def main() -> None:
         row(f"two-state, {name}", seconds,
             f"T1 {fits[name].rmse['T1']:.3f} K; published parameters {two_state.published(record):.2f} K")
     training = two_heaters.read_run(DATA, two_heaters.TRAINING)
-    unseen = two_heaters.read_run(DATA, two_heaters.HEATER_1)
-    seconds, fit = best_of(lambda: two_heaters.fit(training, unseen), repeats=1)
+    validation = two_heaters.read_run(DATA, two_heaters.HEATER_1)
+    seconds, fit = best_of(lambda: two_heaters.fit(training, validation), repeats=1)
     row("two heaters, random run", seconds, f"T1/T2 {fit.rmse['T1']:.3f}/{fit.rmse['T2']:.3f} K")
     row("  free run on heater 1 alone", seconds,
         f"T1/T2 {fit.validation_rmse['T1']:.3f}/{fit.validation_rmse['T2']:.3f} K; aim 1.0/0.6 K")

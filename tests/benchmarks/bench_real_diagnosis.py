@@ -33,9 +33,9 @@ def one_line(found: rt.diagnosis.Diagnosis) -> str:
     return f"{found.verdict}: {'; '.join(names)}"
 
 
-def free_runs(board: ModuleType, system: rt.System, training: rt.Record, unseen: rt.Record) -> str:
+def free_runs(board: ModuleType, system: rt.System, training: rt.Record, validation: rt.Record) -> str:
     """Free-run RMSE after a fit to the free training run [K], T1/T2 on both runs."""
-    fit = board.calibrated(system, training, unseen)
+    fit = board.calibrated(system, training, validation)
     train, other = fit.rmse, fit.validation_rmse
     return f"train {train['T1']:.2f}/{train['T2']:.2f} K, heater 1 alone {other['T1']:.2f}/{other['T2']:.2f} K"
 
@@ -43,24 +43,24 @@ def free_runs(board: ModuleType, system: rt.System, training: rt.Record, unseen:
 def two_heaters() -> None:
     """The São Paulo board: window of the example, whole catalog, whole record, no random heat, and the steps."""
     board = example("two_heaters")
-    training, unseen = board.runs(DATA)
-    seconds, found = best_of(lambda: board.diagnose(training, unseen), repeats=1)
+    training, validation = board.runs(DATA)
+    seconds, found = best_of(lambda: board.diagnose(training, validation), repeats=1)
     row("two heaters, window 700 to 3500 s, 10 effects", seconds, one_line(found))
-    row("  convection only", 0.0, free_runs(board, found.nominal.system, training, unseen))
-    row("  with the effects", 0.0, free_runs(board, found.fit.system, training, unseen))
+    row("  convection only", 0.0, free_runs(board, found.nominal.system, training, validation))
+    row("  with the effects", 0.0, free_runs(board, found.fit.system, training, validation))
     scores = rt.diagnosis.score(found.fit, ["radiation", "heater_power_slope"])
     at = [candidate.label for candidate in scores.candidates]
     i, j = at.index("radiation(heater_1, room)"), at.index("heater_power_slope(Q1)")
     row("  radiation and power slope of heater 1", 0.0,
         f"cosine {scores.confusion[i, j]:.3f}; p {scores.p_value[i]:.2g} and {scores.p_value[j]:.2g}; "
         f"radiation {scores.size[i]:.2g}, limit {scores.limit[i]:.2g} W/K⁴")
-    room = float(np.mean([board.rest_value(training), board.rest_value(unseen)]))
-    train, other = board.means(training), board.means(unseen)
+    room = float(np.mean([board.rest_value(training), board.rest_value(validation)]))
+    train, other = board.means(training), board.means(validation)
     window = train.between(*board.WINDOW)
     seconds, found = best_of(lambda: rt.diagnose(board.nominal(room), window, validation=other), repeats=1)
     row("  the same window, whole catalog", seconds, one_line(found))
     again = board.read_run(DATA, board.REPEATED)
-    seconds, found = best_of(lambda: board.diagnose(again, unseen), repeats=1)
+    seconds, found = best_of(lambda: board.diagnose(again, validation), repeats=1)
     row("  the same inputs on another day, 10 effects", seconds, one_line(found))
     both = [window, board.means(again).between(*board.WINDOW)]
     for what, gains in (("", {}), (", a gain of every heater in every run", {"session_gain": True})):

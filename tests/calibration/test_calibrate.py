@@ -146,9 +146,9 @@ def test_a_ratio_is_named() -> None:
     assert rt.calibrate(alone, noisy(run, 1), parameters=RANGES).undetermined == ()
 
 
-def test_validation_is_scored_on_unseen_data() -> None:
-    train, unseen = noisy(driven(plant(), seed=1), 1), noisy(driven(plant(), seed=2, start=300.0), 2)
-    fit = rt.calibrate(started(plant()), train, parameters=RANGES, validation=unseen)
+def test_validation_is_scored_on_validation_data() -> None:
+    train, validation = noisy(driven(plant(), seed=1), 1), noisy(driven(plant(), seed=2, start=300.0), 2)
+    fit = rt.calibrate(started(plant()), train, parameters=RANGES, validation=validation)
     assert 0.08 < fit.validation_rmse["Ta"] < 0.14
     assert fit.validation[0].fit_percent["Ta"] > 95
 

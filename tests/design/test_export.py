@@ -130,7 +130,7 @@ def test_json_reads_back_as_the_same_controller(which, exports, plant, tmp_path)
 def test_recursion_is_the_observer(which, exports):
     """The operations of the C source against the arrays of the observer, along random records."""
     observer, _ = exports[which]
-    recursion, rng = ObserverRecursion.of(observer), np.random.default_rng(0)
+    recursion, rng = ObserverRecursion.of(observer.model, observer.gain), np.random.default_rng(0)
     names = observer.model.system.exogenous_names
     x = y = np.full(len(observer.model.system.lumps), 297.0)
     for _ in range(40):
@@ -143,7 +143,7 @@ def test_recursion_is_the_observer(which, exports):
 
 def test_lost_reading_corrects_nothing(exports):
     observer, _ = exports["kalman"]
-    recursion, x = ObserverRecursion.of(observer), [300.0] * 18
+    recursion, x = ObserverRecursion.of(observer.model, observer.gain), [300.0] * 18
     u = [0.5, 0.7, 298.0]
     predicted = observer.model.predict(np.array(x), np.array(u))
     np.testing.assert_allclose(recursion.step(x, [np.nan, np.inf], u), predicted, rtol=0, atol=1e-10)

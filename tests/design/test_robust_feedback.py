@@ -130,7 +130,7 @@ def test_a_controller_of_other_modules_is_refused(system, law):
     one = rt.design.cold_side(rt.design.feedback_linearization(system, ["m2"]))
     for loop in (rt.design.pid(one, bandwidth=0.05, sample_time=1.0),
                  rt.design.state_feedback(one, bandwidth=0.05, sample_time=1.0)):
-        with pytest.raises(rt.InputError, match="of 1 modules for a law of 2"):
+        with pytest.raises(rt.InputError, match="of 1 modules for a feedback law of 2"):
             rt.design.simulate_loop(system, loop, 290.0, law=law, duration=10.0)
 
 

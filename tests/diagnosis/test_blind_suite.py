@@ -65,7 +65,7 @@ def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
     """Short records and a short catalog: the suite's own take minutes."""
     monkeypatch.setattr(rt, "diagnose", partial(rt.diagnose, effects=["sensor_gain", "sensor_lag", "heat_source"]))
     monkeypatch.setattr("blind.cases.N_TRAIN", 150)
-    monkeypatch.setattr("blind.cases.N_UNSEEN", 100)
+    monkeypatch.setattr("blind.cases.N_VALIDATION", 100)
     row = judged(case, "test", compare=True)
     assert row["verdict"] != "crashed", row
     assert answer(row) in ("unique", "in the set", "not detected", "unexplained"), row
@@ -77,7 +77,7 @@ def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
 def test_a_small_mass_in_a_bent_valley_is_found():
     """Beside a capacity that gives way no step from nothing along the tangent survives: the neighbor got the name."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 12))
-    found = rt.diagnose(given.system, given.train, validation=given.unseen, effects=["hidden_mass", "sensor_lag"])
+    found = rt.diagnose(given.system, given.train, validation=given.validation, effects=["hidden_mass", "sensor_lag"])
     assert [effect.effect for effect in found.effects] == ["hidden_mass"] and found.effects[0].where == ("left",)
     value, std, _ = found.effects[0].values["capacity"]
     assert abs(value - truth.effects[0][2]["capacity"]) < 3.0 * std
@@ -100,7 +100,7 @@ def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
 def test_an_effect_that_shrinks_to_nothing_is_no_name():
     """The neighbor is accepted first; once the right mass is found, nothing is left of it."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 78))
-    found = rt.diagnose(given.system, given.train, validation=given.unseen,
+    found = rt.diagnose(given.system, given.train, validation=given.validation,
                         effects=["hidden_mass", "missing_ambient_link"])
     assert [(effect.effect, effect.where) for effect in found.effects] == [("hidden_mass", ("left",))]
     value, std, _ = found.effects[0].values["capacity"]

@@ -124,7 +124,7 @@ def test_the_slow_part_is_never_more_than_the_declared_noise(bar: rt.System) -> 
 
 def test_colored_noise_of_three_sensors_is_consistent() -> None:
     given, _ = made(Case("C", "noise", "colored", 2))
-    found = rt.diagnose(given.system, given.train, validation=given.unseen)
+    found = rt.diagnose(given.system, given.train, validation=given.validation)
     assert found.verdict == "consistent"
     assert not found.effects
     assert "slow part" in found.outcome.text
@@ -136,12 +136,13 @@ def test_colored_noise_of_three_sensors_is_consistent() -> None:
 
 @pytest.mark.parametrize("step", [0.0, 0.01])
 def test_without_random_heat_and_with_steps_and_a_spike(plant: rt.System, hide: Hide, step: float) -> None:
-    train, unseen = (colored(record, 0.008, seed) for seed, record in enumerate(hide(), start=1))
+    train, validation = (colored(record, 0.008, seed) for seed, record in enumerate(hide(), start=1))
     outputs = np.array(train.outputs)
     outputs[200, 0] += 1.0
     train = train.with_outputs(outputs if not step else step * np.round(outputs / step))
-    unseen = unseen if not step else unseen.with_outputs(step * np.round(np.asarray(unseen.outputs) / step))
-    found = rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag", "heat_source"])
+    if step:
+        validation = validation.with_outputs(step * np.round(np.asarray(validation.outputs) / step))
+    found = rt.diagnose(plant, train, validation=validation, effects=["sensor_lag", "heat_source"])
     assert found.verdict == "consistent"
     assert found.noise_floor.glitches == {"Tp": 1}
     assert "slow part" in found.outcome.text
@@ -173,8 +174,8 @@ def test_a_hidden_effect_in_colored_noise_is_not_called_noise(plant: rt.System, 
     def lagged(t: float, x: Array, u: Array) -> Array:
         return np.append(rate(x[:2], u), (x[1] - x[2]) / 25.0)
 
-    train, unseen = (colored(record, 0.005, seed) for seed, record in enumerate(
+    train, validation = (colored(record, 0.005, seed) for seed, record in enumerate(
         hide(lagged, extra_states=1, read=lambda T: T[:, [0, 2]]), start=1))
-    found = rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag", "sensor_gain", "heat_source"])
+    found = rt.diagnose(plant, train, validation=validation, effects=["sensor_lag", "sensor_gain", "heat_source"])
     assert found.verdict != "consistent"
     assert [effect.label for effect in (*found.effects, *found.provisional)] == ["sensor_lag(Tb)"]

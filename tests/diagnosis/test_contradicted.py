@@ -44,7 +44,7 @@ def test_a_name_that_holds_is_kept(found: rt.diagnosis.Diagnosis, late: tuple[rt
     assert without - with_it > 100.0
 
 
-def test_a_name_that_is_gone_on_unseen_records_is_taken_back(
+def test_a_name_that_is_gone_on_validation_records_is_taken_back(
         plant: rt.System, hide: Hide, late: tuple[rt.Record, rt.Record], found: rt.diagnosis.Diagnosis) -> None:
     without = hide()[1]  # the sensor was changed in between
     data = validation_data(found.fit, without, None)
@@ -66,7 +66,7 @@ def test_surprise_is_the_dense_gaussian_density(found: rt.diagnosis.Diagnosis, h
     assert negative_log_predictive_density([fit], fit, data) == [pytest.approx(dense, rel=1e-6)]
 
 
-def test_a_name_whose_model_runs_away_on_unseen_records_is_taken_back(
+def test_a_name_whose_model_runs_away_on_validation_records_is_taken_back(
         found: rt.diagnosis.Diagnosis, late: tuple[rt.Record, rt.Record], monkeypatch: pytest.MonkeyPatch) -> None:
     data = validation_data(found.fit, late[1], None)
     first, second = found.nominal, found.fit

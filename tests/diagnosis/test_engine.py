@@ -52,8 +52,8 @@ def test_clip_is_named_with_its_level(plant: rt.System, hide: Hide) -> None:
     def clipped(u: np.ndarray) -> np.ndarray:
         return np.column_stack([np.minimum(u[:, 0], 8.5), u[:, 1]])
 
-    train, unseen = hide(drive=clipped)
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(drive=clipped)
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "named"
     assert [effect.label for effect in found.effects] == ["input_saturation(heater)"]
     assert found.effects[0].values["clip"][0] == pytest.approx(8.5, abs=0.02)
@@ -62,8 +62,8 @@ def test_clip_is_named_with_its_level(plant: rt.System, hide: Hide) -> None:
 
 
 def test_cubic_saturation_is_not_called_a_clip(plant: rt.System, hide: Hide) -> None:
-    train, unseen = hide(drive=lambda u: np.column_stack([u[:, 0] - 1e-3 * u[:, 0] ** 3, u[:, 1]]))
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(drive=lambda u: np.column_stack([u[:, 0] - 1e-3 * u[:, 0] ** 3, u[:, 1]]))
+    found = rt.diagnose(plant, train, validation=validation)
     assert [effect.label for effect in found.effects] == ["input_saturation(heater)"]
     assert found.effects[0].values["cubic"][0] == pytest.approx(1e-3, rel=0.05)
 
@@ -177,8 +177,8 @@ def test_outliers_are_told_from_ramps_and_kinks() -> None:
 
 
 def test_spikes_make_no_name_when_nothing_is_hidden(plant: rt.System, hide: Hide) -> None:
-    (train, where), (unseen, _) = (spiky(record, seed, 0.01) for seed, record in enumerate(hide()))
-    found = rt.diagnose(plant, train, validation=unseen)
+    (train, where), (validation, _) = (spiky(record, seed, 0.01) for seed, record in enumerate(hide()))
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "consistent"
     counted = found.noise_floor.glitches
     assert counted == {"Tp": int(where[:, 0].sum()), "Tb": int(where[:, 1].sum())}
@@ -187,8 +187,8 @@ def test_spikes_make_no_name_when_nothing_is_hidden(plant: rt.System, hide: Hide
 
 
 def test_spikes_do_not_hide_an_effect(plant: rt.System, hide: Hide, rate: Callable) -> None:
-    (train, _), (unseen, _) = (spiky(record, seed, 0.01) for seed, record in enumerate(hide(convection(0.08, rate))))
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = (spiky(record, seed, 0.01)[0] for seed, record in enumerate(hide(convection(0.08, rate))))
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "named"
     assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
     gain, std, _ = found.effects[0].values["gain"]
@@ -223,16 +223,16 @@ def test_a_missing_reading_counts_for_nothing(plant: rt.System, hide: Hide) -> N
 
 
 def test_steps_of_a_converter_make_no_name(plant: rt.System, hide: Hide) -> None:
-    train, unseen = (stepped(record, 0.25) for record in hide())
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = (stepped(record, 0.25) for record in hide())
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "consistent"
     assert found.noise_floor.noise["Tp"] == pytest.approx(0.25 / 12**0.5, rel=1e-6)
     assert found.noise_floor.quantized == ("Tp", "Tb")
 
 
 def test_an_effect_is_named_through_the_steps_of_a_converter(plant: rt.System, hide: Hide, rate: Callable) -> None:
-    train, unseen = (stepped(record, 0.25) for record in hide(convection(0.3, rate)))
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = (stepped(record, 0.25) for record in hide(convection(0.3, rate)))
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "named"
     assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
     assert found.effects[0].values["gain"][0] == pytest.approx(0.3, rel=0.1)
@@ -308,8 +308,8 @@ def test_a_parameter_at_its_bound_makes_no_error(plant: rt.System, hide: Hide) -
 
 def test_stages_are_told_in_order(plant: rt.System, hide: Hide) -> None:
     told: list[str] = []
-    train, unseen = hide(n=200)
-    rt.diagnose(plant, train, validation=unseen, effects=["sensor_lag"], progress=told.append)
+    train, validation = hide(n=200)
+    rt.diagnose(plant, train, validation=validation, effects=["sensor_lag"], progress=told.append)
     assert len(told) > 4 and all(told)
     assert told.index("refitting the nominal system") < told.index("predicting the validation data")
 

@@ -22,8 +22,8 @@ def names(found: rt.diagnosis.Diagnosis) -> set[str]:
 
 
 def test_nothing_hidden_is_consistent(plant: rt.System, hide: Hide) -> None:
-    train, unseen = hide()
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide()
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "consistent" and not found.effects
     assert found.gap["train"].before == pytest.approx(0.01, rel=0.05)
     assert found.system.parameter("lumps.plate.capacity") == pytest.approx(123.0, rel=0.01)
@@ -34,8 +34,8 @@ def test_natural_convection_is_named_and_its_gain_is_right(plant: rt.System, hid
         dT = u[1] - T[0]
         return rate(T, u, np.array([0.08 * abs(dT) ** 0.25 * dT, 0.0]))
 
-    train, unseen = hide(hidden)
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(hidden)
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "named"
     assert [effect.label for effect in found.effects] == ["natural_convection(plate, room)"]
     gain, std, _ = found.effects[0].values["gain"]
@@ -52,8 +52,8 @@ def test_hidden_mass_is_named_saved_and_its_system_loads(plant: rt.System, hide:
         flow = C / tau * (x[2] - x[0])
         return np.append(rate(x[:2], u, np.array([flow, 0.0])), -flow / C)
 
-    train, unseen = hide(hidden, extra_states=1)
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(hidden, extra_states=1)
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "named"
     assert [effect.label for effect in found.effects] == ["hidden_mass(plate)"]
     values = found.effects[0].values
@@ -85,8 +85,8 @@ def test_late_heater_is_a_set_where_lag_and_delay_look_alike(plant: rt.System, h
 
 
 def test_constant_source_is_a_declared_alias(plant: rt.System, hide: Hide, rate: Callable) -> None:
-    train, unseen = hide(lambda t, T, u: rate(T, u, np.array([0.3, 0.0])))
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(lambda t, T, u: rate(T, u, np.array([0.3, 0.0])))
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "ambiguous"
     assert {"heat_source(plate)", "ambient_gradient(plate)", "sensor_self_heating(Tp)"} <= names(found)
 
@@ -96,8 +96,8 @@ def test_physics_outside_the_catalog_is_not_named(plant: rt.System, hide: Hide, 
         slow = 1.0 + 4.0 * np.exp(-(((T[0] - 303.0) / 1.0) ** 2))  # heat of fusion about 303 K
         return rate(T, u) / np.array([slow, 1.0])
 
-    train, unseen = hide(melting)
-    found = rt.diagnose(plant, train, validation=unseen)
+    train, validation = hide(melting)
+    found = rt.diagnose(plant, train, validation=validation)
     assert found.verdict == "unexplained" and not found.effects
     assert found.located.strength["plate"] > 10.0
     assert min(found.located.lumps.values()) < 1e-6
@@ -113,8 +113,9 @@ def test_own_effect_joins_the_catalog(plant: rt.System, hide: Hide) -> None:
         quantities=(rt.diagnosis.Quantity("delay", "s", 0.0, 60.0, typical=0.5),), add=placed)
     rt.diagnosis.register_effect(late)
     try:
-        train, unseen = hide(read=lambda T: np.column_stack([T[:, 0], np.concatenate([T[:1, 1]] * 3 + [T[:-3, 1]])]))
-        found = rt.diagnose(plant, train, validation=unseen)
+        train, validation = hide(
+            read=lambda T: np.column_stack([T[:, 0], np.concatenate([T[:1, 1]] * 3 + [T[:-3, 1]])]))
+        found = rt.diagnose(plant, train, validation=validation)
     finally:
         rt.diagnosis.forget_effect("sensor_delay")
     assert "sensor_delay(Tb)" in names(found)

@@ -155,8 +155,8 @@ def test_nothing_hidden_selects_nothing(plant: rt.System, hide: Hide) -> None:
 
 
 def test_diagnose_compares_both_ways(plant: rt.System, hide: Hide, rate: Callable) -> None:
-    train, unseen = hide(heated(rate))
-    found = rt.diagnose(plant, train, validation=unseen, effects=["input_saturation", "heater_power_slope",
+    train, validation = hide(heated(rate))
+    found = rt.diagnose(plant, train, validation=validation, effects=["input_saturation", "heater_power_slope",
                                                                   "sensor_lag", "sensor_gain"])
     assert found.verdict == "named"
     assert {effect.label for effect in found.effects} == {"input_saturation(heater)", "heater_power_slope(heater)"}

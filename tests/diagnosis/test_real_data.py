@@ -24,14 +24,14 @@ def room(tclab: Path) -> float:
 
 @pytest.fixture(scope="module")
 def records(tclab: Path) -> tuple[rt.Record, rt.Record]:
-    training, unseen = two_heaters.runs(tclab)
-    return two_heaters.means(training).between(*SHORT), two_heaters.means(unseen).between(0.0, 2000.0)
+    training, validation = two_heaters.runs(tclab)
+    return two_heaters.means(training).between(*SHORT), two_heaters.means(validation).between(0.0, 2000.0)
 
 
 @pytest.fixture(scope="module")
 def board(records: tuple[rt.Record, rt.Record], room: float) -> rt.diagnosis.Diagnosis:
-    train, unseen = records
-    return rt.diagnose(two_heaters.nominal(room), train, validation=unseen,
+    train, validation = records
+    return rt.diagnose(two_heaters.nominal(room), train, validation=validation,
                        effects=["missing_link", "sensor_lag", "input_lag"])
 
 
@@ -71,8 +71,8 @@ def test_radiation_and_a_power_slope_look_alike_and_are_below_what_could_be_seen
 
 def test_without_the_missing_effects_in_the_catalog_nothing_is_named(
         records: tuple[rt.Record, rt.Record], room: float) -> None:
-    train, unseen = records
-    found = rt.diagnose(two_heaters.nominal(room), train, validation=unseen, effects=["sensor_offset", "radiation"])
+    train, validation = records
+    found = rt.diagnose(two_heaters.nominal(room), train, validation=validation, effects=["sensor_offset", "radiation"])
     assert found.verdict == "unexplained" and not found.effects
     assert found.gap["validation"].after > 5.0
 
@@ -94,9 +94,9 @@ def test_the_mass_taken_out_of_the_published_model_is_found(tclab: Path) -> None
 
 
 def test_examples_run_on_simulated_data_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    training, unseen = two_heaters.runs(tmp_path)
+    training, validation = two_heaters.runs(tmp_path)
     step = second_mass.read_run(tmp_path)
     assert capsys.readouterr().out.count("SIMULATED") == 2
-    assert len(training) == len(unseen) == 3500 and len(step) == 900
-    assert unseen["Q2"].max() == 0.0 and training["Q2"].max() > 50.0
+    assert len(training) == len(validation) == 3500 and len(step) == 900
+    assert validation["Q2"].max() == 0.0 and training["Q2"].max() > 50.0
     assert np.ptp(two_heaters.means(training).outputs, axis=0).min() > 10.0

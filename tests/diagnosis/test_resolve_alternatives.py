@@ -55,7 +55,7 @@ def allowed(found: rt.diagnosis.Diagnosis) -> set[tuple[str, tuple[str, ...]]]:
     return {(effect.effect, effect.where) for effect in found.effects} | {n for o in found.alternatives for n in o}
 
 
-def test_strong_unseen_inputs_decide(plant: rt.System, train: rt.Record, strong: rt.Record,
+def test_strong_validation_inputs_decide(plant: rt.System, train: rt.Record, strong: rt.Record,
                                    unsure: rt.diagnosis.Diagnosis) -> None:
     assert unsure.verdict == "ambiguous" and allowed(unsure) == {DELAY, LAG}
     found = rt.diagnose(plant, train, validation=strong, effects=LATE)
@@ -67,12 +67,12 @@ def test_strong_unseen_inputs_decide(plant: rt.System, train: rt.Record, strong:
     assert [entry.candidate.key for entry in told.ruled_out] == [LAG] and not told.contenders
     assert [candidate.key for candidate in found.ruled_out] == [LAG]
     answers = ranking(found).set_index("candidate")["answer"]
-    assert answers["input_lag(heater)"].endswith("the unseen ones could")
+    assert answers["input_lag(heater)"].endswith("the validation records could")
     verdict, _, predicted = diagnosis_claims(Diagnosed(found, (), (), ()))
     assert "but input_lag(heater)" in verdict.how and "not corrected" in predicted.how
 
 
-def test_weak_unseen_inputs_do_not(plant: rt.System, train: rt.Record, delayed: Run) -> None:
+def test_weak_validation_inputs_do_not(plant: rt.System, train: rt.Record, delayed: Run) -> None:
     found = rt.diagnose(plant, train, validation=delayed(0.5, 3), effects=LATE)
     assert found.verdict == "ambiguous" and allowed(found) == {DELAY, LAG}
     assert not found.rounds[0].ruled_out and "rule out" not in found.outcome.text
@@ -89,8 +89,8 @@ def test_the_first_name_gives_way(unsure: rt.diagnosis.Diagnosis, strong: rt.Rec
     # both were fitted with the same filters and have as many quantities: ΔBIC is the logarithm of the sums of squares
     lag, delay = entries[LAG].fit, entries[DELAY].fit
     by_training = lag.n_readings * np.log(lag.rss / delay.rss)
-    by_unseen = np.subtract(*negative_log_predictive_density([lag, delay], lag, data))
-    assert abs(by_training) < 10.0 < by_training + by_unseen
+    by_validation = np.subtract(*negative_log_predictive_density([lag, delay], lag, data))
+    assert abs(by_training) < 10.0 < by_training + by_validation
     assert told.best.delta_bic - entries[LAG].delta_bic == pytest.approx(by_training, abs=0.1)
 
 

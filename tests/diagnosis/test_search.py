@@ -143,12 +143,12 @@ def test_where_the_search_gave_up_there_is_no_name(
     def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
         return rate(T, u, np.array([0.3 * abs(u[1] - T[0]) ** 0.25 * (u[1] - T[0]), 0.0]))
 
-    train, unseen = hide(hidden)
+    train, validation = hide(hidden)
     names = ["natural_convection"]
-    assert rt.diagnose(plant, train, validation=unseen, effects=names).verdict == "named"
+    assert rt.diagnose(plant, train, validation=validation, effects=names).verdict == "named"
     # whatever the other gates say
     monkeypatch.setattr("robthermal.diagnosis.search._stages.leaves_large_misfit", lambda *_: True)
-    found = rt.diagnose(plant, train, validation=unseen, effects=names)
+    found = rt.diagnose(plant, train, validation=validation, effects=names)
     assert found.verdict == "unexplained" and not found.effects and "A large misfit stays" in found.outcome.text
     assert [effect.label for effect in found.provisional] == ["natural_convection(plate, room)"]
 

@@ -45,7 +45,7 @@ def test_days_with_gains_are_consistent_only_if_they_may_have_them(plant: rt.Sys
     assert found.not_testable["input_gain", ("heater",)] == "every session has a gain of its own for this input"
     gains = 1.0 + 0.05 * np.concatenate(found.nominal.structure.gains(found.nominal.v))
     assert np.allclose(gains / gains[1], [0.95, 1.0, 1.06], rtol=2e-3)
-    assert found.gap["validation"].after == pytest.approx(0.01, rel=0.15)  # the unseen day's own gain is estimated
+    assert found.gap["validation"].after == pytest.approx(0.01, rel=0.15)  # the validation day's own gain is estimated
     assert "session" in str(found.nominal)
 
 

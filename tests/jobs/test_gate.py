@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 import robthermal as rt
 from robthermal import cli
-from robthermal.jobs.claims._words import inward, outward
+from robthermal._digits import inward, outward
 from robthermal.jobs.run._misfit import misfit
 
 

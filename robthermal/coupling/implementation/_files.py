@@ -11,7 +11,7 @@ import numpy as np
 
 from ..._write import write
 from ...errors import InputError, Outcome
-from ...export import json_bytes
+from ...export import json_bytes, plain
 from ._sections import sections
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> di
     return {"format": FORMAT, "name": name, "sample_time": filters.problem.dt, "verdict": filters.verdict,
             "filters": {key: _matrices(getattr(filters, key)) for key in _SYSTEMS},
             "sections": _sections(filters),
-            "norms": {key: _number(value) for key, value in filters.norms.items()},
-            "performance": {key: _number(getattr(filters.performance, key)) for key in _PERFORMANCE},
+            "norms": {key: plain(value) for key, value in filters.norms.items()},
+            "performance": {key: plain(getattr(filters.performance, key)) for key in _PERFORMANCE},
             "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
 
 
@@ -69,7 +69,3 @@ def _sections(filters: Filters) -> dict[str, Any]:
 
 def _matrices(system: control.StateSpace) -> dict[str, Any]:
     return {key: np.asarray(getattr(system, key)).tolist() for key in "ABCD"}
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from ...thermal import System
 from ..data import DataSet, ResponseData, ResponseWhitener
 from ..effects import Candidate, TrialContext
 from ._whitening import Whitener
-
-if TYPE_CHECKING:
-    from ._linearized_record import LinearizedRecord
 
 Array = NDArray[np.float64]
 White = Whitener | ResponseWhitener
@@ -106,13 +103,13 @@ class Linearized(TrialContext, Protocol):
             Place of the lump.
         """
 
-    def white(self, noise: Callable[[LinearizedRecord], tuple[Any, ...]]) -> White:
+    def white(self, noise: Callable[[Any], tuple[Any, ...]]) -> White:
         """The map that makes the errors of the readings white.
 
         Parameters
         ----------
         noise : callable
-            Gives the noise of a record; a response brings its own.
+            Gives the noise of a linearized record; a response brings its own.
         """
 
     def bands(self, z: Array) -> list[str]:

@@ -4,20 +4,52 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_are
 from scipy.signal import lfilter
 
-if TYPE_CHECKING:
-    from ._linearized_record import LinearizedRecord
+from ...thermal import Equations
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 _IGNORED = 1e6  # K: standard deviation of a missing reading
 _BLOCK = 8  # samples whitened in one product
 _COLUMNS = 32  # whitened at once: they stay in the cache
+
+
+class LinearSteps(Protocol):
+    """What a filter asks of a linearized record: its steps, their kinds and its sensors."""
+
+    @property
+    def one(self) -> Any:
+        """The record, with the readings that are missing."""
+
+    @property
+    def equations(self) -> Equations:
+        """Equations of the system."""
+
+    @property
+    def h(self) -> float:
+        """Sample time [s]."""
+
+    @property
+    def steps(self) -> tuple[Array, Array, Array]:
+        """Transition of every sample, and how heat at its start and its end enters."""
+
+    @property
+    def C(self) -> Array:
+        """Readings by deviations (n_sensors, n_z)."""
+
+    @property
+    def M(self) -> Array:
+        """Rates of the deviations (n, n_z, n_z) [1/s]."""
+
+    @property
+    def kinds(self) -> tuple[Array, Places]:
+        """Rates that differ, and which of them every sample has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,12 +147,12 @@ class Whitener:
         return np.ascontiguousarray(carry), out.reshape(len(sample), _BLOCK * n_sensors, -1)
 
 
-def whitener(path: LinearizedRecord, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
+def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
     """Filter along one record.
 
     Parameters
     ----------
-    path : LinearizedRecord
+    path : LinearSteps
         Linearization along the simulated record.
     noise : ndarray, shape (n_sensors,)
         Standard deviation of the record's sensors [K].
@@ -153,7 +185,7 @@ def whitener(path: LinearizedRecord, noise: Array, disturbance: Array, slow: Slo
     return Whitener(A, C, gains, roots)
 
 
-def gathered(path: LinearizedRecord, disturbance: Array, M: Array | None = None) -> Array:
+def gathered(path: LinearSteps, disturbance: Array, M: Array | None = None) -> Array:
     """Noise gathered in every sample, ∫ e^{Ms} q e^{Mᵀs} ds: Simpson over an eighth, doubled three times."""
     kinds, kind = path.kinds
     one_by_one = M is None
@@ -168,7 +200,7 @@ def gathered(path: LinearizedRecord, disturbance: Array, M: Array | None = None)
     return Q[kind] if one_by_one else Q
 
 
-def settled_cost(path: LinearizedRecord, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None
+def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None
                  ) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 

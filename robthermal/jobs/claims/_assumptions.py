@@ -52,9 +52,9 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
     "closed_loop": (_LINEAR, "The controller runs with the numbers of the certificate file, without limits or delays "
                     "beyond those of the plant."),
     "loop": (
-        "Controller and law run as in the certificate file, read the true temperatures at the samples, and the current "
-        "is held between them. Where the sentence says \"sampled model\", nothing is claimed of what the machine does "
-        "between the samples.",
+        "Controller and linearizing feedback law run as in the certificate file, read the true temperatures at the "
+        "samples, and the current is held between them. Where the sentence says \"sampled model\", nothing is claimed "
+        "of what the machine does between the samples.",
         "Temperatures stay in the box of the claim; where that is proven, \"The box is never left\" says so.",
     ),
 }

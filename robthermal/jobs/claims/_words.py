@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from math import log
 from typing import Any
 
 from ..._celsius import ZERO_CELSIUS
+from ..._digits import downwards, inward, outward, upwards
 from ...report import Claim, Parameters
 from ...verification import Certificate, Verdict
 
@@ -114,25 +114,9 @@ def box_of(certificate: Certificate) -> str:
     return "; ".join(parts)
 
 
-def inward(low: Any, high: Any, digits: int = 6) -> str:
-    """A range in words that is not wider than the range."""
-    return f"{_rounded(low, digits, ROUND_CEILING)} to {_rounded(high, digits, ROUND_FLOOR)}"
-
-
-def outward(low: Any, high: Any, digits: int = 6) -> str:
-    """A range in words that is not narrower than the range."""
-    return f"{_rounded(low, digits, ROUND_FLOOR)} to {_rounded(high, digits, ROUND_CEILING)}"
-
-
 def _celsius(pair: Any) -> str:
     low, high = (float(end) - ZERO_CELSIUS for end in pair)
     return inward(low, high)
-
-
-def _rounded(value: Any, digits: int, direction: str) -> str:
-    number = Decimal(f"{float(value):.12g}")  # the digits after these are of the conversion from kelvin
-    found = Context(prec=digits, rounding=direction).create_decimal(number).normalize()
-    return f"{found:f}" if abs(found) < 10**6 and (not found or abs(found) >= Decimal("1e-4")) else str(found)
 
 
 def _pairs(region: Mapping[str, Any], key: str) -> list[tuple[str, Any]]:
@@ -144,12 +128,12 @@ def _margin(certificate: Certificate, verdict: Verdict) -> str:
     if certificate.kind == "observer":
         factor = float(certificate.evidence["contraction"])
         tau = -float(certificate.region["sample_time"]) / log(factor)
-        return (f"errors die out with a time constant of at most {_rounded(tau, 4, ROUND_CEILING)} s (factor "
-                f"{_rounded(factor, 6, ROUND_CEILING)} per sample)")
+        return (f"errors die out with a time constant of at most {upwards(tau, 4)} s (factor "
+                f"{upwards(factor, 6)} per sample)")
     if certificate.kind == "contraction":
         rate = float(certificate.evidence["rate"])
         if rate > 0.0:
-            return (f"differences die out with a time constant of at most {_rounded(1 / rate, 4, ROUND_CEILING)} s "
-                    f"(rate {_rounded(rate, 4, ROUND_FLOOR)} 1/s)")
-    return ", ".join(f"at least {_rounded(value, 3, ROUND_FLOOR)} W flow inwards on every face" if key == "heat"
+            return (f"differences die out with a time constant of at most {upwards(1 / rate, 4)} s "
+                    f"(rate {downwards(rate, 4)} 1/s)")
+    return ", ".join(f"at least {downwards(value, 3)} W flow inwards on every face" if key == "heat"
                      else f"{key} {value:.3g}" for key, value in verdict.margins.items())

@@ -42,7 +42,7 @@ from ._limits import (
 from ._request import DesignRequest, celsius
 
 _LONG = 12.0  # simulated time in units of 1/bandwidth
-_LARGEST_STEP = 10.0  # K, of the comparison with and without the law
+_LARGEST_STEP = 10.0  # K, of the comparison with and without the feedback law
 _SMALLEST_STEP = 0.1  # K
 _TRIES = 5  # halvings of the step until no limit is active
 
@@ -68,7 +68,7 @@ class ControllerDesign:
     loop : ClosedLoop
         Simulated step from rest to the set-points, with the observer and its sensors' noise.
     collapse : Collapse or None
-        Normalized steps with the law and without it; None where the set-points leave no room for steps.
+        Normalized steps with the feedback law and without it; None where the set-points leave no room for steps.
     """
 
     request: DesignRequest
@@ -176,7 +176,7 @@ def design_system(system: System, request: DesignRequest,
     target = [request.setpoint[name] for name in law.names]
     loop = simulate_loop(system, controller, target, law=law, duration=2 * _LONG / request.bandwidth, observer=watcher,
                          noise_seed=0 if watcher else None, regulate=request.regulate)
-    progress("comparing steps with and without the law")
+    progress("comparing steps with and without the feedback law")
     return ControllerDesign(request, certification, law, controller, watcher, reach, loop,
                             _collapse(law, controller, request, reach))
 

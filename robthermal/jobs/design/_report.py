@@ -153,9 +153,10 @@ def _controller_section(result: ControllerDesign) -> Section:
         f" The upper limits are the usable ones: the smallest of {BELOW_FOLD:g} I*, the contraction limit, the file's "
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
         "lower ones are the largest with which that box is still never left.")
-    text = ("A linearizing law turns the heat that the PI asks for into a current, within the limits; the PI works on "
-            f"a linear cold side, every {c.sample_time:g} s, with a crossover of {result.request.bandwidth:g} rad/s. "
-            f"{own}\n\ndesign.json has every number with its unit, and the equations to program.")
+    text = ("A linearizing feedback law turns the heat that the PI asks for into a current, within the limits; the PI "
+            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of "
+            f"{result.request.bandwidth:g} rad/s. {own}\n\ndesign.json "
+            "has every number with its unit, and the equations to program.")
     table = Table(pd.DataFrame(rows), "Limits and gains.")
     return Section("The controller", text, tables=(table,), anchor="controller")
 
@@ -190,8 +191,8 @@ def _linearity_section(result: ControllerDesign) -> Section:
 
 def _observer_section(system: System, observer: GainObserver | None, loop: ClosedLoop) -> Section:
     if observer is None:
-        return Section("Observer", "The file has no sensors for one: the law needs the temperatures of both faces of "
-                       "every module. Add sensors, or measure the faces.", anchor="observer")
+        return Section("Observer", "The file has no sensors for one: the feedback law needs the temperatures of both "
+                       "faces of every module. Add sensors, or measure the faces.", anchor="observer")
     tail = slice(len(loop.time) // 2, None)
     rms = np.sqrt(np.mean((loop.estimate - loop.lumps)[tail] ** 2, axis=0))
     columns = dict(zip(observer.sensors, observer.gain.T, strict=True))

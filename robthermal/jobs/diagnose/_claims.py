@@ -17,7 +17,7 @@ _SENTENCE = {
 
 
 def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
-    """Verdict, whiteness of what is left, prediction of unseen records.
+    """Verdict, whiteness of what is left, prediction of validation records.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
                  found.outcome.text, _records(result, "train"), _margin(found),
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "
                  "within ΔBIC 10 of it are alternatives"
-                 + (f", but {ruled_out}: more than 10 behind with the density of the unseen records added." if ruled_out
-                    else "."))
+                 + (f", but {ruled_out}: more than 10 behind with the density of the validation records added."
+                    if ruled_out else "."))
     yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
                  "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),
                  f"p = {found.adequacy.p_value:.2g}, must be above 0.001",
@@ -61,7 +61,7 @@ def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
            + ", ".join(f"{name} {level:.3g} K" for name, level in found.noise_floor.noise.items()) + ".")
     yield "Inputs and ambients are held between samples; sensors are read at the samples."
     if found.hold_out is None:
-        yield "No validation record was given: that unseen records are predicted was not tested."
+        yield "No validation record was given: that validation records are predicted was not tested."
 
 
 def _claim(title: str, sentence: str, holds: bool, reason: str, box: str, margin: str, how: str) -> Claim:

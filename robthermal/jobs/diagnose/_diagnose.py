@@ -157,7 +157,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
         raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
     progress("running both models freely")
-    return Diagnosed(found, (*_trained(found), *_unseen(found)), tuple(_responses(found)), files)
+    return Diagnosed(found, (*_trained(found), *_validation(found)), tuple(_responses(found)), files)
 
 
 def _trained(found: Diagnosis) -> Iterator[Residuals]:
@@ -177,7 +177,7 @@ def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
                                     *(_by_name(path.one.sensors, size) for size in sizes))
 
 
-def _unseen(found: Diagnosis) -> Iterator[Residuals]:
+def _validation(found: Diagnosis) -> Iterator[Residuals]:
     """The free runs of the hold-out test: initial temperatures from the first tenth, the session's own gains."""
     for one in () if found.hold_out is None else found.hold_out.residuals:
         yield Residuals("validation", one.name, one.time, one.before, one.after)

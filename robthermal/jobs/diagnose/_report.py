@@ -114,7 +114,7 @@ def _sections(result: Diagnosed) -> Iterator[Section]:
                   "seen with a probability of 0.9 beside the misfit of the nominal system.",
                   tables=_candidate_tables(ranking(found)), anchor="candidates")
     yield _located_section(found)
-    yield _unseen_section(found)
+    yield _validation_section(found)
     yield _next_section(found)
 
 
@@ -209,7 +209,7 @@ def _located_section(found: Diagnosis) -> Section:
                    "anything that acts there.", figures=tuple(figures), tables=tuple(tables), anchor="located")
 
 
-def _unseen_section(found: Diagnosis) -> Section:
+def _validation_section(found: Diagnosis) -> Section:
     rows = [{"effect": effect, "where": ", ".join(where), "why": why}
             for (effect, where), why in found.not_testable.items()]
     if not rows:

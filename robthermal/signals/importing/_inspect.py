@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
 from .._glitches import glitch_rows
 from ._assemble import make_report, say_dropped
 from ._clock import read_clock, time_columns
@@ -16,7 +15,7 @@ from ._columns import Channel
 from ._open import open_table
 from ._options import declared
 from ._report import Import, ImportedColumn
-from ._shorten import shortened
+from ._shorten import short_errors
 from ._units import split_header, unit_of
 from ._values import Values, find_parts
 
@@ -52,7 +51,7 @@ def inspect(
     >>> [(column.column, column.role, column.unit) for column in found.columns]
     [('time', 'time', ''), ('T1 [°C]', 'unused', 'degC')]
     """
-    try:
+    with short_errors():
         choice = declared(*tables, (options, {}, "arguments"))
         table = open_table(source, choice.record)
         time = time_columns(table, choice.record, frozenset())
@@ -80,8 +79,6 @@ def inspect(
         }
         report = make_report(source, table, clock, time, values, parts, glitches, choice, None)
         return replace(report, columns=tuple(_unused(column) for column in report.columns))
-    except InputError as error:
-        raise shortened(error) from None
 
 
 def _unused(column: ImportedColumn) -> ImportedColumn:

@@ -14,7 +14,7 @@ from ._clock import read_clock, time_columns
 from ._columns import SystemLike, channels_of_names, channels_of_system
 from ._open import open_table
 from ._options import declared
-from ._shorten import shortened
+from ._shorten import short_errors
 from ._values import check_limits, find_parts, read_values
 
 _QUIET = ("outputs replaced", "columns not read")
@@ -179,42 +179,26 @@ def _read(
     tables: Sequence[tuple[Mapping[str, Any], Mapping[str, Any], str]],
     options: Mapping[str, Any],
 ) -> tuple[Record, ...]:
-    try:
-        return _found(source, system, inputs, outputs, columns, median_filter, max_bytes, tables, options)
-    except InputError as error:
-        raise shortened(error) from None
-
-
-def _found(
-    source: Any,
-    system: SystemLike | None,
-    inputs: Sequence[str] | None,
-    outputs: Sequence[str] | None,
-    columns: Mapping[str, Any] | None,
-    median_filter: float | None,
-    max_bytes: float | None,
-    tables: Sequence[tuple[Mapping[str, Any], Mapping[str, Any], str]],
-    options: Mapping[str, Any],
-) -> tuple[Record, ...]:
-    own = (getattr(system, "record", None) or {}, getattr(system, "columns", None) or {}, "system file")
-    given = {key: value for key, value in options.items() if value is not None}
-    choice = declared(own, *tables, (given, columns or {}, "arguments"))
-    limit = None if max_bytes is None else positive_number(max_bytes, "max_bytes", "B")
-    ins, outs = _names(system, inputs, outputs)
-    wanted = frozenset((*ins, *outs, *(system_names(system) if system is not None else ())))
-    table = open_table(source, choice.record, limit)
-    place = time_columns(table, choice.record, wanted)
-    channels = (
-        channels_of_names(table, ins, outs, choice, place)
-        if system is None
-        else channels_of_system(table, system, choice, place)
-    )
-    clock = read_clock(table, place, choice.record)
-    values = read_values(table, channels, choice, clock)
-    if system is not None:
-        check_limits(table, values, system)
-    parts = find_parts(table, clock, values, choice)
-    return make_records(source, table, clock, place, values, parts, choice, median_filter, system)
+    with short_errors():
+        own = (getattr(system, "record", None) or {}, getattr(system, "columns", None) or {}, "system file")
+        given = {key: value for key, value in options.items() if value is not None}
+        choice = declared(own, *tables, (given, columns or {}, "arguments"))
+        limit = None if max_bytes is None else positive_number(max_bytes, "max_bytes", "B")
+        ins, outs = _names(system, inputs, outputs)
+        wanted = frozenset((*ins, *outs, *(system_names(system) if system is not None else ())))
+        table = open_table(source, choice.record, limit)
+        place = time_columns(table, choice.record, wanted)
+        channels = (
+            channels_of_names(table, ins, outs, choice, place)
+            if system is None
+            else channels_of_system(table, system, choice, place)
+        )
+        clock = read_clock(table, place, choice.record)
+        values = read_values(table, channels, choice, clock)
+        if system is not None:
+            check_limits(table, values, system)
+        parts = find_parts(table, clock, values, choice)
+        return make_records(source, table, clock, place, values, parts, choice, median_filter, system)
 
 
 def _names(

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ...errors import InputError
 
 _LONGEST = 600  # characters of a message
+
+
+@contextmanager
+def short_errors() -> Iterator[None]:
+    """Within, messages of input errors are at most 600 characters long."""
+    try:
+        yield
+    except InputError as error:
+        raise shortened(error) from None
 
 
 def shortened(error: InputError) -> InputError:

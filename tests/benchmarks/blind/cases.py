@@ -13,10 +13,10 @@ import robthermal as rt
 from .hidden import with_effects
 from .integrate import Hidden, integrate
 from .outside import NOISES, OUTSIDE, readings_noise
-from .plants import N_TRAIN, N_UNSEEN, PLANTS, H, Plant, excitation, nominal, varied
+from .plants import N_TRAIN, N_VALIDATION, PLANTS, H, Plant, excitation, nominal, varied
 from .sizes import SIZES, Found, drawn
 
-UNSEEN_START, FOLLOW_START = 4200.0, 7200.0  # s: the records follow each other, the clock runs on
+VALIDATION_START, FOLLOW_START = 4200.0, 7200.0  # s: the records follow each other, the clock runs on
 
 
 @dataclass(frozen=True, order=True)
@@ -40,7 +40,7 @@ class Given:
 
     system: rt.System
     train: rt.Record
-    unseen: rt.Record
+    validation: rt.Record
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def made(case: Case) -> tuple[Given, Truth]:
     plant = varied(told, rng)
     noise = {name: float(np.exp(rng.uniform(np.log(0.005), np.log(0.02)))) for name in plant.sensors}
     system = nominal(told, _declared(noise, rng), _declared(plant.disturbance, rng))
-    inputs = excitation(told, N_TRAIN, rng), excitation(told, N_UNSEEN, rng)
+    inputs = excitation(told, N_TRAIN, rng), excitation(told, N_VALIDATION, rng)
     effects = _effects(case, rng)
     kind = case.effect if case.group == "noise" else "white"
     if kind == "heat_twice":
@@ -76,9 +76,9 @@ def made(case: Case) -> tuple[Given, Truth]:
         value = {"resistance": plant.modules[module].R, "seebeck": plant.modules[module].S}[part]
         return float(value * (1.0 + asked.accuracy * own_rng.standard_normal()))
 
-    train, unseen = run(list(inputs), [0.0, UNSEEN_START], rng)
+    train, validation = run(list(inputs), [0.0, VALIDATION_START], rng)
     own_rng = np.random.default_rng(rng.integers(2**32))
-    return (Given(system, train, unseen),
+    return (Given(system, train, validation),
             Truth(effects, lambda plan: run([_inputs(told, plan)], [FOLLOW_START], own_rng, plan.sample_time)[0],
                   measured))
 

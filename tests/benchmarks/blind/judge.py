@@ -7,7 +7,7 @@ from typing import Any
 from .plants import PLANTS
 
 Row = dict[str, Any]
-VISIBLE = 1.3  # whitened variance of unseen records from which a gap can be seen to close
+VISIBLE = 1.3  # whitened variance of validation records from which a gap can be seen to close
 
 
 def same(a: list[Any], b: list[Any]) -> bool:
@@ -120,8 +120,8 @@ def ratio(row: Row) -> float | None:
 
 
 def excess(row: Row) -> float | None:
-    """Excess whitened variance of unseen records after over before, where it could be seen."""
-    before, after = row.get("unseen", (0.0, 0.0))
+    """Excess whitened variance of validation records after over before, where it could be seen."""
+    before, after = row.get("validation", (0.0, 0.0))
     return (after - 1.0) / (before - 1.0) if before > VISIBLE else None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import robthermal as rt
 
 H = 3.0  # s, sample time
-N_TRAIN, N_UNSEEN = 1200, 800  # 1 h and 40 min
+N_TRAIN, N_VALIDATION = 1200, 800  # 1 h and 40 min
 ROOM = 298.15  # K, nominal temperature of the first ambient: T_ref of the contract
 MODULE_SIGMA = {"seebeck": 0.05, "resistance": 0.05, "conductance": 0.1}
 CAPACITY_SIGMA, FACE_SIGMA, LINK_SIGMA = 0.1, 0.2, 0.15

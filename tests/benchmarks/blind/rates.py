@@ -105,10 +105,10 @@ def print_rates(rows: list[Row]) -> None:
 
 
 def print_excess(rows: list[Row]) -> None:
-    """Excess variance on unseen records."""
+    """Excess variance on validation records."""
     ratios = [value for row in rows if (value := excess(row)) is not None]
     if ratios:
-        print(f"{'excess variance of unseen records, after over before':<72} median {np.median(ratios):.3f}, 90 % "
+        print(f"{'excess variance of validation records, after over before':<72} median {np.median(ratios):.3f}, 90 % "
               f"{np.quantile(ratios, 0.9):.3f}, worst {max(ratios):.3f} of {len(ratios)}  aim <= 0.05, worst <= 0.3")
 
 

@@ -45,7 +45,7 @@ def judged(case: Case, version: str, compare: bool, most: int | None = None) -> 
         short = {} if most is None else {"effects": short_catalog(given.system, truth, most, case.seed)}
         start = time.process_time()
         try:
-            found = rt.diagnose(given.system, given.train, validation=given.unseen, **short)
+            found = rt.diagnose(given.system, given.train, validation=given.validation, **short)
         except Exception as error:  # a crash is a result of the suite, with its message
             return row | {"verdict": "crashed", "error": f"{type(error).__name__}: {error}",
                           "seconds": time.process_time() - start}
@@ -80,7 +80,7 @@ def _said(found: rt.diagnosis.Diagnosis, truth: Truth) -> Row:
                 "limits": [_limit(found, name, where) for name, where, _ in truth.effects],
                 "candidates": len(found.scores.candidates), "trials": found.scores.n_trials}
     if found.hold_out is not None:
-        out["unseen"] = [found.hold_out.variance_before, found.hold_out.variance_after]
+        out["validation"] = [found.hold_out.variance_before, found.hold_out.variance_after]
     return out
 
 
@@ -105,7 +105,7 @@ def _followed(given: Given, truth: Truth, found: rt.diagnosis.Diagnosis) -> Row:
         system = system.with_parameters({asked.parameter: value}).model_copy(update={"fit": fit})
     start = time.process_time()
     try:
-        again = rt.diagnose(system, [given.train, record], validation=given.unseen)
+        again = rt.diagnose(system, [given.train, record], validation=given.validation)
     except Exception as error:
         return {"verdict": "crashed", "error": f"{type(error).__name__}: {error}"}
     return {"seconds": time.process_time() - start, "expected": plan.expected, "present": plan.present,
