@@ -15,3 +15,8 @@ class Said(NamedTuple):
 
 
 Run = Callable[..., Said]
+
+
+def without_progress(err: str) -> str:
+    """Standard error without the plain lines that a slow machine sees every ten seconds."""
+    return "".join(line for line in err.splitlines(keepends=True) if not line.endswith(" s so far\n"))

@@ -31,6 +31,7 @@ def _close_figures() -> Iterator[None]:
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
     """The command line in this process: an exception that would be a traceback fails the test."""
+    monkeypatch.setattr("robthermal.cli._progress.EVERY", 3600.0)  # s: on a slow machine too, nothing but what was said
 
     def call(*words: object) -> Said:
         monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, words)])

@@ -106,14 +106,14 @@ GOOD = {"v_max": 15.4, "i_max": 6.0, "dt_max": 67.0, "q_max": 51.4, "t_hot": 300
     ({"t_hot": 27.0}, r"argument t_hot.*looks like Celsius.*Add 273\.15"),
     ({"t_hot": 573.0}, r"argument t_hot.*above 523\.15 K.*twice"),
     ({"dt_max": 149.0}, r"argument dt_max.*single-stage.*Fahrenheit is divided by 1\.8.*65\.0 K"),
-    ({"dt_max": 0.0}, r"argument dt_max.*not positive"),
-    ({"dt_max": -67.0}, r"argument dt_max.*not positive"),
+    ({"dt_max": 0.0}, r"argument dt_max.*positive number"),
+    ({"dt_max": -67.0}, r"argument dt_max.*positive number"),
     ({"i_max": 6000.0}, r"argument i_max.*milliampere.*Divide by 1000"),
-    ({"i_max": float("nan")}, r"argument i_max.*not a finite number"),
-    ({"v_max": "15.4"}, r"argument v_max.*'15\.4' is not a finite number"),
-    ({"v_max": True}, r"argument v_max.*not a finite number"),
-    ({"q_max": -1.0}, r"argument q_max.*not positive.*Check the sign"),
-    ({"q_max": float("inf")}, r"argument q_max.*not a finite number"),
+    ({"i_max": float("nan")}, r"argument i_max.*not (a number|finite)"),
+    ({"v_max": "15.4"}, r"argument v_max.*'15\.4', not a number"),
+    ({"v_max": True}, r"argument v_max.*not (a number|finite)"),
+    ({"q_max": -1.0}, r"argument q_max.*positive number"),
+    ({"q_max": float("inf")}, r"argument q_max.*not (a number|finite)"),
 ])
 def test_bad_sheets_are_refused(change: dict, message: str) -> None:
     with pytest.raises(rt.InputError, match=message):
@@ -158,7 +158,7 @@ def test_fit_is_the_least_squares_optimum() -> None:
     ({"t_range": (320.0, 290.0)}, r"argument t_range.*does not ascend"),
     ({"couples": 0}, r"argument couples.*whole number"),
     ({"couples": 12.5}, r"argument couples.*whole number"),
-    ({"i_max": 0.0}, r"argument i_max.*not positive"),
+    ({"i_max": 0.0}, r"argument i_max.*positive number"),
 ])
 def test_bad_polynomial_fits_are_refused(change: dict, message: str) -> None:
     with pytest.raises(rt.InputError, match=message):

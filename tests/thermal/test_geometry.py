@@ -190,8 +190,8 @@ def test_warning_names_lumps_and_remedy() -> None:
 
 
 @pytest.mark.parametrize(("options", "message"), [
-    ({"length": 0.0}, r"rod 'bar' length.*not positive"),
-    ({"area": -1e-4}, r"rod 'bar' area.*not positive"),
+    ({"length": 0.0}, r"rod 'bar' length.*positive number"),
+    ({"area": -1e-4}, r"rod 'bar' area.*positive number"),
     ({"lumps": 2.5}, r"rod 'bar' lumps.*whole number"),
     ({"lumps": 0}, r"rod 'bar' lumps.*whole number"),
     ({"material": "aluminum"}, r"'aluminum' is not in the table.*Did you mean 'aluminium'"),
@@ -199,7 +199,7 @@ def test_warning_names_lumps_and_remedy() -> None:
     ({"convection": 5.0}, r"convection without a perimeter.*Give perimeter"),
     ({"convection": 5.0, "perimeter": 0.04, "ambient": "rom"}, r"ambient 'rom' does not exist.*Assembly\.ambient"),
     ({"convection": 5.0, "perimeter": 0.04}, r"ambient None does not exist"),
-    ({"perimeter": float("nan")}, r"rod 'bar' perimeter.*not a finite number"),
+    ({"perimeter": float("nan")}, r"rod 'bar' perimeter.*not (a number|finite)"),
 ])
 def test_bad_rods_are_refused(options: dict, message: str) -> None:
     a = Assembly()
@@ -226,17 +226,17 @@ def assembled() -> Assembly:
     (lambda a: a.join("block", "plate"), r"has no resistance.*Give contact_resistance"),
     (lambda a: a.join("block", "plate", contact_resistance=1e-4), r"the contact has no area.*Give area"),
     (lambda a: a.join("bar1", "room", contact_resistance=-1e-4), r"contact_resistance.*negative"),
-    (lambda a: a.join("bar1", "room", convection=0.0), r"convection.*not positive"),
+    (lambda a: a.join("bar1", "room", convection=0.0), r"convection.*positive number"),
     (lambda a: a.lump("bar2", 3.0), r"the name 'bar2' is used twice"),
     (lambda a: a.lump("", 3.0), r"'' is no name"),
-    (lambda a: a.lump("x", 0.0), r"lump 'x' capacity.*not positive"),
+    (lambda a: a.lump("x", 0.0), r"lump 'x' capacity.*positive number"),
     (lambda a: a.ambient("lab", 25.0), r"ambient 'lab' temperature.*looks like Celsius"),
     (lambda a: a.stack([Contact(1e-4), Layer("l", 0.1, STUFF)], area=AREA), r"begins or ends with a contact"),
     (lambda a: a.stack([Contact(1e-4), Layer("l", 0.1, STUFF), Layer("m", 0.1, STUFF)], area=AREA), r"begins or ends"),
     (lambda a: a.stack([Layer("l", 0.1, STUFF), Contact(1e-4)], area=AREA), r"begins or ends with a contact"),
     (lambda a: a.stack([], area=AREA), r"has no layer"),
     (lambda a: a.stack(["copper"], area=AREA), r"stack part 1: 'copper'.*a Layer or a Contact"),
-    (lambda a: Material("m", 0.0, 1.0, 1.0), r"material 'm' conductivity.*not positive"),
+    (lambda a: Material("m", 0.0, 1.0, 1.0), r"material 'm' conductivity.*positive number"),
     (lambda a: a.system(), r"no heat path to an ambient from lump"),
 ])
 def test_bad_assemblies_are_refused(call, message: str) -> None:

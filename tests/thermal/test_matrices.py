@@ -148,7 +148,7 @@ def test_bad_conductance_matrices_are_refused(fault: str) -> None:
     ({"lump_names": ["a", "b"]}, r"argument lump_names: 2 names.*3 different"),
     ({"lump_names": ["a", "b", "a"]}, r"argument lump_names: 3 names, 2 of them different"),
     ({"lump_names": ["a", "room", "c"]}, r"'room' is used twice"),
-    ({"tolerance": 0.0}, r"argument tolerance.*not positive"),
+    ({"tolerance": 0.0}, r"argument tolerance.*positive number"),
     ({"sensors": {"T": {"lump": "n9"}}}, r"\[sensors\.T\] lump: 'n9' does not exist"),
 ])
 def test_bad_arguments_are_refused(options: dict, message: str) -> None:
