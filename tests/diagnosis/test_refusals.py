@@ -82,3 +82,21 @@ def test_quiet_record_says_what_it_could_not_show(plant: rt.System) -> None:
     assert found.not_testable["input_gain", ("heater",)] == "no effect on any reading of these records"
     assert found.not_testable["input_delay", ("heater",)] == "no effect on any reading of these records"
     assert ("heat_source", ("plate",)) not in found.not_testable  # that would have been seen
+
+
+def test_bounds_of_initial_temperatures_are_accepted_by_the_system():
+    """Sensors 60 K apart: 20 standard deviations of the start reached below 150 K, and a refit ended as bad input."""
+    system = rt.System(
+        ambients={"room": {"temperature": 298.15}}, lumps={"plate": {"capacity": 100.0}, "lamp": {"capacity": 20.0}},
+        links=[{"between": ("plate", "room"), "conductance": 0.5}, {"between": ("plate", "lamp"), "conductance": 0.5}],
+        sensors={"Tp": {"lump": "plate", "noise": 0.1}, "Tl": {"lump": "lamp", "noise": 0.1}})
+    rng = np.random.default_rng(0)
+    record = rt.Record(sample_time=5.0, inputs=np.full(80, 298.15), input_names=["room"], output_names=["Tp", "Tl"],
+                       outputs=np.array([360.0, 420.0]) + 0.1 * rng.standard_normal((80, 2)))
+    structure = rt.diagnosis.refit(system, record).structure
+    low, high = structure.bounds
+    assert (low < 0).all() and (high > 0).all()
+    for bound in (low, high):
+        T = structure.temperatures(bound)[0]
+        assert [lump.initial for lump in structure.systems(bound)[0].lumps.values()] == pytest.approx(list(T))
+        assert T.min() > 150.0 and T.max() <= 1500.0

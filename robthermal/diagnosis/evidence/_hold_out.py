@@ -284,9 +284,14 @@ def _log_volume(J: Array) -> float:
 def _over(fit: Refit, data: Sequence[DataSet], start: Start = "free") -> tuple[Structure, Array]:
     """The structure over validation data, and its unknowns: those trained, the data's own at zero."""
     starts = tuple(one.initial(fit.system, start) for one in data)
-    structure = replace(fit.structure, data=tuple(data), starts=starts)
-    p = structure.n_parameters + structure.n_effects
-    return structure, np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
+    structure = replace(fit.structure, data=tuple(data), starts=starts, coarse=())
+    p = structure.n_common
+    plain = np.concatenate([fit.v[:p], np.zeros(structure.n_own)])
+    if not fit.structure.coarse:
+        return structure, plain
+    coarse = tuple(path.coarse_columns(structure.base) for path in structure.paths(plain))
+    return (replace(structure, coarse=coarse),
+            np.concatenate([fit.v[:fit.structure.n_common], np.zeros(structure.n_own)]))
 
 
 def _filters(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[White, ...]:
@@ -304,10 +309,11 @@ class _Validation:
 
     @property
     def _kept(self) -> Places:
-        """All rows but the parameters' own priors, which are in R already."""
+        """All rows but the priors of what is common, which are in R already."""
         structure = self.of.structure
         n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
-        return np.r_[0:n, n + n_known:n + n_known + structure.n_own]
+        own = n + n_known + structure.n_coarse
+        return np.r_[0:n, own:own + structure.n_own]
 
     def residual(self, v: Array) -> Array:
         """As `Problem.residual`."""
@@ -324,7 +330,7 @@ def _own_unknowns(fit: Refit, data: Sequence[DataSet], whiteners: Sequence[White
                   ) -> tuple[Structure, Point, int]:
     """Initial temperatures and session gains on validation data, the trained parameters fixed; also the readings."""
     structure, v = _over(fit, data)
-    p = structure.n_parameters + structure.n_effects
+    p = structure.n_common
     trained = fit.v[:p]
     low, high = (bound.copy() for bound in structure.bounds)
     low[:p], high[:p] = trained, trained

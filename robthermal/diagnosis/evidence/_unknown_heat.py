@@ -154,7 +154,7 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
         heat = new
         try:
             here = _heated(fit, np.clip(here.v + step, *fit.structure.bounds), lump, knots, found.heat)
-        except Diverged:  # far outside what the linearization knows: stay with the last answer
+        except (Diverged, InputError):  # far outside what the linearization knows: stay with the last answer
             break
     return found
 

@@ -9,6 +9,7 @@ from ._noise_scaling import with_slow_part as with_slow_part
 from ._refit import Refit as Refit
 from ._refitting import ENOUGH as ENOUGH
 from ._refitting import LIMIT as LIMIT
+from ._refitting import coarsened as coarsened
 from ._refitting import extended as extended
 from ._refitting import filters as filters
 from ._refitting import fitted as fitted
@@ -19,4 +20,5 @@ from ._structure import Structure as Structure
 from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain", "Structure", "WIDE",
-           "Whitened", "descend", "extended", "filters", "fitted", "refit", "relinearized", "with_slow_part"]
+           "Whitened", "coarsened", "descend", "extended", "filters", "fitted", "refit", "relinearized",
+           "with_slow_part"]

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fitting import residual, rmse
+from ...fitting import rmse
 from ..data import NoiseEstimate
 from ..path import LinearizedRecord, SlowNoise, settled_cost
 
@@ -157,7 +157,7 @@ def _is_slow(name: str, paths: Sequence[LinearizedRecord], floor: NoiseEstimate,
 
 
 def _residuals(paths: Sequence[LinearizedRecord]) -> list[Array]:
-    return [residual(path.one.readings, path.readings[:, path.one.columns]) for path in paths]
+    return [path.residual for path in paths]
 
 
 def _cost(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], floor: NoiseEstimate, levels: NoiseScaling

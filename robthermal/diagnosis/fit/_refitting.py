@@ -111,6 +111,20 @@ def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> 
     return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
 
 
+def coarsened(fit: Refit) -> Refit:
+    """The same structure where the network may be too coarse: what a finer one would change is unknown, of usual size.
+
+    Noise levels are found again: those of the fit have grown with what it could not explain.
+    """
+    structure = replace(fit.structure, coarse=())
+    n = structure.n_parameters + structure.n_effects
+    own = fit.v[fit.structure.n_common:]
+    plain = np.concatenate([fit.v[:n], own])
+    coarse = tuple(path.coarse_columns(structure.base) for path in structure.paths(plain))
+    finer = replace(structure, coarse=coarse)
+    return fitted(finer, np.concatenate([fit.v[:n], np.zeros(finer.n_coarse), own]), fit.floor, NoiseScaling(1.0, {}))
+
+
 def relinearized(fit: Refit) -> Refit:
     """The same with linearizations of its own structure; `extended` keeps those of the structure it came from."""
     return replace(fit, paths=fit.structure.paths(fit.v))

@@ -23,6 +23,9 @@ from ._sessions import Sessions
 Array = NDArray[np.float64]
 _KEPT = 2
 _STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+_FARTHEST = 20.0  # standard deviations of an initial temperature
+_COLDEST, _HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
+_COARSEST = 2.5  # times what is usual: a place off by more than half a lump belongs to another lump
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
@@ -54,6 +57,9 @@ class Structure:
         Of the simulation [K].
     sessions : Sessions
         Gains of their own that the records may have.
+    coarse : tuple of ndarray, shape (n, n_sensors, k)
+        Changes of the readings of every data set by which a finer network may differ, from `coarse_columns`; their
+        sizes are unknowns common to all data, with the prior 0 ± 1. Empty: the network is taken to be right.
     """
 
     base: System
@@ -63,6 +69,7 @@ class Structure:
     effects: tuple[Candidate, ...] = ()
     tolerance: float = 1e-4
     sessions: Sessions = Sessions()
+    coarse: tuple[Array, ...] = ()
     _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -74,6 +81,16 @@ class Structure:
     def n_effects(self) -> int:
         """Number of quantities of all effects."""
         return sum(len(c.effect.free) for c in self.effects)
+
+    @property
+    def n_coarse(self) -> int:
+        """Number of ways in which a finer network may differ."""
+        return self.coarse[0].shape[2] if self.coarse else 0
+
+    @property
+    def n_common(self) -> int:
+        """Number of unknowns common to all data: parameters, quantities of effects, what a finer network changes."""
+        return self.n_parameters + self.n_effects + self.n_coarse
 
     @property
     def n_readings(self) -> int:
@@ -111,14 +128,16 @@ class Structure:
         coordinates = [np.log(q[quantity.name]) if quantity.lower > 0 else q[quantity.name]
                        for candidate, q in zip(self.effects, quantities, strict=True)
                        for quantity in candidate.effect.free]
-        return np.concatenate([self.ranges.coordinates(parameters), coordinates, np.zeros(self.n_own)])
+        return np.concatenate([self.ranges.coordinates(parameters), coordinates, np.zeros(self.n_coarse + self.n_own)])
 
     def carried(self, other: Structure, v: Array, quantities: Sequence[dict[str, float]]) -> Array:
         """Unknowns at the parameters and initial temperatures of another structure; a lump that it lacks starts at its
         prior.
         """
         out = self.start(other.ranges.values(v[:other.n_parameters]), quantities)
-        at = self.n_parameters + self.n_effects
+        if self.n_coarse and self.n_coarse == other.n_coarse:
+            out[self.n_common - self.n_coarse:self.n_common] = v[other.n_common - other.n_coarse:other.n_common]
+        at = self.n_common
         known = other.temperatures(v)
         for start, T in zip(self.starts, known, strict=True):
             if start.n_free:
@@ -139,10 +158,22 @@ class Structure:
                 lower.append(np.log(quantity.lower) if log else quantity.lower)
                 upper.append(np.log(quantity.upper) if log else quantity.upper)
         n_sessions = sum(one.n_sessions for one in self.data)
-        reach = np.concatenate([np.full(self.n_starts, 20.0), np.tile(self.sessions.reach, n_sessions)])
+        away = np.tile(self.sessions.reach, n_sessions)
+        coldest, hottest = self._starts_within
         q = self.ranges.coordinates
-        return (np.concatenate([q(self.ranges.lower), lower, -reach]),
-                np.concatenate([q(self.ranges.upper), upper, reach]))
+        wide = np.full(self.n_coarse, _COARSEST)
+        return (np.concatenate([q(self.ranges.lower), lower, -wide, coldest, -away]),
+                np.concatenate([q(self.ranges.upper), upper, wide, hottest, away]))
+
+    @property
+    def _starts_within(self) -> tuple[Array, Array]:
+        """Bounds of the initial temperatures, in standard deviations: no farther than a system accepts."""
+        coldest, hottest = [np.zeros(0)], [np.zeros(0)]
+        for start in self.starts:
+            if start.n_free:
+                coldest.append(np.clip((_COLDEST - start.mean) / start.sigma, -_FARTHEST, 0.0))
+                hottest.append(np.clip((_HOTTEST - start.mean) / start.sigma, 0.0, _FARTHEST))
+        return np.concatenate(coldest), np.concatenate(hottest)
 
     def system(self, v: Array) -> System:
         """Nominal system at these parameters with the effects added."""
@@ -154,7 +185,7 @@ class Structure:
 
     def temperatures(self, v: Array) -> list[Array]:
         """Initial lump temperatures of every record [K]; empty for a frequency response."""
-        out, at = [], self.n_parameters + self.n_effects
+        out, at = [], self.n_common
         for start in self.starts:
             free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0
             out.append(start.mean + free)
@@ -192,20 +223,25 @@ class Structure:
         if key not in self._last:
             while len(self._last) >= _KEPT:
                 del self._last[next(iter(self._last))]
-            self._last[key] = _Computed(tuple(linearize(system, one, self.tolerance)
-                                            for system, one in zip(self.systems(v), self.data, strict=True)))
+            paths = [linearize(system, one, self.tolerance) for system, one in zip(self.systems(v), self.data,
+                                                                                   strict=True)]
+            if self.coarse:
+                b = v[self.n_common - self.n_coarse:self.n_common]
+                paths = [path.refined(columns, b) for path, columns in zip(paths, self.coarse, strict=True)]
+            self._last[key] = _Computed(tuple(paths))
         return self._last[key]
 
     def _unknowns(self, v: Array) -> Iterator[Unknowns]:
         """The unknowns as every data set sees them."""
         names, chain = self._chain(v)
-        n = self.n_parameters + self.n_effects
+        n, coarse = self.n_parameters + self.n_effects, slice(self.n_common - self.n_coarse, self.n_common)
         steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
-        at, gain_at = n, v.size - (self.n_own - self.n_starts)
+        at, gain_at = self.n_common, v.size - (self.n_own - self.n_starts)
         for one, start in zip(self.data, self.starts, strict=True):
             n_gains = self.sessions.n_free * one.n_sessions
             yield Unknowns(v, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start.sigma,
-                           slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma)
+                           slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma,
+                           coarse)
             at, gain_at = at + start.n_free, gain_at + n_gains
 
     @property
@@ -217,7 +253,7 @@ class Structure:
     def prior(self, v: Array) -> tuple[Array, Array]:
         """Priors' centers less the unknowns, in standard deviations, and the derivatives of the unknowns."""
         known = np.flatnonzero(np.isfinite(self.ranges.sigma))
-        n_free = self.n_own
+        n_free = self.n_coarse + self.n_own
         first = self.n_parameters + self.n_effects
         values = self.ranges.values(v[:self.n_parameters])
         J = np.zeros((known.size + n_free, v.size))

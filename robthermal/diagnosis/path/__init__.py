@@ -1,5 +1,6 @@
 """The system linearized along a record, or beside a frequency response, and the filters that whiten residuals."""
 
+from ._coarseness import coarse_names as coarse_names
 from ._linearize import linearize as linearize
 from ._linearize import linearized_records as linearized_records
 from ._linearized import Linearized as Linearized
@@ -17,5 +18,5 @@ from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
 __all__ = ["Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise", "Unknowns", "White",
-           "Whitener", "gathered", "linearize", "linearized_record", "linearized_records", "linearized_response",
-           "settled_cost", "whitener"]
+           "Whitener", "coarse_names", "gathered", "linearize", "linearized_record", "linearized_records",
+           "linearized_response", "settled_cost", "whitener"]

@@ -46,6 +46,8 @@ class Unknowns:
         Numbers of the system behind the gains.
     gain_sigma : sequence of float
         Standard deviations of the gains [-].
+    coarse : slice
+        Places of what a finer network would change.
     """
 
     v: Array
@@ -59,6 +61,7 @@ class Unknowns:
     gains: slice
     gain_names: Sequence[str]
     gain_sigma: Sequence[float]
+    coarse: slice
 
 
 class Linearized(TrialContext, Protocol):
@@ -75,6 +78,24 @@ class Linearized(TrialContext, Protocol):
     @property
     def in_time(self) -> bool:
         """Whether the data set is a record."""
+
+    def coarse_columns(self, base: System) -> Array:
+        """Change of the readings (n, m, k) by every way in which a network may be too coarse; 0 of a response.
+
+        Parameters
+        ----------
+        base : System
+            Network without added effects.
+        """
+
+    def refined(self, columns: Array, b: Array) -> Linearized:
+        """With what a finer network would change; a frequency response as it is.
+
+        Parameters
+        ----------
+        columns, b : ndarray
+            Changes of the readings (n, m, k), and how large they are (k,).
+        """
 
     def slopes(self, unknowns: Unknowns) -> Array:
         """Derivatives (n, m, p) of the modelled readings by all unknowns.

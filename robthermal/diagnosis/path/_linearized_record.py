@@ -7,7 +7,7 @@ is exact, δ(k+1) = A δ(k) + h φ₁(Mh) q₀ + h φ₂(Mh)(q₁ - q₀). All c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,7 @@ from ...fitting import residual
 from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response
+from ._coarseness import coarse_responses
 from ._linearized import Unknowns
 from ._whitening import Whitener, whitener
 
@@ -49,6 +50,10 @@ class LinearizedRecord:
         Held inputs, in the order of `System.exogenous_names`.
     run : Trajectory
         The simulation, for its derivatives.
+    coarse : ndarray, shape (n, n_sensors, k), optional
+        Changes of the readings by which a finer network may differ, from `coarse_columns`.
+    b : ndarray, shape (k,), optional
+        How large they are here.
     """
 
     system: System
@@ -57,6 +62,8 @@ class LinearizedRecord:
     readings: Array
     u: Array
     run: Trajectory
+    coarse: Array | None = None
+    b: Array | None = None
 
     @property
     def h(self) -> float:
@@ -98,8 +105,30 @@ class LinearizedRecord:
 
     @cached_property
     def residual(self) -> Array:
-        """Free-run residual, measured − modelled, (n, n_sensors) [K]."""
-        return residual(self.one.readings, self.readings[:, self.one.columns])
+        """Free-run residual, measured − modelled, (n, n_sensors) [K]; without what a finer network would change."""
+        free = residual(self.one.readings, self.readings[:, self.one.columns])
+        return free if self.coarse is None or self.b is None else free - self.coarse @ self.b
+
+    def coarse_columns(self, base: System) -> Array:
+        """As `Linearized.coarse_columns`.
+
+        Parameters
+        ----------
+        base : System
+            Network without added effects.
+        """
+        responses = list(coarse_responses(self, base))
+        return self.readings_of(responses) if responses else np.zeros((*self.one.readings.shape, 0))
+
+    def refined(self, columns: Array, b: Array) -> LinearizedRecord:
+        """As `Linearized.refined`.
+
+        Parameters
+        ----------
+        columns, b : ndarray
+            Changes of the readings (n, n_sensors, k), and how large they are (k,).
+        """
+        return replace(self, coarse=columns, b=b)
 
     def white(self, noise: Callable[[LinearizedRecord], tuple[Any, ...]]) -> Whitener:
         """As `Linearized.white`: a Kalman filter along the record.
@@ -149,6 +178,8 @@ class LinearizedRecord:
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
         out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
+        if self.coarse is not None:
+            out[..., unknowns.coarse] = self.coarse
         return out
 
     def columns(self, trials: Sequence[Candidate]) -> Array:

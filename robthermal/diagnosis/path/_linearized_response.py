@@ -16,6 +16,7 @@ from ...fitting import residual
 from ...thermal import Input, System
 from ..data import Complex, ResponseData, ResponseWhitener, as_complex, as_real
 from ..effects import Candidate
+from ._coarseness import coarse_names
 from ._linearized import Unknowns
 
 Array = NDArray[np.float64]
@@ -62,6 +63,14 @@ class LinearizedResponse:
     def residual(self) -> Array:
         """Measured − modelled, (2 n_b, m)."""
         return residual(self.one.readings, self.readings)
+
+    def coarse_columns(self, base: System) -> Array:
+        """As `Linearized.coarse_columns`: a response has none."""
+        return np.zeros((*self.readings.shape, len(coarse_names(base))))
+
+    def refined(self, columns: Array, b: Array) -> LinearizedResponse:
+        """As `Linearized.refined`: as it is."""
+        return self
 
     def white(self, noise: Callable[..., Any]) -> ResponseWhitener:
         """As `Linearized.white`: estimated with the response."""

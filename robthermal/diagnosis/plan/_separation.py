@@ -45,7 +45,7 @@ class Hypothesis:
     def on(self, trial: RecordData, conditions: TrialConditions) -> tuple[Structure, Array]:
         """The structure and its unknowns on one new record."""
         start = conditions.start(self.structure, self.structure.system(self.v))
-        own = replace(self.structure, data=(trial,), starts=(start,))
+        own = replace(self.structure, data=(trial,), starts=(start,), coarse=())
         values = own.ranges.values(self.v[:own.n_parameters])
         return own, own.start(values, self.structure.quantities(self.v))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..data import DataSet
 from ..evidence import Scores, explains, promising, score
-from ..fit import Refit
+from ..fit import Refit, coarsened
 from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
 from ._joint_check import checked_jointly
@@ -78,6 +78,8 @@ def accept(state: SearchState) -> SearchState:
     if not isinstance(decision, Accepted):
         return replace(state, complete=True)
     rounds, fit = (*state.rounds, decision), decision.best.fit
+    if fit.structure.coarse:  # what a finer network changes depends on where the model is
+        fit = coarsened(fit)
     left = leaves_large_misfit(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
     return replace(state, rounds=rounds, fit=fit, complete=left, misfit_left=left)
 

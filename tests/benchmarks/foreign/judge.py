@@ -1,0 +1,93 @@
+"""One data set through the workflow, and what its answer is worth: the first accepted effect is the dominant one."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import robthermal as rt
+
+from .cases import STRENGTH, Case, made
+
+Row = dict[str, Any]
+NAMED = ("named", "named_with_remainder", "ambiguous")
+
+
+def judged(case: Case) -> Row:
+    """Make the data, diagnose, and keep what the tables need."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        one = made(case)
+        start = time.process_time()
+        try:
+            found = rt.diagnose(one.system, one.train, validation=one.unseen)
+        except Exception as error:  # a crash is a result of the suite, with its message
+            return {"key": case.key, "group": case.group, "strength": one.strength, "truth": [], "names": [],
+                    "others": [], "verdict": "crashed", "text": f"{type(error).__name__}: {error}",
+                    "seconds": time.process_time() - start}
+    answer = found.to_dict()
+    return {"key": case.key, "group": case.group, "strength": one.strength, "discrete": one.discrete,
+            "coarse": one.coarse, "truth": [[name, list(where)] for name, where, _ in one.truth],
+            "names": [[e["effect"], e["where"]] for e in answer["effects"]],
+            "others": [[[o["effect"], o["where"]] for o in others] for others in answer["alternatives"]],
+            "provisional": [[e["effect"], e["where"]] for e in answer["provisional"]],
+            "verdict": found.verdict, "gap": answer["gap"], "remainder": answer.get("remainder"),
+            "text": found.outcome.text, "seconds": time.process_time() - start}
+
+
+def within(row: Row) -> bool:
+    """Whether the effect is as strong, and the network as coarse, as the suite asks for."""
+    return row["group"] != "hidden" or row["strength"] >= 0.8 * STRENGTH[0]
+
+
+def same(a: list[Any], b: list[Any]) -> bool:
+    """The same effect at the same place."""
+    return bool(a[0] == b[0] and sorted(a[1]) == sorted(b[1]))
+
+
+def answer(row: Row) -> str:
+    """unique, in the set, WRONG, set without, refused, or crashed."""
+    if row["verdict"] == "crashed":
+        return "crashed"
+    if row["verdict"] not in NAMED:
+        return "refused"
+    sets = [[name, *others] for name, others in zip(row["names"], row["others"], strict=True)]
+    holds = [any(same(name, true) for name in names for true in row["truth"]) for names in sets]
+    if any(len(names) == 1 and not right for names, right in zip(sets, holds, strict=True)):
+        return "WRONG"
+    if not all(holds):
+        return "set without"
+    return "unique" if all(len(names) == 1 for names in sets) else "in the set"
+
+
+def rate(rows: list[Row], hit: Callable[[Row], bool]) -> str:
+    """Share, as counts."""
+    k = sum(map(hit, rows))
+    return f"{100 * k / len(rows):5.1f} %  {k} of {len(rows)}" if rows else "none"
+
+
+def print_tables(rows: list[Row]) -> None:
+    """What the contract asks for."""
+    hidden = [row for row in rows if row["group"] == "hidden" and within(row)]
+    null, outside = ([row for row in rows if row["group"] == group] for group in ("nothing", "outside"))
+    print(f"hidden effect: named uniquely, nothing else   {rate(hidden, lambda r: answer(r) == 'unique')}  aim >= 85 %")
+    print(f"  unique or in a set                          "
+          f"{rate(hidden, lambda r: answer(r) in ('unique', 'in the set'))}")
+    print(f"  refused                                     {rate(hidden, lambda r: answer(r) == 'refused')}")
+    print(f"  a wrong unique name                         {rate(hidden, lambda r: answer(r) == 'WRONG')}  aim <= 3 %")
+    print(f"discretization only: a name                   {rate(null, lambda r: r['verdict'] in NAMED)}  aim <= 5 %")
+    print(f"outside the catalog: refused                  "
+          f"{rate(outside, lambda r: answer(r) == 'refused')}  aim >= 90 %")
+    stated = [row for row in hidden if answer(row) == "unique" and row["remainder"]]
+    print(f"remainder within a factor 2 of the truth      "
+          f"{rate(stated, lambda r: 0.5 <= r['remainder']['train']['rms'] / r['coarse'] <= 2.0)}")
+    seconds = sorted(row["seconds"] for row in rows)
+    print(f"CPU seconds: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")
+    for row in rows:
+        if answer(row) not in ("unique", "refused") or (row["group"] == "hidden" and answer(row) == "refused"):
+            names = "; ".join(" or ".join(f"{n}({', '.join(w)})" for n, w in [one, *others])
+                              for one, others in zip(row["names"], row["others"], strict=True))
+            names = names or row["text"][:90]
+            print(f"  {row['key']}: {answer(row)}, {row['verdict']}, strength {row['strength']:.1f}: {names}")

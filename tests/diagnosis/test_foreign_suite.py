@@ -1,0 +1,93 @@
+"""The suite with foreign truth: its integrator against scipy's, its tables on known answers, and a null of its own."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import robthermal as rt
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from foreign.cases import SUB, Case, H, all_cases, made  # noqa: E402 - beside the benchmarks
+from foreign.hidden import CATALOG, MAKE, Hidden, lagged  # noqa: E402
+from foreign.judge import answer  # noqa: E402
+from foreign.machines import MACHINES, ROOM  # noqa: E402
+from foreign.march import march  # noqa: E402
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_machines_are_fine_and_networks_small(machine):
+    made_ = MACHINES[machine](np.random.default_rng(0))
+    assert len(made_.plant.capacity) >= 150
+    assert 4 <= len(made_.plant.zones) <= 8
+    zones = np.concatenate(list(made_.plant.zones.values()))
+    assert zones.size == np.unique(zones).size == len(made_.plant.capacity)
+    _, K, B = made_.plant.matrices()
+    lost = -np.asarray(K.sum(axis=1)).ravel()  # at equal temperatures only the ambients take heat
+    assert np.allclose(lost, B[:, -len(made_.ambients):].sum(axis=1))
+
+
+@pytest.mark.parametrize(("machine", "effect"), [("stack", "seebeck_slope"), ("bar", "radiation"),
+                                                 ("housing", "missing_link")])
+def test_the_integrator_agrees_with_scipy(machine, effect):
+    """Stiff cells, legs with a current, heat that is not linear: second order in the step."""
+    rng = np.random.default_rng(3)
+    one = MACHINES[machine](rng)
+    where = CATALOG[machine][effect][0][0]
+    hidden = MAKE[effect](one, where, CATALOG[machine][effect][1])
+    n = 40
+    U = np.repeat([[rng.uniform(*one.limits[name]) if name in one.limits else ROOM for name in one.plant.columns]], n,
+                  axis=0)
+    C, K, B = one.plant.matrices()
+    T0 = np.full(C.size, ROOM)
+
+    def rate(t, T):
+        Q = B @ U[0] + K @ T
+        for legs in one.plant.legs:
+            legs.heat(T, U[0], Q)
+        for heat in hidden.heats:
+            heat(t, T, U[0], Q)
+        return Q / C
+
+    exact = solve_ivp(rate, (0, (n - 1) * H / SUB), T0, method="BDF", rtol=1e-9, atol=1e-9,
+                      t_eval=[(n - 1) * H / SUB]).y[:, -1]
+    seen = np.array([exact[cells].mean() for cells in one.plant.sensors.values()])
+    own = march(one.plant, U, T0, H, SUB, hidden.heats)[-1]
+    assert np.abs(own - seen).max() < 2e-3 * np.abs(seen - ROOM).max()
+
+
+def test_a_lag_is_the_closed_form():
+    t = np.arange(0.0, 300.0, 2.0)
+    ramp = 0.1 * t
+    assert np.allclose(lagged(ramp, 30.0, 2.0), 0.1 * (t - 30.0 * (1 - np.exp(-t / 30.0))), atol=0.02)
+
+
+def test_a_null_is_as_coarse_as_asked_for_and_says_nothing():
+    one = made(Case("bar", "nothing", "nothing", 0))
+    assert one.truth == [] and 1.4 < one.discrete < 11.0
+    assert rt.diagnosis.refit(one.system, one.train).variance == pytest.approx(one.discrete, rel=0.05)
+
+
+def test_seeds_and_keys():
+    keys = [case.key for case in all_cases([0, 1])]
+    assert len(keys) == len(set(keys)) == 2 * sum(map(len, CATALOG.values())) + 16 + 2 * 10
+    assert Hidden().heats == []
+
+
+LINK, LAG = ["missing_link", ["x1", "x4"]], ["sensor_lag", ["T1"]]
+
+
+@pytest.mark.parametrize(("verdict", "names", "others", "truth", "expected"), [
+    ("named", [LINK], [[]], [["missing_link", ["x4", "x1"]]], "unique"),
+    ("named_with_remainder", [LAG], [[]], [LINK], "WRONG"),
+    ("named_with_remainder", [LINK, LAG], [[], []], [LINK], "WRONG"),
+    ("ambiguous", [LAG], [[LINK]], [LINK], "in the set"),
+    ("ambiguous", [LAG], [[LINK]], [], "set without"),
+    ("unexplained", [], [], [LINK], "refused"),
+])
+def test_answers_are_judged(verdict, names, others, truth, expected):
+    assert answer({"verdict": verdict, "names": names, "others": others, "truth": truth}) == expected
