@@ -12,7 +12,8 @@ import numpy as np
 from ..errors import InputError
 from ._evidence import Evidence
 from ._figure import Figure
-from ._reasons import Reason, Verdict, contradicts, verdict_of
+from ._reasons import NO_VERDICT, Reason, Verdict, contradicts, verdict_of
+from ._stages import Stage
 from ._table import Printed, Table
 from ._usable import Parameters, UsableRange
 
@@ -49,6 +50,8 @@ class Claim:
         Whether it is the result of a test on data: nothing is proven then, and `verified` is None.
     parameters : str, optional
         "nominal" or "ranges": for which parameters, where the same is claimed for both; then both have one title.
+    stage : str, optional
+        Stage of a chain that claims it.
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Claim:
     seconds: float = 0.0
     tested: bool = False
     parameters: Parameters = ""
+    stage: str = "certify"
 
     def __post_init__(self) -> None:
         # "no" and NaN are true in Python; here they would turn a badge green.
@@ -136,6 +140,8 @@ class Section:
         Set below the figures.
     anchor : str, optional
         Address within the page; default from the title.
+    chapter : str, optional
+        Heading above it; sections of one chapter follow each other.
 
     Examples
     --------
@@ -149,6 +155,7 @@ class Section:
     figures: Sequence[Figure] = ()
     tables: Sequence[Table | Printed] = ()
     anchor: str = ""
+    chapter: str = ""
 
     @property
     def paragraphs(self) -> list[str]:
@@ -195,6 +202,8 @@ class Report:
         Sections that belong on the first screen: model against data.
     data : mapping, optional
         Tables for the JSON summary, by key.
+    stages : sequence of Stage, optional
+        Stages of a chain in their order; none in the report of a single job.
 
     Examples
     --------
@@ -219,16 +228,22 @@ class Report:
     usable: Sequence[UsableRange] = ()
     first: Sequence[Section] = ()
     data: Mapping[str, Any] = field(default_factory=dict)
+    stages: Sequence[Stage] = ()
 
     @property
     def holds(self) -> bool:
-        """Whether the verdict is not FAIL."""
-        return self.verdict != "FAIL"
+        """Whether the verdict is PASS or PASS WITH REMARKS."""
+        return self.verdict not in ("FAIL", NO_VERDICT)
 
     @property
     def verdict(self) -> Verdict:
-        """PASS, PASS WITH REMARKS or FAIL: the worst reason decides."""
-        return verdict_of(self.reasons)
+        """PASS, PASS WITH REMARKS or FAIL: the worst reason decides; none where a stage could not be computed."""
+        return NO_VERDICT if self.failed else verdict_of(self.reasons)
+
+    @property
+    def failed(self) -> list[Stage]:
+        """Stages that could not be computed."""
+        return [stage for stage in self.stages if stage.status == "failed"]
 
     @property
     def reasons(self) -> list[Reason]:
@@ -268,4 +283,4 @@ def _reason(claim: Claim) -> Reason:
         return Reason("fail", "not_passed", "diagnose", claim.title, f"{claim.title}: {claim.why}")
     code = "not_robust" if claim.parameters == "ranges" else _CODES[bool(claim.holds)]
     words = "It holds for the parameters as they stand, not for all of their ranges: " if code == "not_robust" else ""
-    return Reason("fail", code, "certify", claim.title, f"{claim.title}: {words}{claim.why}")
+    return Reason("fail", code, claim.stage, claim.title, f"{claim.title}: {words}{claim.why}")

@@ -53,8 +53,10 @@ def write_html(report: Report, path: str | Path) -> Path:
     files = {claim.file for claim in report.claims}
     parts = _anchored([*report.first, *report.sections])
     first, sections = parts[:len(report.first)], parts[len(report.first):]
+    bounds = next((i for i, (_, section) in enumerate(sections) if section.chapter == BOUNDS), 0)
     page = _template("report.html").render(
-        report=report, sections=sections, first=first, drawing=drawing, ranges=_ranges, margins=margins,
+        report=report, sections=sections, first=first, chapters=_chapters(sections), bounds=bounds,
+        drawing=drawing, ranges=_ranges, margins=margins,
         assumptions=numbered_assumptions(report), resting=resting(report), usable=shown(report.usable),
         amps=_amps, least=lambda row: "–" if row.current is None else rounded_down(row.current),
         cards=_cards(report.claims),
@@ -64,6 +66,19 @@ def write_html(report: Report, path: str | Path) -> Path:
         twice={one.file for one in report.evidence if one.good and one.second == "valid"},
         claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
     return save_text(printable(page), path)
+
+
+BOUNDS = "Certify"  # chapter in which the four bounds of the current stand
+
+
+def _chapters(sections: Sequence[tuple[str, Section]]) -> dict[int, tuple[str, str]]:
+    """Address and heading of the chapters, by the section they begin with."""
+    found, last = {}, ""
+    for i, (_, section) in enumerate(sections):
+        if section.chapter and section.chapter != last:
+            found[i] = (f"stage-{section.chapter.lower()}", section.chapter)
+        last = section.chapter
+    return found
 
 
 _MOST_CARDS = 8  # a page of sixty cards is read by nobody
@@ -110,7 +125,7 @@ def _anchored(sections: Sequence[Section]) -> list[tuple[str, Section]]:
     for section in sections:
         plain = re.sub(r"[^a-z0-9]+", "-", (section.anchor or section.title).lower()).strip("-")
         # No address of ours may begin like the ids of a drawing, f1-…, or of an assumption, assumption-1
-        base = plain if plain and not re.match(r"(f|assumption-)\d", plain) else f"section-{plain}".strip("-")
+        base = plain if plain and not re.match(r"(f|assumption-)\d|stage-", plain) else f"section-{plain}".strip("-")
         names = chain([base], (f"{base}-{i}" for i in count(2)))
         anchor = next(name for name in names if name not in taken)
         taken.add(anchor)

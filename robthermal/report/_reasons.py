@@ -10,7 +10,8 @@ from typing import Literal
 from ..errors import InputError
 
 Level = Literal["fail", "remark"]
-Verdict = Literal["PASS", "PASS WITH REMARKS", "FAIL"]
+Verdict = Literal["PASS", "PASS WITH REMARKS", "FAIL", "NO VERDICT"]
+NO_VERDICT: Verdict = "NO VERDICT"  # a stage could not be computed: nothing is decided
 CONTRADICTED = ("validation_misfit", "training_misfit")  # codes that say: the data contradict the model
 
 

@@ -17,6 +17,7 @@ from ._evidence import Evidence
 from ._figure import Figure
 from ._reasons import Reason
 from ._save import printable, save_json
+from ._stages import Stage
 from ._table import Printed, Table
 from ._usable import UsableRange
 
@@ -36,6 +37,7 @@ class _Section(_Strict):
     figures: list[Figure]
     tables: list[Printed]
     anchor: str
+    chapter: str = ""
 
 
 class _Stored(_Strict):
@@ -56,6 +58,7 @@ class _Stored(_Strict):
     usable: list[UsableRange]
     first: list[_Section]
     data: dict[str, Any]
+    stages: list[Stage] = []
     digest: str
 
 
@@ -93,7 +96,7 @@ def write_content(report: Report, path: str | Path) -> Path:
                "evidence": [asdict(one) for one in report.evidence], "checker": report.checker,
                "gate": [asdict(one) for one in report.gate], "gates": list(report.gates),
                "usable": [asdict(one) for one in report.usable], "first": _stored(report.first),
-               "data": dict(report.data)}
+               "data": dict(report.data), "stages": [asdict(one) for one in report.stages]}
     return save_json({**content, "digest": _digest(content)}, path)
 
 
@@ -133,7 +136,8 @@ def _digest(content: dict[str, Any]) -> str:
 
 def _stored(sections: Sequence[Section]) -> list[dict[str, Any]]:
     return [{"title": one.title, "text": one.text, "figures": [asdict(figure) for figure in one.figures],
-             "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor} for one in sections]
+             "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor, "chapter": one.chapter}
+            for one in sections]
 
 
 def read_content(path: str | Path) -> Report:
@@ -174,11 +178,11 @@ def read_content(path: str | Path) -> Report:
         fault: Any = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"])) or "the file"
         raise InputError(f"is not a stored report: {place}, {fault['msg']}", where=str(file), remedy=_REMEDY) from None
-    sections, first = (tuple(Section(one.title, one.text, one.figures, one.tables, one.anchor) for one in part)
-                       for part in (stored.sections, stored.first))
+    sections, first = (tuple(Section(one.title, one.text, one.figures, one.tables, one.anchor, one.chapter)
+                             for one in part) for part in (stored.sections, stored.first))
     return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
                   stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
-                  stored.gates, stored.usable, first, stored.data)
+                  stored.gates, stored.usable, first, stored.data, stored.stages)
 
 
 def _printed(table: Table | Printed) -> Printed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
@@ -46,7 +47,8 @@ def write_junit(report: Report, path: str | Path) -> Path:
     >>> 'failures="1"' in path.read_text(encoding="utf-8")
     True
     """
-    suites = [(report.title, _cases(report))] + ([(f"{report.title}: gates", _gates(report))] if report.gates else [])
+    suites = _stage_suites(report) if report.stages else [(report.title, _cases(report.claims))] + (
+        [(f"{report.title}: gates", _gates(report.gates, report.gate))] if report.gates else [])
     everything = [case for _, cases in suites for case in cases]
     root = ElementTree.Element("testsuites", {"name": "robthermal", **_total(everything)})
     for name, cases in suites:
@@ -91,8 +93,10 @@ def write_json(report: Report, path: str | Path) -> Path:
     if "certify" in data:
         data["certify"] = {**data["certify"], "nominal": _answers(report, "nominal"),
                            "robust": _answers(report, "ranges")}
-    summary = {"format": FORMAT, "title": report.title, "label": report.label, "verdict": report.verdict,
-               "holds": report.holds, "reasons": [one.to_dict() for one in report.reasons], **data,
+    stages = {one.name: {"status": one.status, "seconds": one.seconds, "hash": one.hash} for one in report.stages}
+    summary = {"format": FORMAT, "title": report.title, "label": report.label,
+               "verdict": None if report.failed else report.verdict, "holds": report.holds,
+               "reasons": [one.to_dict() for one in report.reasons], **({"stages": stages} if stages else {}), **data,
                "currents": currents(report.usable), "claims": [_claim(claim) for claim in report.claims],
                "certificates": [_certificate(one) for one in report.evidence], "checker": report.checker,
                "version": report.provenance.get("robthermal", ""),
@@ -117,12 +121,27 @@ def _claim(claim: Claim) -> dict[str, object]:
             "seconds": float(claim.seconds), "reason": claim.why}
 
 
-def _cases(report: Report) -> list[ElementTree.Element]:
-    if not report.claims:
+def _stage_suites(report: Report) -> list[tuple[str, list[ElementTree.Element]]]:
+    """One suite per stage: its claims and gates, and of a stage that could not be computed why."""
+    suites = []
+    for stage in report.stages:
+        found = [one for one in report.gate if one.stage == stage.name]
+        codes = dict.fromkeys([*(stage.gates if stage.ran else ()), *(one.code for one in found)])
+        claims = [claim for claim in report.claims if claim.stage == stage.name]
+        cases = (_cases(claims) if claims or stage.name == "certify" and stage.ran else []) + _gates(
+            tuple(codes), found)
+        if stage.status == "failed":
+            cases.insert(0, _case("stage is computed", stage.seconds, stage.text or "failed", "failed", stage.text))
+        suites.append((stage.name, cases))
+    return suites
+
+
+def _cases(claims: Sequence[Claim]) -> list[ElementTree.Element]:
+    if not claims:
         return [_case("something is claimed", 0.0, "nothing is claimed", "not certified", "")]
     seen: Counter[str] = Counter()
     cases = []
-    for claim in report.claims:
+    for claim in claims:
         seen[claim.name] += 1  # pipelines drop a second case of the same name
         name = claim.name if seen[claim.name] == 1 else f"{claim.name} [{seen[claim.name]}]"
         about = f"{claim.sentence}\nbox: {claim.box}\nmargin: {claim.margin}\nhow: {claim.how}\nfile: {claim.file}"
@@ -130,10 +149,10 @@ def _cases(report: Report) -> list[ElementTree.Element]:
     return cases
 
 
-def _gates(report: Report) -> list[ElementTree.Element]:
+def _gates(codes: Sequence[str], reasons: Sequence[Reason]) -> list[ElementTree.Element]:
     cases = []
-    for code in report.gates:
-        found = [one for one in report.gate if one.code == code]
+    for code in codes:
+        found = [one for one in reasons if one.code == code]
         failed = [one for one in found if one.level == "fail"]
         said = "\n".join(f"{one.level}: {_words(one)}" for one in found) or "nothing found"
         cases.append(_case(code, 0.0, "; ".join(map(_words, failed)), code, said, "robthermal.gates"))

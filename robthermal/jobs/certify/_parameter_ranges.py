@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
-from ...calibration import Fit
+from ...calibration import Estimates
 from ...errors import InputError
 from ..request import Boxes
 
@@ -13,14 +13,14 @@ Ranges = Mapping[str, tuple[float, float]]
 _MOST = 40  # parameters that are tried one by one
 
 
-def claim_ranges(boxes: Boxes, fit: Fit | None) -> Ranges | None:
+def claim_ranges(boxes: Boxes, fit: Estimates | None) -> Ranges | None:
     """Parameter ranges of the claims; None: the parameters as they stand.
 
     Parameters
     ----------
     boxes : Boxes
         With the choice and the confidence.
-    fit : Fit or None
+    fit : Estimates or None
         Calibration of the system; None if nothing was calibrated.
     """
     if not isinstance(boxes.parameters, str):
@@ -62,12 +62,12 @@ def _answer(holds: Callable[[Ranges], bool], ranges: Ranges) -> bool:
 Doubt = tuple[Literal["undetermined", "bound"], str, Ranges]
 
 
-def doubted(fit: Fit) -> Iterable[Doubt]:
+def doubted(fit: Estimates) -> Iterable[Doubt]:
     """Parameters the data do not determine, and those at a bound, each with its whole [fit] range.
 
     Parameters
     ----------
-    fit : Fit
+    fit : Estimates
         Calibration of the system.
     """
     whole = dict(zip(fit.parameters, zip(fit.lower.tolist(), fit.upper.tolist(), strict=True), strict=True))

@@ -44,6 +44,8 @@ class GateCode(Enum):
     SIMULATED_DATA = ("The records are simulated: they say nothing about a machine.", "Replace them by measurements.")
     CONSTANT_INPUT = ("An input never changes in the records: nothing can be learnt about what it does.",
                       "Change it during a measurement.")
+    RESAMPLED = ("The samples of a record were not on a uniform grid: the readings were interpolated.",
+                 "Let the logger sample evenly; the import report has the bound of the error.")
     NO_NOISE_STATED = ("The noise of a sensor is not stated; it was estimated from the readings.",
                        "Give `noise` in [sensors.NAME].")
     NOMINAL_ONLY = ("The claims are about exactly the parameters of the model, not about ranges of them.",

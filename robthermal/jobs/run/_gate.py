@@ -9,12 +9,12 @@ import numpy as np
 
 from ..._celsius import ZERO_CELSIUS
 from ...report import Reason
-from ...signals import Record
 from ..certify import certification_reasons, remark
-from ..claims import GateCode
+from ..claims import Certification, GateCode
 from ..request import Gate
+from ._facts import DataFacts, DiagnosisFacts, data_facts, diagnosis_facts
 from ._misfit import Misfit
-from ._result import JobResult
+from ._result import Doubted, JobResult
 
 _FAR, _SHARE = 10.0, 0.2  # K, and part of a current, that a claim may reach beyond the records
 _OF_CLAIMS = (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.NOT_ROBUST)  # the cases of the claims say these
@@ -29,20 +29,59 @@ def gate_reasons(result: JobResult) -> tuple[Reason, ...]:
     result : JobResult
         Result of the main job, as `run_job` returns it.
     """
-    found = [*_misfits(result.misfits), *_records(result), *_diagnosis(result), *_parameters(result),
-             *certification_reasons(result.certification, measured_currents(result)), *_outside(result)]
+    facts = data_facts(result.system, result.comparisons, result.misfits)
+    diagnosed = diagnosis_facts(result.diagnosis.diagnosis) if result.diagnosis else None
+    label = f"{result.project.label} {result.project.name}"
+    found = [*data_reasons(facts, diagnosed, label), *claim_reasons(result.certification, result.doubted, facts)]
     return applied(found, result.project.gate)
 
 
 def applied(reasons: Sequence[Reason], gate: Gate) -> tuple[Reason, ...]:
-    """Reasons as the gate counts them."""
+    """Reasons as the gate counts them.
+
+    Parameters
+    ----------
+    reasons : sequence of Reason
+        Reasons as the stages give them.
+    gate : Gate
+        Whether remarks are failures.
+    """
     return tuple(replace(one, level="fail") if gate.remarks == "fail" else one for one in reasons)
 
 
-def measured_currents(result: JobResult) -> dict[str, tuple[float, float]]:
-    """Range of every module's current in the records [A]."""
-    return {name: _range([c.record for c in result.comparisons], name) for name in result.system.modules
-            if result.comparisons}
+def data_reasons(facts: DataFacts, diagnosed: DiagnosisFacts | None, label: str) -> Iterator[Reason]:
+    """Reasons that the measured data and the diagnosis give.
+
+    Parameters
+    ----------
+    facts : DataFacts
+        Model beside the data.
+    diagnosed : DiagnosisFacts or None
+        Result of the diagnosis; None if nobody asked for one.
+    label : str
+        Label and name of the project.
+    """
+    yield from _misfits(facts.misfits)
+    yield from _records(facts, diagnosed is not None, "simulated" in label.lower())
+    if diagnosed is not None:
+        yield from _diagnosis(diagnosed, any(one.beyond for one in facts.misfits))
+
+
+def claim_reasons(certification: Certification, doubted: Sequence[Doubted], facts: DataFacts) -> Iterator[Reason]:
+    """Reasons that a certification gives beside its claims.
+
+    Parameters
+    ----------
+    certification : Certification
+        Claims with their checks.
+    doubted : sequence of tuple
+        As in `JobResult`.
+    facts : DataFacts
+        What the records hold.
+    """
+    yield from _parameters(doubted)
+    yield from certification_reasons(certification, facts.currents(certification.system))
+    yield from _outside(certification, facts)
 
 
 def _misfits(misfits: Sequence[Misfit]) -> Iterator[Reason]:
@@ -57,47 +96,45 @@ def _misfits(misfits: Sequence[Misfit]) -> Iterator[Reason]:
                          code.remedy if one.beyond else "", one.excess, one.tolerance)
 
 
-def _records(result: JobResult) -> Iterator[Reason]:
-    kinds = {one.kind for one in result.comparisons}
-    records = [one.record for one in result.comparisons]
-    if records and "validation" not in kinds:
+def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Reason]:
+    if facts.kinds and "validation" not in facts.kinds:
         yield remark(GateCode.NO_VALIDATION, "calibrate", "records", GateCode.NO_VALIDATION.meaning)
-    if records and result.diagnosis is None:
+    if facts.kinds and not diagnosed:
         yield remark(GateCode.NOT_DIAGNOSED, "diagnose", "records", GateCode.NOT_DIAGNOSED.meaning)
-    if records and "simulated" in f"{result.project.label} {result.project.name}".lower():
+    if facts.kinds and simulated:
         yield remark(GateCode.SIMULATED_DATA, "calibrate", "records", GateCode.SIMULATED_DATA.meaning)
-    names = dict.fromkeys(name for record in records for name in record.input_names)
-    for name in names if records else ():
-        low, high = _range(records, name)
+    for name, (low, high) in (facts.inputs or {}).items():
         if low == high:
             yield remark(GateCode.CONSTANT_INPUT, "calibrate", name, f"{name} never changes in the records: nothing "
-                          "can be learnt about what it does.")
-    silent = [name for name in dict.fromkeys(name for record in records for name in record.output_names)
-              if name in result.system.sensors and not result.system.sensors[name].noise]
-    if silent:
-        yield remark(GateCode.NO_NOISE_STATED, "calibrate", ", ".join(silent), f"The noise of {', '.join(silent)} is "
-                      "not stated; it was estimated from the readings.")
+                         "can be learnt about what it does.")
+    for name in facts.left_out:
+        yield remark(GateCode.CONSTANT_INPUT, "identify", name, f"{name} never changes while the frequency response is "
+                     "measured: it is left out of it.")
+    for file in facts.resampled:
+        yield remark(GateCode.RESAMPLED, "calibrate", file, f"The samples of {file} were not on a uniform grid.")
+    if facts.silent:
+        names = ", ".join(facts.silent)
+        yield remark(GateCode.NO_NOISE_STATED, "calibrate", names, f"The noise of {names} is not stated; it was "
+                     "estimated from the readings.")
 
 
-def _diagnosis(result: JobResult) -> Iterator[Reason]:
-    if result.diagnosis is None:
-        return
-    found = result.diagnosis.diagnosis
+def _diagnosis(found: DiagnosisFacts, off: bool) -> Iterator[Reason]:
     codes = {"unexplained": GateCode.DIAGNOSIS_UNEXPLAINED, "ambiguous": GateCode.DIAGNOSIS_AMBIGUOUS,
              "named": GateCode.DIAGNOSIS_NAMED}
-    if found.verdict in codes:
-        code = codes[found.verdict]
-        names = ", ".join(" or ".join([effect.label, *(f"{name}({', '.join(where)})" for name, where in others
-                                                       if (name, where) != (effect.effect, effect.where))])
-                          for effect, others in zip(found.effects, found.alternatives, strict=True))
-        off = any(one.beyond for one in result.misfits)
-        yield Reason("fail" if off else "remark", code.code, "diagnose", names or "model",
-                     code.meaning[:-1] + (f": {names}." if names else "."), code.remedy)
+    if found.verdict not in codes:
+        return
+    code = codes[found.verdict]
+    if found.adopted:
+        yield Reason("remark", code.code, "diagnose", found.names, "The diagnosis names an effect that the system file "
+                     f"does not have; the certified model has it: {found.names}.", "Put it into the system file.")
+        return
+    yield Reason("fail" if off else "remark", code.code, "diagnose", found.names or "model",
+                 code.meaning[:-1] + (f": {found.names}." if found.names else "."), code.remedy)
 
 
-def _parameters(result: JobResult) -> Iterator[Reason]:
+def _parameters(doubted: Sequence[Doubted]) -> Iterator[Reason]:
     codes = {"undetermined": GateCode.UNDETERMINED_PARAMETER, "bound": GateCode.PARAMETER_AT_BOUND}
-    for what, name, holds in result.doubted:
+    for what, name, holds in doubted:
         code = codes[what]
         words = {"undetermined": f"The records do not determine {name}",
                  "bound": f"{name} ended at a bound of [fit]"}[what]
@@ -106,16 +143,12 @@ def _parameters(result: JobResult) -> Iterator[Reason]:
         yield Reason("remark" if holds else "fail", code.code, "calibrate", name, f"{words}; {then}.", code.remedy)
 
 
-def _outside(result: JobResult) -> Iterator[Reason]:
+def _outside(certification: Certification, facts: DataFacts) -> Iterator[Reason]:
     """Boxes of the claims that reach far beyond the records."""
-    records = [one.record for one in result.comparisons]
-    if not records:
+    if facts.readings is None:
         return
-    readings = [values for record in records for values in (
-        *(record[name] for name in record.output_names),
-        *(record[name] for name in record.input_names if name in result.system.ambients))]
-    low, high = (float(end([end(values) for values in readings])) for end in (np.nanmin, np.nanmax))
-    boxes = [one.certificate.region.get("temperature") for one in result.certification.checked if one.required]
+    low, high = facts.readings
+    boxes = [one.certificate.region.get("temperature") for one in certification.checked if one.required]
     ends = np.array([pair for box in boxes if box is not None
                      for pair in (box.values() if isinstance(box, Mapping) else [box])], float)
     if ends.size:
@@ -125,16 +158,10 @@ def _outside(result: JobResult) -> Iterator[Reason]:
                          f"The claims reach from {ends.min() - ZERO_CELSIUS:.0f} to {ends.max() - ZERO_CELSIUS:.0f} "
                          f"°C; the records hold {low - ZERO_CELSIUS:.0f} to {high - ZERO_CELSIUS:.0f} °C.",
                          reach, _FAR)
-    measured = measured_currents(result)
-    for name, (least, most) in result.certification.current.items():
-        largest = max(abs(end) for end in measured[name])
-        if most > max(measured[name][1], 0.0) + _SHARE * largest or least < (
-                min(measured[name][0], 0.0) - _SHARE * largest):
+    measured = facts.currents(certification.system)
+    for name, (least, most) in certification.current.items():
+        low, high = measured[name]
+        share = _SHARE * max(abs(low), abs(high))
+        if most > max(high, 0.0) + share or least < min(low, 0.0) - share:
             yield remark(GateCode.OUTSIDE_DATA, "certify", name, f"The claims are about {least:g} to {most:g} A of "
-                          f"{name}; the records hold {measured[name][0]:.3g} to {measured[name][1]:.3g} A.")
-
-
-def _range(records: Sequence[Record], name: str) -> tuple[float, float]:
-    values = [record[name] for record in records if name in (*record.input_names, *record.output_names)]
-    ends = [(float(np.nanmin(v)), float(np.nanmax(v))) for v in values if np.isfinite(v).any()]
-    return (min(a for a, _ in ends), max(b for _, b in ends)) if ends else (0.0, 0.0)
+                         f"{name}; the records hold {low:.3g} to {high:.3g} A.")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ...calibration import Fit, calibrate
+from ...calibration import Estimates, Fit, calibrate
 from ...errors import InputError
 from ...fitting import as_data, free_run
 from ...signals import Record
@@ -17,10 +17,10 @@ from ...thermal import System
 from ..certify import certify_system, claim_ranges, claims_hold, doubted
 from ..diagnose import Diagnosed, diagnose_records
 from ..measured import read_files
-from ..request import Gate, Project
+from ..request import Boxes, Gate, Project
 from ._gate import gate_reasons
 from ._misfit import Misfit, misfit, noise_of_readings
-from ._result import Comparison, JobResult
+from ._result import Calibrated, Comparison, Doubted, JobResult
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]
@@ -59,23 +59,56 @@ def run_job(project: Project, progress: Progress = lambda stage: None) -> JobRes
     >>> result.holds
     True
     """
+    train, validation = job_records(project, progress)
+    done = calibrated(project, project.system, train, validation, progress)
+    ranges = claim_ranges(project.boxes, done.fit)
+    certification = certify_system(done.system, project.boxes, progress, parameters=ranges)
+    found = JobResult(project, done.fit, done.system, done.comparisons, certification, done.misfits,
+                      _diagnosis(project, train, validation, progress),
+                      doubted_claims(done.fit, done.system, project.boxes, progress), ranges)
+    return replace(found, reasons=gate_reasons(found))
+
+
+def job_records(project: Project, progress: Progress = lambda stage: None) -> tuple[list[Record], list[Record]]:
+    """Training and validation records of a project, every uninterrupted part one record.
+
+    Parameters
+    ----------
+    project : Project
+        Project, as `read_project` returns it.
+    progress : callable, optional
+        Called with a sentence before every stage.
+    """
     progress("reading records")
     train, validation = ([part for path in paths for part in read_files(
         [path], project.system, tables=project.reading.get(path, ()), median_filter=project.median_filter)]
                          for paths in (project.train, project.validation))
-    fit, system = None, project.system
+    return train, validation
+
+
+def calibrated(project: Project, system: System, train: Sequence[Record], validation: Sequence[Record],
+               progress: Progress = lambda stage: None) -> Calibrated:
+    """Calibrate a system, and compare it with the records.
+
+    Parameters
+    ----------
+    project : Project
+        Options of the calibration, and tolerances.
+    system : System
+        System with nominal parameters, of the project or with effects added.
+    train, validation : sequence of Record
+        Fitted, and only compared.
+    progress : callable, optional
+        Called with a sentence before every stage.
+    """
+    fit = None
     if train:
-        progress(f"calibrating {len(project.system.fit)} parameters on {sum(r.n_samples for r in train)} samples")
-        fit = calibrate(project.system, train, validation=validation or None, initial=project.initial,
-                        loss=project.loss)
-        system = fit.system
+        progress(f"calibrating {len(system.fit)} parameters on {sum(r.n_samples for r in train)} samples")
+        fit = calibrate(system, train, validation=validation or None, initial=project.initial, loss=project.loss)
     progress("comparing model and data")
-    comparisons = _comparisons(project, fit, train, validation)
-    ranges = claim_ranges(project.boxes, fit)
-    certification = certify_system(system, project.boxes, progress, parameters=ranges)
-    found = JobResult(project, fit, system, comparisons, certification, _misfits(comparisons, system, project.gate),
-                      _diagnosis(project, train, validation, progress), _doubted(project, fit, progress), ranges)
-    return replace(found, reasons=gate_reasons(found))
+    comparisons = _comparisons(project, system, fit, train, validation)
+    model = fit.system if fit else system
+    return Calibrated(fit, model, comparisons, _misfits(comparisons, model, project.gate))
 
 
 def _misfits(comparisons: Sequence[Comparison], system: System, gate: Gate) -> tuple[Misfit, ...]:
@@ -95,29 +128,42 @@ def _diagnosis(project: Project, train: Sequence[Record], validation: Sequence[R
                             session_gain=project.session_gain)
 
 
-def _doubted(project: Project, fit: Fit | None, progress: Progress) -> tuple[tuple[str, str, bool], ...]:
-    """Parameters that the records leave open or that ended at a bound, and whether the claims hold on all of [fit]."""
+def doubted_claims(fit: Estimates | None, system: System, boxes: Boxes, progress: Progress = lambda stage: None
+                   ) -> tuple[Doubted, ...]:
+    """Parameters that the records leave open or that ended at a bound, and whether the claims hold on all of [fit].
+
+    Parameters
+    ----------
+    fit : Estimates or None
+        Calibration of the system; None if nothing was calibrated.
+    system : System
+        Calibrated system.
+    boxes : Boxes
+        Ranges of the claims.
+    progress : callable, optional
+        Called with a sentence before every stage.
+    """
     if fit is None:
         return ()
     found = []
     for what, name, whole in doubted(fit):
         progress(f"certifying for the whole range of {name}")
         try:
-            holds = claims_hold(fit.system, project.boxes, whole)
+            holds = claims_hold(system, boxes, whole)
         except InputError:  # a parameter that no certificate covers, or a range that is none
             holds = False
         found.append((what, name, holds))
     return tuple(found)
 
 
-def _comparisons(project: Project, fit: Fit | None, train: Sequence[Record], validation: Sequence[Record]
-                 ) -> tuple[Comparison, ...]:
+def _comparisons(project: Project, system: System, fit: Fit | None, train: Sequence[Record],
+                 validation: Sequence[Record]) -> tuple[Comparison, ...]:
     """What the calibration computed, beside free runs of the nominal model."""
-    noise = fit.noise if fit else {name: sensor.noise for name, sensor in project.system.sensors.items()}
+    noise = fit.noise if fit else {name: sensor.noise for name, sensor in system.sensors.items()}
     found = (*fit.residuals, *fit.validation_residuals) if fit else ()
     out = []
     for i, record in enumerate([*train, *validation]):
-        nominal = free_run(project.system, as_data(project.system, record, "records")[0], project.initial, noise)
+        nominal = free_run(system, as_data(system, record, "records")[0], project.initial, noise)
         before = _modelled(record, nominal.by_sensor)
         after = _modelled(record, found[i]) if found else before
         out.append(Comparison("train" if i < len(train) else "validation", record, before, after))

@@ -19,6 +19,7 @@ from ..request import Project
 from ._misfit import Misfit
 
 Array = NDArray[np.float64]
+Doubted = tuple[str, str, bool]  # why, parameter, whether the required claims hold on its whole [fit] range
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,28 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Calibrated:
+    """A model, calibrated where there are data, beside the records.
+
+    Parameters
+    ----------
+    fit : Fit or None
+        Calibration; None without training data.
+    system : System
+        Calibrated, or nominal.
+    comparisons : tuple of Comparison
+        Model against data.
+    misfits : tuple of Misfit
+        How far the model is from every reading.
+    """
+
+    fit: Fit | None
+    system: System
+    comparisons: tuple[Comparison, ...]
+    misfits: tuple[Misfit, ...]
+
+
+@dataclass(frozen=True)
 class JobResult:
     """Everything the main job found.
 
@@ -110,7 +133,7 @@ class JobResult:
     certification: Certification
     misfits: tuple[Misfit, ...] = ()
     diagnosis: Diagnosed | None = None
-    doubted: tuple[tuple[str, str, bool], ...] = ()
+    doubted: tuple[Doubted, ...] = ()
     ranges: Mapping[str, tuple[float, float]] | None = None
     reasons: tuple[Reason, ...] = ()
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from ...calibration import Fit
+from ...calibration import Estimates, Fit
 from ...report import Figure, Section, Table, measured_against_model
 from ._misfit import Misfit
 from ._result import Comparison
@@ -31,20 +31,34 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> 
 
 def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ...]) -> Section:
     """Model against the records that were held out, for the first screen; against the training records without any."""
-    kind = "validation" if any(one.kind == "validation" for one in misfits) else "train"
-    rows = sorted((one for one in misfits if one.kind == kind),
-                  key=lambda one: -one.excess / max(one.tolerance, 1e-9))
-    worst = next((c for c in comparisons if c.kind == kind and c.record.name == rows[0].record), comparisons[0])
-    frame = pd.DataFrame([{"record": one.record, "sensor": one.sensor, "mean [K]": one.mean, "rms [K]": one.rms,
-                           "noise [K]": one.noise, "beyond noise [K]": one.excess, "tolerance [K]": one.tolerance,
-                           "answer": _answer(one)} for one in rows])
+    kind, record = _shown(misfits)[0].kind, _shown(misfits)[0].record
+    worst = next((c for c in comparisons if c.kind == kind and c.record.name == record), comparisons[0])
     what = ("records that were held out" if kind == "validation" else
             "its own training records: none was held out, so that nothing is known about its predictions")
     return Section("Model against data", f"The calibrated model, run freely, beside {what}.",
                    figures=(_comparison_figure(worst),),
-                   tables=(Table(frame.head(_ROWS), f"Residual measured − modelled by sensor, the largest first"
-                                 f"{f'; {_ROWS} of {len(frame)}' * (len(frame) > _ROWS)}.", digits=3),),
-                   anchor="validation")
+                   tables=(misfit_table(misfits),), anchor="validation")
+
+
+def misfit_table(misfits: Sequence[Misfit]) -> Table:
+    """Misfits of the records that were held out, or of the training records without any; the largest first.
+
+    Parameters
+    ----------
+    misfits : sequence of Misfit
+        Of all records.
+    """
+    rows = _shown(misfits)
+    frame = pd.DataFrame([{"record": one.record, "sensor": one.sensor, "mean [K]": one.mean, "rms [K]": one.rms,
+                           "noise [K]": one.noise, "beyond noise [K]": one.excess, "tolerance [K]": one.tolerance,
+                           "answer": _answer(one)} for one in rows])
+    return Table(frame.head(_ROWS), f"Residual measured − modelled by sensor, the largest first"
+                 f"{f'; {_ROWS} of {len(frame)}' * (len(frame) > _ROWS)}.", digits=3)
+
+
+def _shown(misfits: Sequence[Misfit]) -> list[Misfit]:
+    kind = "validation" if any(one.kind == "validation" for one in misfits) else "train"
+    return sorted((one for one in misfits if one.kind == kind), key=lambda one: -one.excess / max(one.tolerance, 1e-9))
 
 
 _ROWS = 6
@@ -72,7 +86,7 @@ def _worst(c: Comparison, count: int) -> list[str]:
     return sorted(rmse, key=lambda name: -rmse[name])[:count]
 
 
-def parameter_section(fit: Fit, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
+def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
     """Calibrated parameters with their uncertainty, and what the data do not determine."""
     text = "Estimated from the training records; standard deviations are for the residuals as they are."
     frame = fit.table()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from ...calibration import Estimates
+from ...signals import Record
 from ..certify import certify_table
+from ._misfit import Misfit
 from ._result import JobResult
 
 
@@ -17,17 +20,26 @@ def summary_tables(result: JobResult) -> dict[str, Any]:
     result : JobResult
         Result of the main job, as `run_job` returns it.
     """
-    tables: dict[str, Any] = {"residuals": _residuals(result), "certify": certify_table(result.certification)}
-    reports = {one.record.imported.file: one.record.imported for one in result.comparisons if one.record.imported}
-    tables["imports"] = [report.to_dict() for report in reports.values()]
+    tables: dict[str, Any] = {"residuals": residual_table(result.misfits),
+                              "certify": certify_table(result.certification)}
+    tables["imports"] = import_table(one.record for one in result.comparisons)
     if result.fit is not None:
-        tables["calibrate"] = {"parameters": _parameters(result), "outcome": result.fit.outcome.code}
+        tables["calibrate"] = {"parameters": parameter_table(result.fit, result.ranges),
+                               "outcome": result.fit.outcome.code}
     return tables
 
 
-def _parameters(result: JobResult) -> dict[str, Any]:
-    fit, ranges = result.fit, result.ranges or {}
-    assert fit is not None
+def parameter_table(fit: Estimates, ranges: Mapping[str, tuple[float, float]] | None) -> dict[str, Any]:
+    """Calibrated parameters by name.
+
+    Parameters
+    ----------
+    fit : Estimates
+        Calibration of the system.
+    ranges : mapping or None
+        Ranges for which claims are made.
+    """
+    ranges = ranges or {}
     found = {}
     for i, (name, value) in enumerate(fit.parameters.items()):
         bound = ("lower" if value - fit.lower[i] < fit.upper[i] - value else "upper") if fit.at_bound[i] else None
@@ -36,9 +48,28 @@ def _parameters(result: JobResult) -> dict[str, Any]:
     return found
 
 
-def _residuals(result: JobResult) -> Mapping[str, Any]:
+def import_table(records: Iterable[Record]) -> list[dict[str, Any]]:
+    """How every file was read, once per file.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        All parts of all files.
+    """
+    reports = {record.imported.file: record.imported for record in records if record.imported}
+    return [report.to_dict() for report in reports.values()]
+
+
+def residual_table(misfits: Iterable[Misfit]) -> Mapping[str, Any]:
+    """Residuals by kind of record, file and sensor.
+
+    Parameters
+    ----------
+    misfits : iterable of Misfit
+        How far the model is from every reading.
+    """
     found: dict[str, dict[str, dict[str, dict[str, float]]]] = {}
-    for one in result.misfits:
+    for one in misfits:
         row = {"mean": one.mean, "rms": one.rms, "noise": one.noise, "excess": one.excess,
                "tolerance": one.tolerance, "p": one.p_value}
         found.setdefault(one.kind, {}).setdefault(one.record, {})[one.sensor] = row

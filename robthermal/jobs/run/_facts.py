@@ -1,0 +1,125 @@
+"""What the verdict asks of measured data and of a diagnosis: plain facts that can be kept in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...diagnosis import Diagnosis
+from ...signals import Record
+from ...thermal import System
+from ._misfit import Misfit
+from ._result import Comparison
+
+
+@dataclass(frozen=True)
+class DataFacts:
+    """Measured data beside the model.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        "train" and "validation", as far as there are such data.
+    misfits : tuple of Misfit
+        How far the model is from every reading of every record.
+    inputs : dict
+        Range of every input [unit], module current [A] and ambient [K] in the records.
+    readings : tuple of float or None
+        Coldest and hottest reading of sensors and ambients [K]; None without records.
+    silent : tuple of str
+        Measured sensors whose noise is not stated.
+    resampled : tuple of str
+        Files whose samples were not on a uniform grid.
+    left_out : tuple of str
+        Inputs that never change, left out of a frequency response.
+    """
+
+    kinds: tuple[str, ...] = ()
+    misfits: tuple[Misfit, ...] = ()
+    inputs: Mapping[str, tuple[float, float]] | None = None
+    readings: tuple[float, float] | None = None
+    silent: tuple[str, ...] = ()
+    resampled: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    def currents(self, system: System) -> dict[str, tuple[float, float]]:
+        """Range of every module's current in the records [A]; empty without records.
+
+        Parameters
+        ----------
+        system : System
+            With the modules.
+        """
+        return {name: (self.inputs or {}).get(name, (0.0, 0.0)) for name in system.modules if self.readings}
+
+
+@dataclass(frozen=True)
+class DiagnosisFacts:
+    """Result of a diagnosis, as far as the verdict asks for it.
+
+    Parameters
+    ----------
+    verdict : str
+        "named", "ambiguous", "consistent" or "unexplained".
+    names : str
+        Effects with what could not be told from them, in words.
+    adopted : bool
+        Whether the certified system has them.
+    """
+
+    verdict: str
+    names: str
+    adopted: bool = False
+
+
+def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Sequence[Misfit],
+               kinds: Sequence[str] = ()) -> DataFacts:
+    """Facts about records beside a model.
+
+    Parameters
+    ----------
+    system : System
+        Model of the comparisons.
+    comparisons : sequence of Comparison
+        One per record.
+    misfits : sequence of Misfit
+        Of the same records.
+    kinds : sequence of str
+        Kinds of data that are no records.
+    """
+    records = [one.record for one in comparisons]
+    names = dict.fromkeys(name for record in records for name in record.input_names)
+    sensors = dict.fromkeys(name for record in records for name in record.output_names)
+    ends = [_range(records, name) for name in (*sensors, *(name for name in names if name in system.ambients))]
+    actions = [(report.file, action["what"]) for record in records if (report := record.imported)
+               for action in report.actions]
+    return DataFacts(
+        tuple(dict.fromkeys([*(one.kind for one in comparisons), *kinds])), tuple(misfits),
+        {name: _range(records, name) for name in names},
+        (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None,
+        tuple(name for name in sensors if name in system.sensors and not system.sensors[name].noise),
+        tuple(dict.fromkeys(file for file, what in actions if what == "resampled")))
+
+
+def diagnosis_facts(found: Diagnosis, adopted: bool = False) -> DiagnosisFacts:
+    """Facts about a diagnosis.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    adopted : bool
+        Whether the certified system has the effects.
+    """
+    names = ", ".join(" or ".join([effect.label, *(f"{name}({', '.join(where)})" for name, where in others
+                                                   if (name, where) != (effect.effect, effect.where))])
+                      for effect, others in zip(found.effects, found.alternatives, strict=True))
+    return DiagnosisFacts(found.verdict, names, adopted)
+
+
+def _range(records: Sequence[Record], name: str) -> tuple[float, float]:
+    values = [record[name] for record in records if name in (*record.input_names, *record.output_names)]
+    ends = [(float(np.nanmin(v)), float(np.nanmax(v))) for v in values if np.isfinite(v).any()]
+    return (min(a for a, _ in ends), max(b for _, b in ends)) if ends else (0.0, 0.0)
