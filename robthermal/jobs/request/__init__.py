@@ -12,12 +12,15 @@ from ._schema import Method as Method
 from ._schema import Project as Project
 from ._schema import in_kelvin as in_kelvin
 from ._schema import read_project as read_project
+from ._stage_tables import CoupleTable as CoupleTable
+from ._stage_tables import DesignTable as DesignTable
+from ._stage_tables import Identification as Identification
 from ._toml import Number as Number
 from ._toml import Table as Table
 from ._toml import read_text as read_text
 from ._toml import read_toml as read_toml
 from ._toml import refusal as refusal
 
-__all__ = ["Boxes", "Gate", "Method", "Number", "Project", "Table", "boxes_from_text", "gate_from_text", "in_kelvin",
-           "point_from_text", "ranges_from_text", "read_calibrated", "read_project", "read_text", "read_toml",
+__all__ = ["Boxes", "CoupleTable", "DesignTable", "Gate", "Identification", "Method", "Number", "Project", "Table",
+           "boxes_from_text", "gate_from_text", "in_kelvin", "point_from_text", "ranges_from_text", "read_calibrated", "read_project", "read_text", "read_toml",
            "refusal", "write_calibrated"]

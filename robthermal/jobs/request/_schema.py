@@ -13,11 +13,20 @@ from ...errors import InputError
 from ...signals import celsius_to_kelvin, declared
 from ...thermal import FitRange, System, fit_in_kelvin, read_system
 from ..measured import ReadTable
+from ._stage_tables import (
+    FILE_NAME,
+    CoupleTable,
+    DesignTable,
+    DiagnoseTable,
+    Identification,
+    IdentifyTable,
+    Pair,
+    RecordEntry,
+)
 from ._toml import Number, Table, read_toml, refusal
 
 _REMEDY = "See the documentation, \"Project file\", or start from the demo's."
 _COLDEST_KELVIN, _HOTTEST_CELSIUS = 150.0, 250.0  # as in system files
-Pair = tuple[Number, Number]
 Method = Literal["energy", "sum", "max", "lyapunov"]
 Structure = Literal["full", "block"]
 Direction = Literal["symmetric", "cooling", "heating"]
@@ -30,14 +39,6 @@ Ranges = Mapping[str, tuple[float, float]]
 METHODS: tuple[Method, ...] = ("energy", "sum", "max", "lyapunov")
 STRUCTURES: tuple[Structure, ...] = ("full", "block")
 DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
-
-
-class RecordEntry(Table):
-    """One entry of `train` or `validation` that says how its file is read."""
-
-    file: str
-    record: dict[str, Any] = {}
-    columns: dict[str, Any] = {}
 
 
 class ProjectTable(Table):
@@ -57,6 +58,7 @@ class CalibrateTable(Table):
     initial: Initial = "free"
     loss: Loss = "linear"
     parameters: dict[str, dict[str, Number]] = {}
+    responses: list[str] = []
 
 
 class CertifyTable(Table):
@@ -86,16 +88,13 @@ class GateTable(Table):
     remarks: Remarks = "pass"
 
 
-class DiagnoseTable(Table):
-    """[diagnose]: look for what the model lacks."""
-
-    session_gain: bool = False
-
-
 class _File(Table):
     project: ProjectTable
     gate: GateTable = GateTable()
+    identify: dict[Annotated[str, Field(pattern=FILE_NAME)], IdentifyTable] = {}
     diagnose: DiagnoseTable | None = None
+    design: DesignTable | None = None
+    couple: CoupleTable | None = None
     calibrate: CalibrateTable = CalibrateTable()
     certify: CertifyTable = CertifyTable()
     record: dict[str, Any] = {}
@@ -202,6 +201,20 @@ class Project:
         Whether the diagnosis lets every record have its own gains.
     reading : mapping
         Record file to tables [record] and [columns] that say how it is read, besides the system's own.
+    path : Path
+        The project file itself; other files are relative to it.
+    system_file : Path
+        File of the system.
+    identify : tuple of Identification
+        Frequency responses to estimate.
+    responses : tuple of Path
+        Files of frequency responses to calibrate on, besides those of `identify`.
+    adopt : bool
+        Whether an effect that the diagnosis names goes into the certified system.
+    design : DesignTable or None
+        Controller to design.
+    couple : CoupleTable or None
+        Subsystems to couple.
     """
 
     name: str
@@ -218,6 +231,13 @@ class Project:
     diagnose: bool = False
     session_gain: bool = False
     reading: Mapping[Path, tuple[ReadTable, ...]] = field(default_factory=dict)
+    path: Path = Path()
+    system_file: Path = Path()
+    identify: tuple[Identification, ...] = ()
+    responses: tuple[Path, ...] = ()
+    adopt: bool = False
+    design: DesignTable | None = None
+    couple: CoupleTable | None = None
 
 
 def read_project(path: str | Path) -> Project:
@@ -251,28 +271,47 @@ def read_project(path: str | Path) -> Project:
     reading: dict[Path, tuple[ReadTable, ...]] = {}
     train, validation = (tuple(_record_file(entry, folder, path, data, reading) for entry in entries)
                          for entries in (head.train, head.validation))
+    identify = tuple(_identification(name, table, system, path, data, reading)
+                     for name, table in data.identify.items())
+    responses = tuple(_beside(folder, name, path, "calibrate") for name in data.calibrate.responses)
+    asked = data.diagnose or DiagnoseTable()
+    measured = dict.fromkeys([*train, *validation, *(file for one in identify for file in one.records), *responses])
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
                    data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
-                   (path, system_file, *train, *validation), _gate(system, data.gate, path),
-                   data.diagnose is not None, data.diagnose is not None and data.diagnose.session_gain, reading)
+                   (path, system_file, *measured), _gate(system, data.gate, path), data.diagnose is not None,
+                   asked.session_gain, reading, path, system_file, identify, responses, asked.adopt, data.design,
+                   data.couple)
+
+
+def _identification(name: str, table: IdentifyTable, system: System, path: Path, data: _File,
+                    reading: dict[Path, tuple[ReadTable, ...]]) -> Identification:
+    where = f"{path} [identify.{name}] operating_point"
+    point = {key: in_kelvin(value, system.temperature_unit, f"{where} {key}") if key in system.ambients else value
+             for key, value in table.operating_point.items()}
+    unknown = [key for key in point if key not in (*system.inputs, *system.modules, *system.ambients)]
+    if unknown:
+        raise InputError(f"there is no input {unknown[0]!r}", where=where,
+                         expected="some of " + ", ".join((*system.inputs, *system.modules, *system.ambients)))
+    files = tuple(_record_file(entry, path.parent, path, data, reading, f"identify.{name}") for entry in table.records)
+    return Identification(name, files, table, point)
 
 
 def _record_file(entry: str | RecordEntry, folder: Path, project: Path, data: _File,
-                 reading: dict[Path, tuple[ReadTable, ...]]) -> Path:
+                 reading: dict[Path, tuple[ReadTable, ...]], table: str = "project") -> Path:
     """File of an entry; how it is read is kept: [record] and [columns] of the project, then those of the entry."""
     own = RecordEntry(file=entry) if isinstance(entry, str) else entry
-    file = _beside(folder, own.file, project)
+    file = _beside(folder, own.file, project, table)
     tables: tuple[ReadTable, ...] = ((data.record, data.columns, str(project)),
-                                     (own.record, own.columns, f"{project} [project] {own.file}"))
+                                     (own.record, own.columns, f"{project} [{table}] {own.file}"))
     declared(*tables)  # refuses unknown keys before any record is read
     reading[file] = tuple(table for table in tables if table[0] or table[1])
     return file
 
 
-def _beside(folder: Path, name: str, project: Path) -> Path:
+def _beside(folder: Path, name: str, project: Path, table: str = "project") -> Path:
     file = folder / name
     if not file.is_file():
-        raise InputError(f"{name!r} does not exist", where=f"{project} [project]",
+        raise InputError(f"{name!r} does not exist", where=f"{project} [{table}]",
                          remedy="Paths are relative to the project file.")
     return file
 

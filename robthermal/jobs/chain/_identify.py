@@ -1,0 +1,89 @@
+"""Stage "identify": frequency responses from records, each in responses/NAME.json."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from ...identify import FrequencyResponse
+from ...report import Figure, Report, Section, Table, house_style
+from ...thermal import System
+from ..measured import estimate_response, import_reports
+from ..request import Identification, Project
+from ..run import DataFacts
+from ._context import Context, StageJob, read_files_key
+from ._measured import RESPONSES
+from ._parts import part
+
+
+def _absent(project: Project) -> str:
+    return "" if project.identify else "The project file has no table [identify.NAME]."
+
+
+def _depends(project: Project) -> Mapping[str, Any]:
+    return {one.name: {"options": one.options.model_dump(mode="json", exclude={"use", "records"}),
+                       "point": dict(one.operating_point), "records": read_files_key(project, one.records)}
+            for one in project.identify}
+
+
+def _run(context: Context, folder: Path) -> Report:
+    project = context.project
+    (folder / RESPONSES).mkdir()
+    sections, tables, left_out, imports = [], {}, dict[str, None](), []
+    for one in project.identify:
+        context.progress(f"estimating the frequency response {one.name}")
+        model = _model(project.system, one)
+        found = _estimate(project, one, model)
+        found.save(folder / RESPONSES / f"{one.name}.json")
+        sections.append(_section(one, found))
+        tables[one.name] = {"method": found.method, "bins": len(found), "inputs": list(found.input_names),
+                            "outputs": list(found.output_names), "suspect_bins": int(found.suspect.sum()),
+                            "use": one.use, "notes": list(found.notes)}
+        left_out |= dict.fromkeys(_constant(found.notes))
+        imports += [report.to_dict() for path in one.records
+                    for report in import_reports([path], model, tables=project.reading.get(path, ()))]
+    facts = DataFacts(left_out=tuple(left_out))
+    return part("identify", sections, data={"identify": tables, "imports": imports, "facts": asdict(facts)})
+
+
+def _model(system: System, one: Identification) -> System | None:
+    """The system that names the columns; None where a column is none of it: a machine beside the certified one."""
+    known = {*system.inputs, *system.modules, *system.ambients, *system.sensors}
+    asked = {*one.options.inputs, *one.options.outputs}
+    return system if asked <= known else None
+
+
+def _estimate(project: Project, one: Identification, model: System | None) -> FrequencyResponse:
+    options = one.options
+    return estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
+                             method=options.method, half_width=options.half_width, degree=options.degree,
+                             poles=options.poles, band=options.band,
+                             tables={path: project.reading.get(path, ()) for path in one.records})
+
+
+def _constant(notes: Sequence[str]) -> list[str]:
+    found = [re.search(r"never change: (.*) \(constant_input\)", note) for note in notes]
+    return [name for match in found if match for name in match[1].split(", ")]
+
+
+def _section(one: Identification, found: FrequencyResponse) -> Section:
+    with house_style():
+        axes = found.plot()
+        figure = Figure.draw(axes.flat[0].figure, alt=f"Bode plot of the frequency response {one.name}, with its 95 % "
+                             "bands.", caption=f"Measured frequency response {one.name}, with 95 % bands.")
+    use = {"train": "Calibration and diagnosis are fitted to it.", "none": "Calibration and diagnosis do not use it.",
+           "validation": "Calibration and diagnosis are only compared with it."}[one.use]
+    rows = [{"method": found.method, "bins": len(found), "lowest [Hz]": float(found.frequencies[0]),
+             "highest [Hz]": float(found.frequencies[-1]), "suspect bins": int(found.suspect.sum())}]
+    text = "\n\n".join([f"From {', '.join(path.name for path in one.records)}; in {RESPONSES}/{one.name}.json. {use}",
+                        *(f"Note: {note}." for note in found.notes)])
+    return Section(f"Frequency response {one.name}", text, figures=(figure,),
+                   tables=(Table(pd.DataFrame(rows), "What was estimated."),), anchor=f"frf-{one.name}")
+
+
+IDENTIFY = StageJob("identify", _absent, lambda project: (), _depends, _run)
