@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -75,22 +76,33 @@ def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="P
         tolerance: Annotated[list[str] | None, typer.Option(
             help="How far a prediction may be off beyond the noise [K], may repeat.",
             metavar="SENSOR=VALUE|default=VALUE")] = None,
+        only: Annotated[str, typer.Option(
+            help="Compute these stages alone; what they need must be there from an earlier run.",
+            metavar="STAGE,STAGE")] = "",
+        start: Annotated[str, typer.Option(
+            "--from", help="Compute this stage and all after it again, even if nothing has changed.",
+            metavar="STAGE")] = "",
+        force: Annotated[bool, typer.Option("--force", help="Compute all stages again.")] = False,
         as_json: Json = False) -> None:
-    """Run the main job on your system and records: data, calibrated model, certificates, report.
+    """Run a project: identify, calibrate, diagnose, certify, design, couple, as far as its file asks for them.
+
+    What has not changed since the last run is taken from the results folder; its certificates are verified again.
 
     Example: robthermal run project.toml --out results
     """
     _run(rt.jobs.request.gate_from_text(rt.jobs.read_project(project), confidence=confidence,
-                                        tolerance=tolerance or []), out, as_json)
+                                        tolerance=tolerance or []), out, as_json,
+         [name.strip() for name in only.split(",") if name.strip()], start, force)
 
 
-def _run(job: rt.jobs.request.Project, out: Path, as_json: bool) -> None:
-    rt.jobs.folder.check_free(out)
-    with progress() as stage:
-        result = rt.jobs.run_job(job, stage)
-        stage("writing the report")
-        report = rt.jobs.write_job(result, out)
-    show_report(report, out, as_json)
+def _run(job: rt.jobs.request.Project, out: Path, as_json: bool, only: Sequence[str] = (), start: str = "",
+         force: bool = False) -> None:
+    try:
+        with progress() as stage:
+            report = rt.jobs.run_project(job, out, only=only, start=start, force=force, progress=stage)
+    except KeyboardInterrupt:
+        _stop(f"interrupted; finished stages are kept in {out}: the same command goes on from there", _INTERRUPTED)
+    show_report(report, out, as_json, stages={one.name: one.status for one in report.stages})
 
 
 @app.command()
@@ -350,7 +362,7 @@ def _usage(error: Any) -> str:
     return f"{said}. See {command} --help." if said and "\n" not in said else f"no command\n{said}"
 
 
-def _stop(message: str, status: int, **details: object) -> None:
+def _stop(message: str, status: int, **details: object) -> NoReturn:
     typer.echo(f"robthermal: {message}", err=True)
     if "--json" in sys.argv:  # a script that asked for JSON gets it, whatever happened
         error = {"message": message, "status": status, **details}

@@ -6,6 +6,7 @@ What a user calls. What the commands use beside it, and the classes of the resul
 from . import measured as measured  # of the commands
 from .certify import certify_system as certify_system
 from .certify import write_certify as write_certify
+from .chain import run_project as run_project
 from .couple import couple_subsystems as couple_subsystems
 from .couple import read_coupling as read_coupling
 from .couple import write_coupling as write_coupling
@@ -30,5 +31,5 @@ from .verify import verify_files as verify_files
 
 __all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "couple_subsystems", "demo_project",
            "design_system", "diagnose_records", "explain", "explainable", "map_system", "new_project", "read_coupling",
-           "read_project", "rebuild_report", "run_job", "verify_files", "write_certify", "write_coupling",
+           "read_project", "rebuild_report", "run_job", "run_project", "verify_files", "write_certify", "write_coupling",
            "write_design", "write_diagnosis", "write_job", "write_map"]

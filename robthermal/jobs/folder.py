@@ -12,6 +12,7 @@ from pathlib import Path
 from ..errors import InputError
 
 MARKER = "summary.json"  # every finished output folder has one
+CACHE = ".cache"  # of a chain: also one that was interrupted before its first summary has it
 
 
 @contextmanager
@@ -84,7 +85,8 @@ def check_free(target: Path) -> None:
     ...
     robthermal.errors.InputError: results: is a file. Choose another folder with --out.
     """
-    if target.is_dir() and not (target / MARKER).is_file() and any(target.iterdir()):
+    ours = (target / MARKER).is_file() or any((target / CACHE).glob("*.json"))
+    if target.is_dir() and not ours and any(target.iterdir()):
         raise InputError("is a folder with other things in it", where=str(target), remedy="Choose another with --out.")
     if target.exists() and not target.is_dir():
         raise InputError("is a file", where=str(target), remedy="Choose another folder with --out.")

@@ -30,6 +30,7 @@ from .claims import ARITHMETIC, GateCode, claim_of
 from .evidence import checker, judged, twice_checked
 from .now import now
 
+_FOLDERS = ("certificates", "design/certificates", "coupling/certificates")
 _NO_EVIDENCE = "it names no certificate that could be checked"
 
 
@@ -69,7 +70,26 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     False
     """
     folder = Path(folder)
-    stored = _stored(folder)
+    report = replace(checked_again(_stored(folder), folder, progress), checker=checker(), generated=now())
+    if not is_unchanged(folder / "report.json"):
+        report = _distrusted(report, folder)
+    _write(report, folder)
+    return report
+
+
+def checked_again(stored: Report, folder: Path, progress: Callable[[int, int], None] = lambda done, total: None
+                  ) -> Report:
+    """A report with what its certificates say now: claims, evidence, usable currents and the reasons that rest on them.
+
+    Parameters
+    ----------
+    stored : Report
+        Report, or part of one, of an earlier run.
+    folder : Path
+        Results folder with the certificates.
+    progress : callable, optional
+        Called with how many certificates are checked, and how many there are.
+    """
     found = []
     for i, one in enumerate(stored.evidence):
         progress(i, len(stored.evidence))
@@ -77,18 +97,15 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     found = _checked_twice(_of_one_machine(found), {claim.file for claim in stored.claims})
     good = {one.evidence.file: one.certificate for one in found if one.evidence.good and one.certificate is not None}
     usable = tuple(rest_on_certificates(stored.usable, good))
-    inside = box_stays_inside(good, [claim.file for claim in stored.claims if claim.kind == "invariance"],
-                              stored.data.get("certify", {}).get("temperature_lower") == "held")
+    boxes = [claim.file for claim in stored.claims if claim.kind == "invariance" and claim.stage == "certify"]
+    inside = box_stays_inside(good, boxes, stored.data.get("certify", {}).get("temperature_lower") == "held")
     by_file = {one.evidence.file: one for one in found}
     current = _current(by_file.get("certificates/box.json"))
     runaway_free = bool(good) and within_usable(current, usable, inside)
-    claims = tuple(_claimed_again(claim, by_file.get(claim.file), runaway_free) for claim in stored.claims)
-    report = replace(stored, claims=claims, evidence=tuple(one.evidence for one in found), usable=usable,
-                     gate=_gate_again(stored, current, usable, inside), checker=checker(), generated=now())
-    if not is_unchanged(folder / "report.json"):
-        report = _distrusted(report, folder)
-    _write(report, folder)
-    return report
+    claims = tuple(_claimed_again(claim, by_file.get(claim.file), runaway_free and claim.stage == "certify")
+                   for claim in stored.claims)
+    return replace(stored, claims=claims, evidence=tuple(one.evidence for one in found), usable=usable,
+                   gate=_gate_again(stored, current, usable, inside))
 
 
 @dataclass(frozen=True)
@@ -109,7 +126,7 @@ def _stored(folder: Path) -> Report:
 
 def _checked_again(one: Evidence, folder: Path) -> _Found:
     place = PurePosixPath(one.file)
-    if place.parent != PurePosixPath("certificates") or place.name in ("", ".."):
+    if str(place.parent) not in _FOLDERS or place.name in ("", ".."):
         return _Found(_lost(one, "is not in the folder of certificates"))
     try:
         certificate = Certificate.load(folder / one.file)
@@ -164,6 +181,7 @@ def _claimed_again(claim: Claim, found: _Found | None, usable: bool) -> Claim:
     verdict = found.verdict if found.evidence.good and claim.good else None
     again = claim_of(claim.file, found.certificate, verdict, title=claim.title, seconds=claim.seconds,
                      usable=usable)
+    again = replace(again, stage=claim.stage)
     if claim.good and not found.evidence.good:
         return replace(again, verified=False, margin="none", reason=found.evidence.reason)
     return again if claim.good else replace(again, holds=claim.holds and again.holds, verified=False, margin="none",
@@ -198,7 +216,7 @@ def _distrusted(report: Report, folder: Path) -> Report:
                    if claim.tested else claim for claim in report.claims)
     return replace(report, title=f"Results in {folder.resolve().name}", subtitle="", label="", claims=claims,
                    sections=(), first=(), usable=(), gate=(reason,), gates=(reason.code,), answer="", data={},
-                   assumptions=(ARITHMETIC,), provenance=versions())
+                   assumptions=(ARITHMETIC,), provenance=versions(), stages=())
 
 
 def _write(report: Report, folder: Path) -> None:

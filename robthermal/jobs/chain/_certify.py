@@ -28,7 +28,8 @@ def certified_after(project: Project) -> tuple[str, ...]:
     project : Project
         What is asked for.
     """
-    return (*(["calibrate"] if has_data(project) else []), *(["diagnose"] if project.diagnose and project.adopt else []))
+    adopted = project.diagnose and project.adopt
+    return (*(["calibrate"] if has_data(project) else []), *(["diagnose"] if adopted else []))
 
 
 def _depends(project: Project) -> Mapping[str, Any]:

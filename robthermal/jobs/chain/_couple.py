@@ -9,7 +9,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...report import Report, file_hash
-from ..couple import coupling_from_tables, coupling_report, couple_subsystems, save_coupling
+from ..couple import couple_subsystems, coupling_from_tables, coupling_report, save_coupling
 from ..evidence import with_evidence
 from ..request import Project, read_text
 from ._context import Context, StageJob
@@ -68,7 +68,8 @@ def tables_of(project: Project) -> dict[str, Any]:
         try:
             found = tomllib.loads(read_text(path, "TOML"))
         except tomllib.TOMLDecodeError as error:
-            raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
+            raise InputError(f"is not valid TOML: {error}", where=str(path),
+                             remedy="Correct the line it names.") from None
     head = {"name": table.name, "sample_time": table.sample_time, "export": table.export or None}
     measured = {key: getattr(table, key) for key in (*_RESPONSES, "circles")}
     own = {"coupling": {**table.coupling, **_given(head)}, "subsystems": table.subsystems,

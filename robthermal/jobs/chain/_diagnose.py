@@ -15,7 +15,7 @@ from ...thermal import FitRange, System
 from ...thermal.effects import add_effect, effects
 from ..diagnose import Diagnosed, diagnose_records, diagnosis_claims, diagnosis_report, save_diagnosis
 from ..request import Project
-from ..run import DiagnosisFacts, calibrated, diagnosis_facts
+from ..run import calibrated, diagnosis_facts
 from ._calibrate import calibration_part, write_calibration
 from ._context import Context, StageJob
 from ._measured import Data, data_key, has_training, project_data, used_responses
@@ -46,7 +46,8 @@ def _run(context: Context, folder: Path) -> Report:
     facts: dict[str, Any] = {"diagnosis": asdict(diagnosis_facts(found, adopted))}
     tables: dict[str, Any] = {"diagnose": {"verdict": found.verdict, "adopted": adopted,
                                            "effects": [effect.label for effect in found.effects]}}
-    sections, first = [_tests(result), *diagnosis_report(result).sections], ()
+    sections = [_tests(result), *diagnosis_report(result).sections]
+    first: tuple[Section, ...] = ()
     if adopted:
         again = _adopted(context, found, data, folder)
         facts["data"] = again.data["facts"]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from ...identify import FrequencyResponse
-from ...report import Figure, Report, Section, Table, house_style
+from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
 from ..measured import estimate_response, import_reports
 from ..request import Identification, Project
-from ..run import DataFacts
 from ._context import Context, StageJob, read_files_key
 from ._measured import RESPONSES
 from ._parts import part
@@ -34,7 +31,7 @@ def _depends(project: Project) -> Mapping[str, Any]:
 def _run(context: Context, folder: Path) -> Report:
     project = context.project
     (folder / RESPONSES).mkdir()
-    sections, tables, left_out, imports = [], {}, dict[str, None](), []
+    sections, tables, reasons, imports = [], {}, [], []
     for one in project.identify:
         context.progress(f"estimating the frequency response {one.name}")
         model = _model(project.system, one)
@@ -44,11 +41,11 @@ def _run(context: Context, folder: Path) -> Report:
         tables[one.name] = {"method": found.method, "bins": len(found), "inputs": list(found.input_names),
                             "outputs": list(found.output_names), "suspect_bins": int(found.suspect.sum()),
                             "use": one.use, "notes": list(found.notes)}
-        left_out |= dict.fromkeys(_constant(found.notes))
+        reasons += [Reason("remark", remark.code, "identify", one.name, f"{one.name}: {remark.text}")
+                    for remark in found.remarks]
         imports += [report.to_dict() for path in one.records
                     for report in import_reports([path], model, tables=project.reading.get(path, ()))]
-    facts = DataFacts(left_out=tuple(left_out))
-    return part("identify", sections, data={"identify": tables, "imports": imports, "facts": asdict(facts)})
+    return part("identify", sections, gate=reasons, data={"identify": tables, "imports": imports})
 
 
 def _model(system: System, one: Identification) -> System | None:
@@ -60,15 +57,10 @@ def _model(system: System, one: Identification) -> System | None:
 
 def _estimate(project: Project, one: Identification, model: System | None) -> FrequencyResponse:
     options = one.options
-    return estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
-                             method=options.method, half_width=options.half_width, degree=options.degree,
-                             poles=options.poles, band=options.band,
-                             tables={path: project.reading.get(path, ()) for path in one.records})
-
-
-def _constant(notes: Sequence[str]) -> list[str]:
-    found = [re.search(r"never change: (.*) \(constant_input\)", note) for note in notes]
-    return [name for match in found if match for name in match[1].split(", ")]
+    found = estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
+                              method=options.method, half_width=options.half_width, degree=options.degree,
+                              poles=options.poles, band=options.band, reading=project.reading)
+    return found.replace(operating_point={**found.operating_point, **one.operating_point})
 
 
 def _section(one: Identification, found: FrequencyResponse) -> Section:
@@ -81,7 +73,7 @@ def _section(one: Identification, found: FrequencyResponse) -> Section:
     rows = [{"method": found.method, "bins": len(found), "lowest [Hz]": float(found.frequencies[0]),
              "highest [Hz]": float(found.frequencies[-1]), "suspect bins": int(found.suspect.sum())}]
     text = "\n\n".join([f"From {', '.join(path.name for path in one.records)}; in {RESPONSES}/{one.name}.json. {use}",
-                        *(f"Note: {note}." for note in found.notes)])
+                        *found.notes])
     return Section(f"Frequency response {one.name}", text, figures=(figure,),
                    tables=(Table(pd.DataFrame(rows), "What was estimated."),), anchor=f"frf-{one.name}")
 

@@ -22,7 +22,8 @@ def input_section(project: Project, imports: Sequence[Mapping[str, Any]]) -> Sec
         Import reports, as in the summary.
     """
     uses: dict[str, list[str]] = {}
-    named = [(project.path, "project"), (project.system_file, "system"), *((path, "training") for path in project.train),
+    named = [(project.path, "project"), (project.system_file, "system"),
+             *((path, "training") for path in project.train),
              *((path, "validation") for path in project.validation),
              *((path, f"identify {one.name}") for one in project.identify for path in one.records),
              *((path, "response") for path in project.responses)]
@@ -40,7 +41,8 @@ def input_section(project: Project, imports: Sequence[Mapping[str, Any]]) -> Sec
 
 
 def _row(one: Mapping[str, Any]) -> dict[str, object]:
-    used = [f"{column['name']} [{column['unit']}]" for column in one["columns"] if column["role"] not in ("unused", "time")]
+    used = [f"{column['name']} [{column['unit']}]" for column in one["columns"]
+            if column["role"] not in ("unused", "time")]
     return {"file": one["file"], "rows": one["rows"]["file"], "used": one["rows"]["used"], "parts": len(one["parts"]),
             "sample time [s]": one["sample_time"], "time": one["time"].get("format", ""), "columns": ", ".join(used)}
 

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from ...calibration import Estimates
-from ...report import Evidence, Report, Section
+from ...report import Evidence, Reason, Report, Section
 from ...thermal import System, read_system
 from ..now import now
 from ..request import Project, read_calibrated
@@ -22,7 +22,7 @@ CALIBRATED, AUGMENTED = "calibrated.json", "augmented.json"  # estimates of the 
 
 
 def part(stage: str, sections: Sequence[Section] = (), *, first: Sequence[Section] = (),
-         data: Mapping[str, Any] | None = None) -> Report:
+         gate: Sequence[Reason] = (), data: Mapping[str, Any] | None = None) -> Report:
     """A part of the report without claims.
 
     Parameters
@@ -31,11 +31,13 @@ def part(stage: str, sections: Sequence[Section] = (), *, first: Sequence[Sectio
         Name of the stage.
     sections, first : sequence of Section
         What it shows, below and on the first screen.
+    gate : sequence of Reason, optional
+        Reasons of the verdict that the stage finds by itself.
     data : mapping, optional
         Tables for the summary, and facts for later stages.
     """
     return Report(title=stage, subtitle="", label="", claims=(), sections=tuple(sections), provenance={},
-                  assumptions=(), generated=now(), first=tuple(first), data=dict(data or {}))
+                  assumptions=(), generated=now(), gate=tuple(gate), first=tuple(first), data=dict(data or {}))
 
 
 def below(report: Report, folder: str, stage: str) -> Report:
@@ -67,9 +69,7 @@ def facts_of(context: Context) -> DataFacts:
         With the stages that have run.
     """
     adopted = context.data("diagnose").get("facts", {}).get("data")
-    found = _DATA.validate_python(adopted or context.data("calibrate").get("facts", {}))
-    left_out = _DATA.validate_python(context.data("identify").get("facts", {})).left_out
-    return replace(found, left_out=left_out)
+    return _DATA.validate_python(adopted or context.data("calibrate").get("facts", {}))
 
 
 def diagnosis_of(context: Context) -> DiagnosisFacts | None:

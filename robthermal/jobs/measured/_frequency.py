@@ -32,7 +32,8 @@ _METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
 def estimate_response(paths: Sequence[Path], *, system: System | None = None, inputs: Sequence[str] = (),
                       outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
                       poles: Sequence[float] = (), band: tuple[float, float] | None = None,
-                      tables: Sequence[ReadTable] = ()) -> FrequencyResponse:
+                      tables: Sequence[ReadTable] = (), reading: Mapping[Path, Sequence[ReadTable]] | None = None
+                      ) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
     Parameters
@@ -55,6 +56,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         Frequencies to keep [Hz].
     tables : sequence
         How the files are read, from `reading_from_text`.
+    reading : mapping, optional
+        Tables of single files by path, besides `tables`.
 
     Returns
     -------
@@ -78,7 +81,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     """
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
-    parts = [part for path in paths for part in _parts(path, system, inputs, outputs, tables)]
+    parts = [part for path in paths
+             for part in _parts(path, system, inputs, outputs, (*tables, *(reading or {}).get(path, ())))]
     chosen = [part.select(inputs=list(inputs or part.input_names), outputs=list(outputs or part.output_names))
               for part in parts]
     records, constant = _changing(chosen)

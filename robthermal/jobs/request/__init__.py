@@ -22,5 +22,5 @@ from ._toml import read_toml as read_toml
 from ._toml import refusal as refusal
 
 __all__ = ["Boxes", "CoupleTable", "DesignTable", "Gate", "Identification", "Method", "Number", "Project", "Table",
-           "boxes_from_text", "gate_from_text", "in_kelvin", "point_from_text", "ranges_from_text", "read_calibrated", "read_project", "read_text", "read_toml",
-           "refusal", "write_calibrated"]
+           "boxes_from_text", "gate_from_text", "in_kelvin", "point_from_text", "ranges_from_text", "read_calibrated",
+           "read_project", "read_text", "read_toml", "refusal", "write_calibrated"]

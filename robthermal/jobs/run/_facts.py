@@ -32,8 +32,6 @@ class DataFacts:
         Measured sensors whose noise is not stated.
     resampled : tuple of str
         Files whose samples were not on a uniform grid.
-    left_out : tuple of str
-        Inputs that never change, left out of a frequency response.
     """
 
     kinds: tuple[str, ...] = ()
@@ -42,7 +40,6 @@ class DataFacts:
     readings: tuple[float, float] | None = None
     silent: tuple[str, ...] = ()
     resampled: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
 
     def currents(self, system: System) -> dict[str, tuple[float, float]]:
         """Range of every module's current in the records [A]; empty without records.

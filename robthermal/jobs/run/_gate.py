@@ -107,9 +107,6 @@ def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Rea
         if low == high:
             yield remark(GateCode.CONSTANT_INPUT, "calibrate", name, f"{name} never changes in the records: nothing "
                          "can be learnt about what it does.")
-    for name in facts.left_out:
-        yield remark(GateCode.CONSTANT_INPUT, "identify", name, f"{name} never changes while the frequency response is "
-                     "measured: it is left out of it.")
     for file in facts.resampled:
         yield remark(GateCode.RESAMPLED, "calibrate", file, f"The samples of {file} were not on a uniform grid.")
     if facts.silent:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ...calibration import Estimates, Fit, calibrate
 from ...errors import InputError
 from ...fitting import as_data, free_run
+from ...identify import FrequencyResponse
 from ...signals import Record
 from ...thermal import System
 from ..certify import certify_system, claim_ranges, claims_hold, doubted
@@ -87,7 +89,8 @@ def job_records(project: Project, progress: Progress = lambda stage: None) -> tu
 
 
 def calibrated(project: Project, system: System, train: Sequence[Record], validation: Sequence[Record],
-               progress: Progress = lambda stage: None) -> Calibrated:
+               progress: Progress = lambda stage: None, *, responses: Sequence[FrequencyResponse] = (),
+               held_out: Sequence[FrequencyResponse] = ()) -> Calibrated:
     """Calibrate a system, and compare it with the records.
 
     Parameters
@@ -100,11 +103,17 @@ def calibrated(project: Project, system: System, train: Sequence[Record], valida
         Fitted, and only compared.
     progress : callable, optional
         Called with a sentence before every stage.
+    responses, held_out : sequence of FrequencyResponse
+        Fitted together with `train`, and only compared.
     """
     fit = None
-    if train:
-        progress(f"calibrating {len(system.fit)} parameters on {sum(r.n_samples for r in train)} samples")
-        fit = calibrate(system, train, validation=validation or None, initial=project.initial, loss=project.loss)
+    if train or responses:
+        data = [f"{sum(r.n_samples for r in train)} samples"] if train else []
+        data += [f"{sum(map(len, responses))} bins"] if responses else []
+        progress(f"calibrating {len(system.fit)} parameters on {' and '.join(data)}")
+        fitted: Any = [*train, *responses]
+        compared: Any = [*validation, *held_out]
+        fit = calibrate(system, fitted, validation=compared or None, initial=project.initial, loss=project.loss)
     progress("comparing model and data")
     comparisons = _comparisons(project, system, fit, train, validation)
     model = fit.system if fit else system
