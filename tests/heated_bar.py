@@ -64,3 +64,14 @@ def write_project(folder: Path, records: Mapping[str, tuple[np.ndarray, np.ndarr
     (folder / "bar.toml").write_text(system)
     (folder / "project.toml").write_text(project)
     return folder / "project.toml"
+
+
+def write_bar(folder: Path, lag: float = 0.0, project: str = PROJECT) -> Path:
+    """Project of a bar in a room, steps of its heater in closed form; the sensor lags by a time constant [s]."""
+    noise, time, records = np.random.default_rng(1), np.arange(900.0), {}
+    for name, share in (("train", 1.0), ("validation", 0.5)):
+        steps = ((0.0, share), (300.0, -share), (500.0, 0.6 * share))
+        rise = sum(closed_form(time, step, start, lag) for start, step in steps)
+        heater = 100 * share * np.select([time < 300, time < 500], [1.0, 0.0], 0.6)
+        records[name] = heater, ROOM + rise + noise.normal(0, NOISE, time.size)
+    return write_project(folder, records, project=project)

@@ -101,7 +101,8 @@ def _run(job: rt.jobs.request.Project, out: Path, as_json: bool, only: Sequence[
         with progress() as stage:
             report = rt.jobs.run_project(job, out, only=only, start=start, force=force, progress=stage)
     except KeyboardInterrupt:
-        _stop(f"interrupted; finished stages are kept in {out}: the same command goes on from there", _INTERRUPTED)
+        kept = f"finished stages are kept in {out}: the same command goes on from there"
+        _stop(f"interrupted; {kept if out.exists() else 'nothing was written'}", _INTERRUPTED)
     show_report(report, out, as_json, stages={one.name: one.status for one in report.stages})
 
 

@@ -31,5 +31,5 @@ from .verify import verify_files as verify_files
 
 __all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "couple_subsystems", "demo_project",
            "design_system", "diagnose_records", "explain", "explainable", "map_system", "new_project", "read_coupling",
-           "read_project", "rebuild_report", "run_job", "run_project", "verify_files", "write_certify", "write_coupling",
-           "write_design", "write_diagnosis", "write_job", "write_map"]
+           "read_project", "rebuild_report", "run_job", "run_project", "verify_files", "write_certify",
+           "write_coupling", "write_design", "write_diagnosis", "write_job", "write_map"]

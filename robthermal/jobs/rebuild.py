@@ -26,7 +26,7 @@ from ..report import (
 )
 from ..verification import Certificate, Verdict, same_system, verify
 from .certify import CODES, box_stays_inside, current_reasons, rest_on_certificates, within_usable
-from .claims import ARITHMETIC, GateCode, claim_of
+from .claims import ARITHMETIC, GateCode, claim_of, kind_assumptions
 from .evidence import checker, judged, twice_checked
 from .now import now
 
@@ -138,7 +138,8 @@ def _checked_again(one: Evidence, folder: Path) -> _Found:
         return _Found(replace(found, valid=False, reason="valid by itself, but not the file of this report: its "
                               "SHA-256 is another one"), certificate)
     # How long the check took is no result: with the first duration the same results give the same bytes.
-    return _Found(replace(found, seconds=one.seconds), certificate, verdict)
+    resting = tuple(dict.fromkeys([*one.assumptions, *found.assumptions]))
+    return _Found(replace(found, seconds=one.seconds, assumptions=resting), certificate, verdict)
 
 
 def _of_one_machine(found: list[_Found]) -> list[_Found]:
@@ -181,7 +182,7 @@ def _claimed_again(claim: Claim, found: _Found | None, usable: bool) -> Claim:
     verdict = found.verdict if found.evidence.good and claim.good else None
     again = claim_of(claim.file, found.certificate, verdict, title=claim.title, seconds=claim.seconds,
                      usable=usable)
-    again = replace(again, stage=claim.stage)
+    again = replace(again, stage=claim.stage, parameters=claim.parameters)
     if claim.good and not found.evidence.good:
         return replace(again, verified=False, margin="none", reason=found.evidence.reason)
     return again if claim.good else replace(again, holds=claim.holds and again.holds, verified=False, margin="none",
@@ -215,6 +216,7 @@ def _distrusted(report: Report, folder: Path) -> Report:
     claims = tuple(replace(claim, sentence="", box="", margin="", holds=False, reason="report.json was changed")
                    if claim.tested else claim for claim in report.claims)
     return replace(report, title=f"Results in {folder.resolve().name}", subtitle="", label="", claims=claims,
+                   evidence=tuple(replace(one, assumptions=kind_assumptions(one.kind)) for one in report.evidence),
                    sections=(), first=(), usable=(), gate=(reason,), gates=(reason.code,), answer="", data={},
                    assumptions=(ARITHMETIC,), provenance=versions(), stages=())
 

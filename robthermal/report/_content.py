@@ -109,8 +109,9 @@ class Claim:
 
     @property
     def name(self) -> str:
-        """Title, and for which parameters where that is said."""
-        return f"{self.title}, for the parameter ranges" if self.parameters == "ranges" else self.title
+        """Title, the stage that claims it if that is not the certification, and for which parameters, where said."""
+        title = self.title if self.stage == "certify" else f"{self.title} ({self.stage})"
+        return f"{title}, for the parameter ranges" if self.parameters == "ranges" else title
 
     @property
     def why(self) -> str:
@@ -270,9 +271,9 @@ class Report:
     def _of_claims(self) -> list[Reason]:
         if not self.claims:
             return [Reason("fail", "not_certified", "certify", "claims", "Nothing is claimed.")]
-        bad = {claim.title for claim in self.claims if claim.parameters != "ranges" and not claim.good}
+        bad = {(claim.stage, claim.title) for claim in self.claims if claim.parameters != "ranges" and not claim.good}
         return [_reason(claim) for claim in self.claims
-                if not claim.good and not (claim.parameters == "ranges" and claim.title in bad)]
+                if not claim.good and not (claim.parameters == "ranges" and (claim.stage, claim.title) in bad)]
 
 
 _CODES = {True: "not_verified", False: "not_certified"}

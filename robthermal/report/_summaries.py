@@ -106,7 +106,8 @@ def write_json(report: Report, path: str | Path) -> Path:
 
 
 def _answers(report: Report, parameters: str) -> dict[str, bool]:
-    return {claim.title: claim.good for claim in report.claims if claim.parameters == parameters}
+    return {claim.title: claim.good for claim in report.claims
+            if claim.parameters == parameters and claim.stage == "certify"}
 
 
 def _certificate(one: Evidence) -> dict[str, object]:

@@ -5,25 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from commands import Run
-from heated_bar import NOISE, PROJECT, ROOM, closed_form, write_project
+from heated_bar import PROJECT, write_bar
 
 import robthermal as rt
 
 LAG = 12.0  # s, of the sensor
-
-
-def write_bar(folder: Path, lag: float = 0.0, project: str = PROJECT) -> Path:
-    """Project of a bar in a room, steps of its heater in closed form; the sensor lags by a time constant [s]."""
-    noise, time, records = np.random.default_rng(1), np.arange(900.0), {}
-    for name, share in (("train", 1.0), ("validation", 0.5)):
-        steps = ((0.0, share), (300.0, -share), (500.0, 0.6 * share))
-        rise = sum(closed_form(time, step, start, lag) for start, step in steps)
-        heater = 100 * share * np.select([time < 300, time < 500], [1.0, 0.0], 0.6)
-        records[name] = heater, ROOM + rise + noise.normal(0, NOISE, time.size)
-    return write_project(folder, records, project=project)
 
 
 def test_ranges_of_a_calibration_reach_certify_through_its_file(tmp_path: Path, run: Run) -> None:

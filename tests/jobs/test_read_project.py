@@ -64,14 +64,20 @@ def read(folder: Path, text: str | bytes) -> rt.jobs.request.Project:
 def test_every_key_of_the_documentation_is_read(folder: Path) -> None:
     text = re.search(r"^```toml\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
     assert text
-    for name in ("monday", "tuesday", "friday"):
-        (folder / f"{name}.csv").write_text("")
+    for name in ("monday.csv", "tuesday.csv", "friday.csv", "multisine.csv", "old.json"):
+        (folder / name).write_text("")
     project = read(folder, text[1])
     assert project.label == "BEFORE REPAIR" and project.median_filter == 9.0
     assert [path.name for path in project.train] == ["monday.csv", "tuesday.csv"]
     assert [path.name for path in project.validation] == ["friday.csv"]
     assert [path.name for path in project.files] == ["project.toml", "bench.toml", "monday.csv", "tuesday.csv",
-                                                     "friday.csv"]
+                                                     "friday.csv", "multisine.csv", "old.json"]
+    (stage,) = project.identify
+    assert (stage.name, stage.use, [path.name for path in stage.records]) == ("stage", "train", ["multisine.csv"])
+    assert stage.operating_point == {"m1": 0.5, "room": 296.15}
+    assert [path.name for path in project.responses] == ["old.json"]
+    assert project.design is not None and project.design.margins == {"gain": 2.0, "phase": 45.0}
+    assert project.couple is not None and project.couple.frf_2 == ["identify.two"] and not project.adopt
     assert (project.initial, project.loss) == ("free", "linear")
     assert set(project.system.fit) == {"links.plate-room.conductance", "modules.m1.resistance.value"}
     assert project.system.fit["modules.m1.resistance.value"].sigma == 0.5

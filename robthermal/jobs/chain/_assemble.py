@@ -111,9 +111,9 @@ def _data(context: Context, facts: DataFacts) -> dict[str, Any]:
         imports |= {report["sha256"] or report["file"]: report for report in one.report.data.get("imports", ())}
     ranges = context.data("certify").get("ranges", {})
     if "calibrate" in found:
-        rows = found["calibrate"]["parameters"]
-        found["calibrate"] = {**found["calibrate"],
-                              "parameters": {name: {**row, "range": _range(name, ranges)} for name, row in rows.items()}}
+        rows = {name: {**row, "range": _range(name, ranges)}
+                for name, row in found["calibrate"]["parameters"].items()}
+        found["calibrate"] = {**found["calibrate"], "parameters": rows}
     return {"imports": list(imports.values()), **found, "residuals": residual_table(facts.misfits)}
 
 

@@ -55,9 +55,11 @@ def below(report: Report, folder: str, stage: str) -> Report:
     def moved(file: str) -> str:
         return f"{folder}/{file}" if file else ""
 
+    paired = any(claim.parameters == "ranges" for claim in report.claims)
     evidence: list[Evidence] = [replace(one, file=moved(one.file)) for one in report.evidence]
-    return replace(report, claims=tuple(replace(claim, file=moved(claim.file), stage=stage)
-                                        for claim in report.claims), evidence=tuple(evidence))
+    claims = [replace(claim, file=moved(claim.file), stage=stage, parameters=claim.parameters if paired else "")
+              for claim in report.claims]
+    return replace(report, claims=tuple(claims), evidence=tuple(evidence))
 
 
 def facts_of(context: Context) -> DataFacts:

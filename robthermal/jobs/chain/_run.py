@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -83,14 +84,16 @@ def run_project(project: Project, out: str | Path, *, only: Sequence[str] = (), 
     context = Context(project, target, progress)
     stages: list[Stage] = []
     try:
-        for number, job in enumerate(STAGES):
-            progress(job.name, number, len(STAGES))
+        asked = [job.name for job in STAGES if not job.absent(project)]
+        for job in STAGES:
+            if job.name in asked:
+                progress(job.name, asked.index(job.name), len(asked))
             forced = force or bool(start) and NAMES.index(job.name) >= NAMES.index(start)
             stages.append(_stage(job, context, only, forced, stages))
     except (InputError, Diverged, KeyboardInterrupt) as error:
         _write_failed(context, stages, STAGES[len(stages)].name, error)
         raise
-    progress("writing the report", len(STAGES), len(STAGES))
+    progress("writing the report", len(asked), len(asked))
     return write_report(assemble(context, stages, certified_system(context)[0]), target)
 
 
@@ -138,7 +141,9 @@ def _kept(job: StageJob, context: Context, key: str) -> Finished | None:
     if not found.report.evidence:
         return found
     context.progress(f"verifying the certificates of {job.name} again")
-    return Finished(checked_again(found.report, context.out), found.files, found.key, found.seconds, cached=True)
+    again = checked_again(found.report, context.out)
+    claims = [old if old.good and new.good else new for old, new in zip(found.report.claims, again.claims, strict=True)]
+    return replace(found, report=replace(again, claims=tuple(claims)))
 
 
 def _computed(job: StageJob, context: Context, key: str) -> Finished:
