@@ -59,8 +59,8 @@ SURFACE = {
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system couple_subsystems demo_project design_system diagnose_records
-        explain explainable map_system new_project read_coupling read_project rebuild_report run_job verify_files
-        write_certify write_coupling write_design write_diagnosis write_job write_map
+        explain explainable map_system new_project read_coupling read_project rebuild_report run_job run_project
+        verify_files write_certify write_coupling write_design write_diagnosis write_job write_map
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
@@ -74,7 +74,7 @@ SURFACE = {
         write_excitation write_job write_map
     """,
     "report": """
-        Bound Claim Evidence Figure Printed Reason Report Section Table UsableRange box_ranges current_limits
+        Bound Claim Evidence Figure Printed Reason Report Section Stage Table UsableRange box_ranges current_limits
         file_hash house_style is_unchanged load_curve measured_against_model read_content residuals_before_after
         rounded_down spectra_before_after versions write_content write_html write_json write_junit
     """,

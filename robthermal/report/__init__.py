@@ -16,7 +16,6 @@ from ._reasons import Verdict as Verdict
 from ._residuals import residuals_before_after as residuals_before_after
 from ._residuals import spectra_before_after as spectra_before_after
 from ._stages import Stage as Stage
-from ._stages import Status as Status
 from ._store import is_unchanged as is_unchanged
 from ._store import read_content as read_content
 from ._store import write_content as write_content
@@ -31,8 +30,7 @@ from ._usable import Parameters as Parameters
 from ._usable import UsableRange as UsableRange
 from ._usable import rounded_down as rounded_down
 
-__all__ = ["Bound", "Claim", "Evidence", "Figure", "Printed", "Reason", "Report", "Section", "Stage", "Status", "Table",
-           "UsableRange",
-           "box_ranges", "current_limits", "file_hash", "house_style", "is_unchanged", "load_curve",
+__all__ = ["Bound", "Claim", "Evidence", "Figure", "Printed", "Reason", "Report", "Section", "Stage", "Table",
+           "UsableRange", "box_ranges", "current_limits", "file_hash", "house_style", "is_unchanged", "load_curve",
            "measured_against_model", "read_content", "residuals_before_after", "rounded_down", "spectra_before_after",
            "versions", "write_content", "write_html", "write_json", "write_junit"]

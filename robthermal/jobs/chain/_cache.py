@@ -25,7 +25,7 @@ def read_cached(out: Path, stage: str) -> Finished | None:
     Parameters
     ----------
     out : Path
-        Results folder.
+        Results folder of the chain.
     stage : str
         Name of the stage.
     """
@@ -48,7 +48,7 @@ def still_there(out: Path, found: Finished) -> bool:
     Parameters
     ----------
     out : Path
-        Results folder.
+        Results folder of the chain.
     found : Finished
         Result of an earlier run.
     """
@@ -85,7 +85,7 @@ def commit(out: Path, stage: str, folder: Path, report: Report, key: str, second
     Parameters
     ----------
     out : Path
-        Results folder.
+        Results folder of the chain.
     stage : str
         Name of the stage.
     folder : Path
@@ -121,7 +121,7 @@ def forget(out: Path, stage: str) -> None:
     Parameters
     ----------
     out : Path
-        Results folder.
+        Results folder of the chain.
     stage : str
         Name of the stage.
     """
@@ -155,7 +155,7 @@ def drop_report(out: Path) -> None:
     Parameters
     ----------
     out : Path
-        Results folder.
+        Results folder of the chain.
     """
     for name in _WRITTEN_ANEW:
         (out / name).unlink(missing_ok=True)

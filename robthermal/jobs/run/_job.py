@@ -146,7 +146,7 @@ def doubted_claims(fit: Estimates | None, system: System, boxes: Boxes, progress
     fit : Estimates or None
         Calibration of the system; None if nothing was calibrated.
     system : System
-        Calibrated system.
+        Calibrated system of the claims.
     boxes : Boxes
         Ranges of the claims.
     progress : callable, optional
