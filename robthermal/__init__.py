@@ -31,6 +31,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import project as project
     from . import report as report
     from . import signals as signals
+    from . import synthesis as synthesis
     from . import systems as systems
     from . import thermal as thermal
     from . import verification as verification
@@ -48,7 +49,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verification import verify as verify
 
 _PACKAGES = ("calibration", "certify", "coupling", "design", "diagnosis", "errors", "identify", "jobs", "report",
-             "signals", "systems", "thermal", "verification")
+             "signals", "synthesis", "systems", "thermal", "verification")
 _FORMER = ("project",)  # names of the version before: `rt.project` is now `rt.jobs` and the packages inside
 
 _HOME = {  # public name: the package it lives in

@@ -30,6 +30,7 @@ CODES = {
     "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
     "jobs": "-circles_left_out -frf_without_covariance",
     "signals": "+designed -not_lower +resolved -undetermined -unresolved",
+    "synthesis": "+certified -infeasible -not_certified -not_found",
     "thermal": "+agrees +closed -disagrees +found -none -not_reducible +reduced +rounded +unchecked",
 }
 

@@ -61,7 +61,27 @@ def closed_loop(plant: Any, controller: Any, *, measure: str = "hinf", bound: fl
     >>> cert.holds, rt.certify.closed_loop(P, control.ss([], [], [], [[-2.5]]), bound=0.5).holds
     (True, False)
     """
-    P, K = read_plant(plant, "argument plant"), read_plant(controller, "argument controller")
+    return prove_closed_loop(read_plant(plant, "argument plant"), read_plant(controller, "argument controller"),
+                             measure=measure, bound=bound, rate=rate, poles=poles, channels=channels)
+
+
+def prove_closed_loop(P: Plant, K: Plant, *, measure: str = "hinf", bound: float | None = None, rate: float = 0.0,
+                      poles: Mapping[str, float] | None = None,
+                      channels: tuple[Sequence[int], Sequence[int]] | None = None,
+                      norm: float | None = None) -> Certificate:
+    """The same as `closed_loop`, of arrays.
+
+    Parameters
+    ----------
+    P : Plant
+        Generalized plant, controls and measurements last.
+    K : Plant
+        Controller, from measurements to controls.
+    measure, bound, rate, poles, channels
+        What is proven, as in `closed_loop`.
+    norm : float, optional
+        H-infinity norm of the loop in floats, where it is known already.
+    """
     if measure not in _MEASURES:
         raise InputError(f"measure = {measure!r}", where="argument measure", expected=f"one of {list(_MEASURES)}")
     loop = close(P, K)
@@ -77,7 +97,7 @@ def closed_loop(plant: Any, controller: Any, *, measure: str = "hinf", bound: fl
         region["bound"] = float(bound) if bound is not None else _estimate(loop, measure) * (1 + _SLACK)
     system = {"plant": _matrices(P), "controller": _matrices(K), "n_meas": len(K.B.T), "n_ctrl": len(K.C),
               "sample_time": P.dt}
-    candidates = _evidence(loop, region)
+    candidates = _evidence(loop, region, norm)
     cert = _try(system, region, next(candidates))
     for candidate in candidates:
         if cert.holds:
@@ -162,7 +182,7 @@ def _estimate(loop: Plant, measure: str) -> float:
     return found if 0 < found < np.inf else 1.0
 
 
-def _evidence(loop: Plant, region: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str]]:
+def _evidence(loop: Plant, region: Mapping[str, Any], norm: float | None) -> Iterator[tuple[dict[str, Any], str]]:
     """Candidates in turn, each with how it was found; at least one."""
     measure = region["measure"]
     if measure == "stability":
@@ -171,7 +191,7 @@ def _evidence(loop: Plant, region: Mapping[str, Any]) -> Iterator[tuple[dict[str
             yield {"method": "lyapunov", "matrix": matrix}, "scipy Lyapunov equation"
         yield {"method": "polynomial"}, "none"
     elif measure == "hinf":
-        yield from _bounded_real(loop, region["bound"])
+        yield from _bounded_real(loop, region["bound"], norm)
         yield {"method": "polynomial"}, "none"
     elif measure == "h2":
         for floor in _FLOORS:
@@ -186,10 +206,10 @@ def _evidence(loop: Plant, region: Mapping[str, Any]) -> Iterator[tuple[dict[str
         yield {"method": "lyapunov", "matrix": _modal(loop.A)}, "eigenvectors"
 
 
-def _bounded_real(loop: Plant, bound: float) -> Iterator[tuple[dict[str, Any], str]]:
+def _bounded_real(loop: Plant, bound: float, norm: float | None) -> Iterator[tuple[dict[str, Any], str]]:
     if not loop.stable or not len(loop.A):
         return
-    norm = plant_norm(loop)[0]
+    norm = plant_norm(loop)[0] if norm is None else norm
     if norm >= bound:
         return
     for shift in SHIFTS:

@@ -12,7 +12,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InputError
-from ._response import largest, responder
+from ._response import modes, responder
 from ._systems import Plant, read_plant
 
 _STEP = 1e-6  # relative: levels this close to the largest value are not searched
@@ -57,22 +57,21 @@ def plant_norm(plant: Plant) -> tuple[float, float]:
     """The same for arrays that are known to be stable."""
     response = responder(plant)
 
-    def size(found: Array, which: Array) -> Array:
-        return np.linalg.norm(found, 2, axis=(1, 2))
+    def size(omega: Array) -> Array:
+        return np.linalg.norm(response(omega), 2, axis=(1, 2))
 
-    tops, places = largest(plant, np.array([0.0, plant.end]), size)
-    top, place = float(tops[0]), float(places[0])
-    for omega in (0.0, plant.end):
-        value = float(size(response(np.array([omega])), np.zeros(1))[0])
-        if value > top:
-            top, place = value, omega
+    at, width = modes(plant)
+    start = np.concatenate([[0.0, plant.end], at, np.hypot(at, width)])
+    start = np.unique(start[start <= plant.end])
+    values = size(start)
+    top, place = float(values.max()), float(start[values.argmax()])
     for _ in range(_ROUNDS):
         crossings = _crossings(plant, (1 + _STEP) * top)
         if len(crossings) == 0:
             break
         # every interval above the level lies between two neighbors
         points = np.unique(np.concatenate([crossings, (crossings[1:] + crossings[:-1]) / 2]))
-        values = size(response(points), np.zeros(len(points)))
+        values = size(points)
         if values.max() <= (1 + _STEP / 10) * top:
             break
         top, place = float(values.max()), float(points[values.argmax()])

@@ -11,11 +11,12 @@ from ...diagnosis import DiagnosisCode
 from ...errors import OutcomeCode
 from ...identify import IdentifyCode
 from ...signals import SignalsCode
+from ...synthesis import SynthesisCode
 from ...thermal import ThermalCode
 from .._outcomes import JobsCode
 
 _ENUMS: tuple[type[OutcomeCode], ...] = (SignalsCode, IdentifyCode, ThermalCode, CalibrationCode, CertifyCode,
-                                         CouplingCode, DesignCode, DiagnosisCode, FleetCode, JobsCode)
+                                         CouplingCode, SynthesisCode, DesignCode, DiagnosisCode, FleetCode, JobsCode)
 
 
 def outcome_codes() -> dict[str, tuple[OutcomeCode, ...]]:

@@ -1,0 +1,11 @@
+"""Controllers by convex programs and Riccati equations, each with a proof of what it reaches.
+
+For any linear plant; thermal front ends are in `robthermal.design`, which also re-exports what is here.
+"""
+
+from ._design import Design as Design
+from ._design import RobustAgainst as RobustAgainst
+from ._hinf import hinf as hinf
+from ._outcomes import SynthesisCode as SynthesisCode
+
+__all__ = ["Design", "RobustAgainst", "SynthesisCode", "hinf"]

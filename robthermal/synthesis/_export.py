@@ -1,0 +1,118 @@
+"""Designs for other programs: a state-space controller in C99, MATLAB or JSON, and its certificates beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import Array
+from .._write import write
+from ..errors import InputError
+from ..export import Program, comment, identifier, json_bytes, number, plain, write_export
+from ..linear import Plant, read_plant
+
+if TYPE_CHECKING:
+    from ._design import Design
+
+FORMAT = "robthermal-design/1"
+_TEST_SAMPLES = 64
+
+_ABOUT = """\
+Controller u = K y, {n} states, sample time {h:.17g} s. In every sample:
+
+    {p}_step(&state, y, u);     u from the measurements of this sample, then the next state
+
+Measurements: {y}. Controls: {u}. The state starts at zero."""
+
+_BODY = """\
+typedef struct {{
+    double x[{states}];
+}} {p}_state;
+
+static inline void {p}_step({p}_state *s, const double y[{n_y}], double u[{n_u}])
+{{
+    double next[{states}] = {{0}};
+{output}
+{state}
+    for (int k = 0; k < {states}; k++)
+        s->x[k] = next[k];
+}}
+"""
+
+
+def export_design(design: Design, path: str | Path, name: str) -> None:
+    """Write one file, or a folder with all of them."""
+    K = read_plant(design.controller)
+    if Path(path).suffix:
+        write_export(path, lambda: document(design, name), lambda: program(design, K, name))
+        return
+    folder = Path(path)
+    try:
+        (folder / "certificates").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder: {error.strerror}", where=ascii(str(folder))) from None
+    write(folder / "design.json", json_bytes(plain(document(design, name))))
+    for k, certificate in enumerate(design.certificates):
+        measure = certificate.region.get("measure", certificate.kind)
+        certificate.save(folder / "certificates" / f"{k + 1}_{measure}.json")
+    if K.dt:
+        for suffix in (".c", ".h"):
+            write(folder / f"controller{suffix}", program(design, K, name).text().encode("ascii"))
+
+
+def document(design: Design, name: str) -> dict[str, Any]:
+    """Content of design.json."""
+    K = design.controller
+    return {"format": FORMAT, "name": name, "method": design.method, "solver": design.solver,
+            "controller": {"A": K.A, "B": K.B, "C": K.C, "D": K.D, "sample_time": float(K.dt or 0.0),
+                           "inputs": list(K.input_labels), "outputs": list(K.output_labels)},
+            "value": design.value, "lower": design.lower, "margins": design.margins,
+            "robust_against": {"text": design.robust_against.text, **design.robust_against.data},
+            "outcome": {"ok": design.outcome.ok, "code": design.outcome.code, "text": design.outcome.text}}
+
+
+def program(design: Design, K: Plant, name: str) -> Program:
+    """C source of a sampled controller, the doubles of the certificate."""
+    if not K.dt:
+        raise InputError("C source of a continuous controller", where="argument path",
+                         expected="a sampled controller, or the ending .json or .mat",
+                         remedy="Design it with sample_time=.")
+    p, n, (n_u, n_y) = identifier(name, "controller"), len(K.A), K.D.shape
+    given = [*(f"s->x[{k}]" for k in range(n)), *(f"y[{k}]" for k in range(n_y))]
+    body = _BODY.format(p=p, states=max(n, 1), n_y=n_y, n_u=n_u, output=_sums("u", np.hstack([K.C, K.D]), given),
+                        state=_sums("next", np.hstack([K.A, K.B]), given))
+    labels = design.controller
+    about = _ABOUT.format(p=p, n=n, h=K.dt, y=comment(", ".join(labels.input_labels)),
+                          u=comment(", ".join(labels.output_labels)))
+    call = f"        {p}_step(&state, in, out);"
+    return Program(p, "CONTROLLER_TEST", about, body, list(_vector(K)), n_y, f"    {p}_state state = {{{{0}}}};", call)
+
+
+def _sums(target: str, matrix: Array, names: Sequence[str]) -> str:
+    """One assignment per row, summed from the left."""
+    lines = []
+    for i, row in enumerate(matrix):
+        terms = [f"{number(a)} * {name}" for a, name in zip(row, names, strict=True) if a != 0]
+        lines.append(f"    {target}[{i}] = " + ("\n        + ".join(terms) or "0.0") + ";")
+    return "\n".join(lines)
+
+
+def _vector(K: Plant) -> Iterator[list[float]]:
+    """Measurements, and the controls that follow, summed in the order of the source."""
+    rng, x = np.random.default_rng(0), [0.0] * len(K.A)
+    for _ in range(_TEST_SAMPLES):
+        y = rng.standard_normal(K.D.shape[1]).tolist()
+        u = [_dot(row, [*x, *y]) for row in np.hstack([K.C, K.D])]
+        x = [_dot(row, [*x, *y]) for row in np.hstack([K.A, K.B])]
+        yield [*y, *u]
+
+
+def _dot(row: Array, values: Sequence[float]) -> float:
+    total = None
+    for a, value in zip(row.tolist(), values, strict=True):
+        if a != 0:
+            total = a * value if total is None else total + a * value
+    return 0.0 if total is None else total

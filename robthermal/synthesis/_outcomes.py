@@ -1,0 +1,20 @@
+"""How the synthesis of a controller may end."""
+
+from __future__ import annotations
+
+from enum import unique
+
+from ..errors import OutcomeCode
+
+
+@unique
+class SynthesisCode(OutcomeCode):
+    """Codes of the outcomes of `robthermal.synthesis`."""
+
+    CERTIFIED = (True, "Certified for the numbers of the controller as returned.")
+    INFEASIBLE = (False, "No controller reaches what was asked for; the text says what is reached.",
+                  "Ask for less, or add controls or sensors.")
+    NOT_CERTIFIED = (False, "A controller was computed, but what it reaches is not proven.",
+                     "Scale the plant, ask for a tolerance of 0.05, or simplify the weights.")
+    NOT_FOUND = (False, "No stabilizing controller was found in any precision.",
+                 "Scale the plant, and check weights with poles at or near the boundary of stability.")
