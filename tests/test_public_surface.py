@@ -15,7 +15,7 @@ SURFACE = {
         Certificate Diverged FleetRun InputError Outcome Record System Verdict __version__ calibrate calibration
         certify coupling design diagnose diagnosis errors fleet identify jobs project read_record read_records
         read_system report
-        signals systems thermal verification verify
+        signals synthesis systems thermal verification verify
     """,
     "calibration": """
         CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseFit Score VaryingModel Whiteness calibrate
@@ -34,13 +34,13 @@ SURFACE = {
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """
-        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DesignCode
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput Design DesignCode
         DisturbanceObserver
         Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
-        MatrixController ObserverModel PID Placement Polarity Reach Reachable RegulatedPoint Seen StateFeedback
-        StepResponseLinearity
+        MatrixController ObserverModel PID Placement Polarity Reach Reachable RegulatedPoint RobustAgainst Seen
+        StateFeedback StepResponseLinearity
         certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
-        feedback_linearization linear_controller load_controller loop_poles observer pid place_sensors reachable
+        feedback_linearization hinf linear_controller load_controller loop_poles observer pid place_sensors reachable
         regulated_points simulate_loop state_feedback step_response_linearity unobservable
     """,
     "diagnosis": """
@@ -83,6 +83,9 @@ SURFACE = {
         SignalsCode celsius_to_kelvin crest_factor declared design_check find_glitches
         inspect_file kelvin_to_celsius median_filter multisine multisines noise
         options_from_text prbs read_record read_records save_records staircase
+    """,
+    "synthesis": """
+        Design RobustAgainst SynthesisCode hinf
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

@@ -1,5 +1,8 @@
-"""Controllers and observers for systems with thermoelectric modules."""
+"""Controllers and observers for systems with thermoelectric modules; syntheses for any linear plant."""
 
+from ..synthesis import Design as Design
+from ..synthesis import RobustAgainst as RobustAgainst
+from ..synthesis import hinf as hinf
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
 from ._constant_gain import ConstantGain as ConstantGain
@@ -53,10 +56,10 @@ Seen = ControllerInput
 collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "ControllerInput", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter", "FeedForward",
-           "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController",
-           "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen",
-           "StateFeedback", "StepResponseLinearity", "certify_loop", "check_polarity", "cold_side", "collapse",
-           "constant_gain", "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization",
+           "ControllerInput", "Design", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
+           "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController",
+           "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "RegulatedPoint", "RobustAgainst",
+           "Seen", "StateFeedback", "StepResponseLinearity", "certify_loop", "check_polarity", "cold_side", "collapse",
+           "constant_gain", "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "hinf",
            "linear_controller", "load_controller", "loop_poles", "observer", "pid", "place_sensors", "reachable",
            "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "unobservable"]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -115,7 +115,8 @@ class Balls:
         for k in range(rows):
             for _ in range(2):
                 Q[:, k] = Q[:, k] - Q[:, :k] @ (Q[:, :k].T @ Q[:, k]) if k else Q[:, k]
-                Q[:, k] = Q[:, k] / (Q[:, k] @ Q[:, k]).sqrt()
+                length: Any = Q[:, k] @ Q[:, k]
+                Q[:, k] = Q[:, k] / length.sqrt()
             Q[:, k] = _middles(Q[:, k])
         return Q, Q[:, :columns].T @ matrix
 

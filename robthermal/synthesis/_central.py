@@ -147,7 +147,8 @@ def controller(plant: Regular, found: Solutions, arithmetic: Arithmetic) -> Plan
     C1h = F2 + scaled @ C2h
     A = plant.A + B @ F + B1h @ arithmetic.inv(D21h) @ C2h
     parts = A, B1h @ plant.to_y, plant.from_u @ C1h, plant.from_u @ D11h @ plant.to_y
-    return _with_direct_path(Plant(*(floats(part) for part in parts), 0.0), plant.D22)
+    A, B, C, D = (floats(part) for part in parts)
+    return _with_direct_path(Plant(A, B, C, D, 0.0), plant.D22)
 
 
 def _root(matrix: Array) -> Array:

@@ -102,17 +102,20 @@ def _sums(target: str, matrix: Array, names: Sequence[str]) -> str:
 
 def _vector(K: Plant) -> Iterator[list[float]]:
     """Measurements, and the controls that follow, summed in the order of the source."""
-    rng, x = np.random.default_rng(0), [0.0] * len(K.A)
+    rng = np.random.default_rng(0)
+    x: list[float] = [0.0] * len(K.A)
+    output: list[list[float]] = np.hstack([K.C, K.D]).tolist()
+    state: list[list[float]] = np.hstack([K.A, K.B]).tolist()
     for _ in range(_TEST_SAMPLES):
-        y = rng.standard_normal(K.D.shape[1]).tolist()
-        u = [_dot(row, [*x, *y]) for row in np.hstack([K.C, K.D])]
-        x = [_dot(row, [*x, *y]) for row in np.hstack([K.A, K.B])]
-        yield [*y, *u]
+        y = [float(value) for value in rng.standard_normal(K.D.shape[1])]
+        both = [*x, *y]
+        yield [*y, *(_dot(row, both) for row in output)]
+        x = [_dot(row, both) for row in state]
 
 
-def _dot(row: Array, values: Sequence[float]) -> float:
+def _dot(row: Sequence[float], values: Sequence[float]) -> float:
     total = None
-    for a, value in zip(row.tolist(), values, strict=True):
+    for a, value in zip(row, values, strict=True):
         if a != 0:
             total = a * value if total is None else total + a * value
     return 0.0 if total is None else total

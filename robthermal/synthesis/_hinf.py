@@ -58,8 +58,8 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
         Numbers of measurements y and of controls u.
     gamma : float, optional
         Norm that is enough [output unit per input unit]; the controller is then made for it, not for the optimum.
-    method : {"auto", "riccati", "reference"}
-        Riccati equations, or the matrix inequalities of Gahinet and Apkarian with cvxpy, slow and for comparison.
+    method : {"auto", "riccati"}
+        Both are the Riccati equations.
     tolerance : float
         Allowed excess of the proven value over the optimum, relative [-].
     region : mapping, optional
@@ -87,18 +87,18 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     References
     ----------
     Glover and Doyle, Systems & Control Letters 11 (1988); Zhou, Doyle and Glover, Robust and Optimal Control (1996),
-    theorem 17.1; Gahinet and Apkarian, Int. J. Robust Nonlinear Control 4 (1994).
+    theorem 17.1.
 
     Examples
     --------
     >>> import control, robthermal as rt
     >>> P = control.ss([[1.0]], [[1, 0, 1]], [[1], [0], [1]], [[0, 0, 0], [0, 0, 1], [0, 1, 0]])  # x' = x + w1 + u
-    >>> d = rt.design.hinf(P, 1, 1)  # optimum 1 + √2, from x² - 2 x - 1 = 0
-    >>> d.holds, 2.4142 <= d.value <= 2.4142 * 1.005, rt.verify(d.certificates[0]).valid
+    >>> d = rt.design.hinf(P, 1, 1)  # optimum 1 + √3, from g² - 2 g - 2 = 0
+    >>> d.holds, 2.732 <= d.value <= 2.733 * 1.005, rt.verify(d.certificates[0]).valid
     (True, True, True)
     """
     start = time.perf_counter()
-    choice("method", method, ("auto", "riccati", "reference"))
+    choice("method", method, ("auto", "riccati"))
     tolerance = positive_number(tolerance, "tolerance")
     asked = None if gamma is None else positive_number(gamma, "gamma")
     plant = sampled(read_generalized(P, n_meas, n_ctrl), sample_time)
@@ -108,10 +108,17 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     best, lower = best_of(plant, tolerance, asked, poles, max_gain)
     found = _finished(plant, best, order, poles)
     if found is None:
-        code = SynthesisCode.NOT_FOUND if best is None else SynthesisCode.NOT_CERTIFIED
-        return _design(P, plant, None, [], code.outcome(), lower, start, best)
+        return _design(P, plant, None, [], _nothing(best, max_gain), lower, start, best)
     K, certificates = found
     return _design(P, plant, K, certificates, _judge(certificates, asked, lower, poles), lower, start, best)
+
+
+def _nothing(best: Reached | None, max_gain: float | None) -> Outcome:
+    """Why there is no controller."""
+    if best is None and max_gain is not None:
+        return SynthesisCode.INFEASIBLE.outcome(f"max_gain = {max_gain:g}: every controller that was made for up to "
+                                                "ten times the optimum has a larger gain.")
+    return (SynthesisCode.NOT_FOUND if best is None else SynthesisCode.NOT_CERTIFIED).outcome()
 
 
 def best_of(plant: GeneralizedPlant, tolerance: float, asked: float | None, poles: Mapping[str, float],
@@ -140,7 +147,7 @@ def _reach(plant: GeneralizedPlant, work: GeneralizedPlant, side: float, toleran
            poles: Mapping[str, float], max_gain: float | None, size: float) -> Reached | None:
     """First candidate whose proven value is good enough, else the best of all."""
     best: Reached | None = None
-    for candidate in candidates(work, tolerance, asked):
+    for candidate in candidates(work, tolerance, asked, limited=max_gain is not None):
         if best is not None and best.value <= candidate.level:
             continue  # what it was made for is reached already
         K = _of_plant(candidate.controller, plant, side, poles)

@@ -21,6 +21,7 @@ _MOST = 80  # bisections
 _MOST_CHECKED = 40  # states of a plant whose optimum in floats is confirmed in balls
 _SPAN = 1e-9  # of the H2 controller's norm: below it the optimum counts as zero
 _PRECISIONS: tuple[Floats | Balls, ...] = (Floats(), Balls(192), Balls(448))
+_FURTHER = (1.5, 2.0, 3.0, 5.0, 10.0)  # times the optimum, in search of a smaller gain
 _BACK_OFF = (0.6, 2.0, 6.0, 20.0, 60.0)  # of the tolerance, above the optimum
 
 
@@ -35,18 +36,21 @@ class Candidate:
     iterations: int
 
 
-def candidates(plant: GeneralizedPlant, tolerance: float, asked: float | None = None) -> Iterator[Candidate]:
+def candidates(plant: GeneralizedPlant, tolerance: float, asked: float | None = None,
+               limited: bool = False) -> Iterator[Candidate]:
     """Controllers of a continuous plant with D12, D21 of full rank, best first, in floats and then in balls.
 
     The caller proves what they reach, and stops when that is good enough. Nothing comes where no precision finds one.
+    With `limited` they go on to ten times the optimum: their gains fall.
     """
     plant = balanced(plant)
     for arithmetic in _PRECISIONS:
         with arithmetic.working() if isinstance(arithmetic, Balls) else nullcontext():
-            yield from _in(plant, arithmetic, tolerance, asked)
+            yield from _in(plant, arithmetic, tolerance, asked, _FURTHER if limited else ())
 
 
-def _in(plant: GeneralizedPlant, arithmetic: Arithmetic, tolerance: float, asked: float | None) -> Iterator[Candidate]:
+def _in(plant: GeneralizedPlant, arithmetic: Arithmetic, tolerance: float, asked: float | None,
+        further: tuple[float, ...]) -> Iterator[Candidate]:
     name = f"{arithmetic.bits} bit" if isinstance(arithmetic, Balls) else "floats"
     try:
         own = regular(plant, arithmetic)
@@ -58,8 +62,10 @@ def _in(plant: GeneralizedPlant, arithmetic: Arithmetic, tolerance: float, asked
             return
     except np.linalg.LinAlgError:
         return
-    above = [optimum * (1 + factor * tolerance) for factor in _BACK_OFF]
-    levels = above if asked is None else [asked, *(level for level in reversed(above) if level < asked)]
+    above = [*(optimum * (1 + factor * tolerance) for factor in _BACK_OFF), *(optimum * factor for factor in further)]
+    levels = above
+    if asked is not None and asked > optimum:
+        levels = [asked, *(level for level in reversed(above) if level < asked)]
     for level in levels:
         made = _made(own, level, arithmetic)
         if made is not None:

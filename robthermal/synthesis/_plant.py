@@ -81,7 +81,8 @@ def hidden_mode(A: Array, B: Array, dt: float) -> complex | None:
     if n == 0:
         return None
     values, size = np.linalg.eigvals(A), max(np.linalg.norm(A, 2), np.linalg.norm(B, 2), 1e-300)
-    edge = 1e-9 * max(1.0 if dt else 0.0, float(abs(values).max()))
+    sizes: Array = abs(values)
+    edge = 1e-9 * (1.0 if dt else float(sizes.max()))
     for value in values[(abs(values) >= 1 - edge) if dt else (values.real >= -edge)]:
         gap = np.linalg.svd(np.hstack([A - value * np.eye(n), B]), compute_uv=False)[n - 1]
         if gap < _HIDDEN * size:

@@ -64,22 +64,22 @@ def _zero_on_axis(A: Array, B: Array, C: Array, D: Array) -> bool:
     feedback = np.linalg.solve(R[:k], Q[:, :k].T @ C)
     own, seen = A - B @ feedback, Q[:, k:].T @ C
     values = np.linalg.eigvals(own)
-    scale = max(float(abs(values).max()), 1e-300)
-    for value in values[abs(values.real) <= _AXIS * np.maximum(abs(values), 1e-3 * scale)]:
+    sizes: Array = abs(values)
+    for value in values[abs(values.real) <= _AXIS * np.maximum(sizes, 1e-3 * float(sizes.max()))]:
         gap = np.linalg.svd(np.vstack([own - 1j * value.imag * np.eye(n), seen]), compute_uv=False)[-1]
-        if gap <= _AXIS * max(np.linalg.norm(own, 2), 1e-300):
+        if gap <= _AXIS * max(float(np.linalg.norm(own, 2)), 1e-300):
             return True
     return False
 
 
 def _typical(A: Array, B: Array, C: Array, D: Array) -> Array:
     """Size of what every input does to the outputs, at frequencies between the slowest and the fastest mode."""
-    modes = abs(np.linalg.eigvals(A)) if len(A) else np.ones(1)
-    modes = modes[modes > 1e-9 * max(float(modes.max()), 1e-300)]
+    modes: Array = abs(np.linalg.eigvals(A)) if len(A) else np.ones(1)
+    modes = modes[modes > 1e-9 * float(modes.max())]
     middle = float(np.exp(np.log(modes).mean())) if len(modes) else 1.0
     omega = middle * np.geomspace(0.1, 10, 7)
     size = np.linalg.norm(responder(Plant(A, B, C, D, 0.0))(omega * 1.0001), axis=1).max(axis=0)
-    top = float(size.max()) or 1.0
+    top = float(size.max()) if size.any() else 1.0
     return np.maximum(size, 1e-3 * top)
 
 
