@@ -107,7 +107,7 @@ def _vector(K: Plant) -> Iterator[list[float]]:
     output: list[list[float]] = np.hstack([K.C, K.D]).tolist()
     state: list[list[float]] = np.hstack([K.A, K.B]).tolist()
     for _ in range(_TEST_SAMPLES):
-        y = [float(value) for value in rng.standard_normal(K.D.shape[1])]
+        y = [float(value) for value in rng.standard_normal((K.D.shape[1],))]
         both = [*x, *y]
         yield [*y, *(_dot(row, both) for row in output)]
         x = [_dot(row, both) for row in state]

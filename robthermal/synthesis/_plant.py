@@ -80,7 +80,7 @@ def hidden_mode(A: Array, B: Array, dt: float) -> complex | None:
     n = len(A)
     if n == 0:
         return None
-    values, size = np.linalg.eigvals(A), max(np.linalg.norm(A, 2), np.linalg.norm(B, 2), 1e-300)
+    values, size = np.linalg.eigvals(A), float(np.linalg.norm(np.hstack([A, B]), 2))
     sizes: Array = abs(values)
     edge = 1e-9 * (1.0 if dt else float(sizes.max()))
     for value in values[(abs(values) >= 1 - edge) if dt else (values.real >= -edge)]:
