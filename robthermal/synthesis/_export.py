@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import control
 import numpy as np
 
 from .._arrays import Array
@@ -13,9 +14,7 @@ from .._write import write
 from ..errors import InputError
 from ..export import Program, comment, identifier, json_bytes, number, plain, write_export
 from ..linear import Plant, read_plant
-
-if TYPE_CHECKING:
-    from ._design import Design
+from ..verification import Certificate
 
 FORMAT = "robthermal-design/1"
 _TEST_SAMPLES = 64
@@ -43,39 +42,37 @@ static inline void {p}_step({p}_state *s, const double y[{n_y}], double u[{n_u}]
 """
 
 
-def export_design(design: Design, path: str | Path, name: str) -> None:
-    """Write one file, or a folder with all of them."""
-    K = read_plant(design.controller)
+def export_design(controller: control.StateSpace, facts: Mapping[str, Any], certificates: Sequence[Certificate],
+                  path: str | Path, name: str) -> None:
+    """Write one file, or a folder with all of them; `facts`: what design.json says beside the controller."""
+    content = document(controller, name) | dict(facts)
     if Path(path).suffix:
-        write_export(path, lambda: document(design, name), lambda: program(design, K, name))
+        write_export(path, lambda: content, lambda: program(controller, name))
         return
     folder = Path(path)
     try:
         (folder / "certificates").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make the folder: {error.strerror}", where=ascii(str(folder))) from None
-    write(folder / "design.json", json_bytes(plain(document(design, name))))
-    for k, certificate in enumerate(design.certificates):
+    write(folder / "design.json", json_bytes(plain(content)))
+    for k, certificate in enumerate(certificates):
         measure = certificate.region.get("measure", certificate.kind)
         certificate.save(folder / "certificates" / f"{k + 1}_{measure}.json")
-    if K.dt:
+    if controller.dt:
         for suffix in (".c", ".h"):
-            write(folder / f"controller{suffix}", program(design, K, name).text().encode("ascii"))
+            write(folder / f"controller{suffix}", program(controller, name).text().encode("ascii"))
 
 
-def document(design: Design, name: str) -> dict[str, Any]:
-    """Content of design.json."""
-    K = design.controller
-    return {"format": FORMAT, "name": name, "method": design.method, "solver": design.solver,
+def document(K: control.StateSpace, name: str) -> dict[str, Any]:
+    """Start of design.json: the controller."""
+    return {"format": FORMAT, "name": name,
             "controller": {"A": K.A, "B": K.B, "C": K.C, "D": K.D, "sample_time": float(K.dt or 0.0),
-                           "inputs": list(K.input_labels), "outputs": list(K.output_labels)},
-            "value": design.value, "lower": design.lower, "margins": design.margins,
-            "robust_against": {"text": design.robust_against.text, **design.robust_against.data},
-            "outcome": {"ok": design.outcome.ok, "code": design.outcome.code, "text": design.outcome.text}}
+                           "inputs": list(K.input_labels), "outputs": list(K.output_labels)}}
 
 
-def program(design: Design, K: Plant, name: str) -> Program:
+def program(controller: control.StateSpace, name: str) -> Program:
     """C source of a sampled controller, the doubles of the certificate."""
+    K = read_plant(controller)
     if not K.dt:
         raise InputError("C source of a continuous controller", where="argument path",
                          expected="a sampled controller, or the ending .json or .mat",
@@ -84,9 +81,8 @@ def program(design: Design, K: Plant, name: str) -> Program:
     given = [*(f"s->x[{k}]" for k in range(n)), *(f"y[{k}]" for k in range(n_y))]
     body = _BODY.format(p=p, states=max(n, 1), n_y=n_y, n_u=n_u, output=_sums("u", np.hstack([K.C, K.D]), given),
                         state=_sums("next", np.hstack([K.A, K.B]), given))
-    labels = design.controller
-    about = _ABOUT.format(p=p, n=n, h=K.dt, y=comment(", ".join(labels.input_labels)),
-                          u=comment(", ".join(labels.output_labels)))
+    about = _ABOUT.format(p=p, n=n, h=K.dt, y=comment(", ".join(controller.input_labels)),
+                          u=comment(", ".join(controller.output_labels)))
     call = f"        {p}_step(&state, in, out);"
     return Program(p, "CONTROLLER_TEST", about, body, list(_vector(K)), n_y, f"    {p}_state state = {{{{0}}}};", call)
 
