@@ -18,8 +18,8 @@ SURFACE = {
         signals synthesis systems thermal verification verify
     """,
     "calibration": """
-        CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseFit Score VaryingModel Whiteness calibrate
-        convection_law join_models module_properties
+        CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseComparison Score VaryingModel Whiteness
+        calibrate convection_law join_models module_properties
     """,
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent

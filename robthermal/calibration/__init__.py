@@ -1,4 +1,4 @@
-"""Parameters of a thermal system from measured records or frequency responses, and what the data do not determine."""
+"""Parameters of a thermal system from records, frequency responses or both, and what the data do not determine."""
 
 from ._calibrate import calibrate as calibrate
 from ._convection import ConvectionLaw as ConvectionLaw
@@ -8,11 +8,11 @@ from ._fit import Fit as Fit
 from ._module_properties import ModuleProperties as ModuleProperties
 from ._module_properties import module_properties as module_properties
 from ._outcomes import CalibrationCode as CalibrationCode
-from ._response_fit import ResponseFit as ResponseFit
+from ._response_comparison import ResponseComparison as ResponseComparison
 from ._score import Score as Score
 from ._varying import VaryingModel as VaryingModel
 from ._varying import join_models as join_models
 from ._whiteness import Whiteness as Whiteness
 
-__all__ = ["CalibrationCode", "ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseFit", "Score",
-           "VaryingModel", "Whiteness", "calibrate", "convection_law", "join_models", "module_properties"]
+__all__ = ["CalibrationCode", "ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseComparison",
+           "Score", "VaryingModel", "Whiteness", "calibrate", "convection_law", "join_models", "module_properties"]

@@ -1,10 +1,10 @@
-"""`calibrate`: parameters from records by output-error least squares."""
+"""`calibrate`: parameters from records and frequency responses by weighted least squares."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, overload
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -13,13 +13,12 @@ from threadpoolctl import threadpool_limits
 from .._arrays import Floats
 from ..errors import Diverged, InputError
 from ..fitting import (
-    LOSSES,
-    STARTS,
     Choice,
     Data,
     Loss,
+    Measured,
+    MeasuredResponse,
     Problem,
-    Ranges,
     Start,
     Weigh,
     as_data,
@@ -28,71 +27,67 @@ from ..fitting import (
     estimated_noise,
     free_run,
     initial_of,
+    measured_of,
+    measured_response,
     refuse_same,
     refuse_short,
     scaled,
     scipy_loss,
     smallest_noise,
 )
-from ..identify import FrequencyResponse
-from ..signals import Record
 from ..thermal import System
-from ._covariance import information
 from ._directions import in_words, named, weights
 from ._estimates import outcome_of
 from ._fit import Fit
 from ._innovations import has_disturbance, whitener
+from ._joint import JointProblem
 from ._outcomes import CalibrationCode
-from ._response_fit import ResponseFit, calibrate_response
+from ._refusals import (
+    check_options,
+    refuse_double_start,
+    refuse_idle,
+    refuse_idle_options,
+    refuse_same_response,
+    refuse_unknown_noise,
+)
+from ._response_comparison import comparison_of
+from ._response_model import ResponseProblem
 from ._score import score_of
 from ._whiteness import whiteness_of
 
 Method = Literal["output_error", "prediction_error"]
-METHODS = ("output_error", "prediction_error")
 _ROUNDS = 8  # of noise estimation
 _SETTLED = 0.01  # relative change of the noise levels
 _STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
 
 
-@overload
-def calibrate(system: System, data: FrequencyResponse, *, parameters: Choice = None, max_iterations: int = 50,
-              operating_point: Mapping[str, float] | None = None) -> ResponseFit: ...
-
-
-@overload
-def calibrate(system: System, data: Record | Sequence[Record], *, parameters: Choice = None,
-              validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
-              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
-              method: Method = "output_error") -> Fit: ...
-
-
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
-def calibrate(system: System, data: Record | Sequence[Record] | FrequencyResponse, *, parameters: Choice = None,
-              validation: Record | Sequence[Record] | None = None, initial: Start = "free", loss: Loss = "linear",
-              noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
-              method: Method = "output_error",
-              operating_point: Mapping[str, float] | None = None) -> Fit | ResponseFit:
-    """Estimate parameters of a system from records (exact derivatives) or a frequency response: least squares.
+def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters: Choice = None,
+              validation: Measured | Sequence[Measured] | None = None, initial: Start = "free",
+              loss: Loss = "linear", noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
+              method: Method = "output_error", operating_point: Mapping[str, float] | None = None) -> Fit:
+    """Estimate parameters of a system from records, frequency responses or both: one weighted least squares.
 
     Parameters
     ----------
     system : System
         With starting values.
-    data : Record, list of Record, or FrequencyResponse
-        Measured. Several records share the parameters; each has its own initial temperatures. To a frequency response
-        the linearization is fitted, weighted by its covariance, Evers (2.12); then only `parameters`, `max_iterations`
-        and `operating_point` apply.
+    data : Record, FrequencyResponse, or list of them
+        Measured; all share the parameters. Every record has its own initial temperatures. To a frequency response the
+        linearization is fitted, weighted by its covariance, Evers (2.12). Give a response of other experiments than the
+        records: the same readings would count twice.
     parameters : iterable of str or mapping, optional
         What may change: names from the system's fit table, or a mapping from name to (lower, upper) or `FitRange`, in
         the unit of the parameter, temperatures in kelvin. A tuple of names as key ties them to one value,
         called "a = b" in the result. Default: the whole fit table.
-    validation : Record or list of Record, optional
-        Data the fit does not see; free runs on them are scored, with initial temperatures from their first tenth.
+    validation : Record, FrequencyResponse, or list of them, optional
+        Data the fit does not see. Free runs on records are scored, with initial temperatures from their first tenth; to
+        responses the misfit is given.
     initial : {"free", "measured", "system"}
         Initial lump temperatures: unknown, with a prior of max(5 K, spread of the first readings) around the nearest
         sensor's first reading; fixed to that reading; or fixed to the file's values, where it has them.
     loss : {"linear", "soft_l1", "huber"}
-        The last two resist glitches: beyond 1.345 standard deviations a residual counts linearly.
+        The last two resist glitches in records: beyond 1.345 standard deviations a residual counts linearly.
     noise : mapping or float, optional
         Standard deviation of the sensors [K; V of a voltage]. Default: as declared in the system, but not below
         step/√12 of a quantized reading; where the declaration is 0 it is estimated from the residuals.
@@ -102,18 +97,20 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
         What is made small: the residuals of a free run, or the innovations of a Kalman filter, which knows the lumps'
         `disturbance` and the sensors' noise (which must then be declared). Without any disturbance both are the same.
     operating_point : mapping, optional
-        For a frequency response of a nonlinear system: heaters [unit], module currents [A] and ambients [K] at whose
-        steady state it was measured; default off and nominal.
+        For frequency responses of a nonlinear system: heaters [unit], module currents [A] and ambients [K] at whose
+        steady state they were measured. Default, one by one: `FrequencyResponse.operating_point`, the means of its
+        records; else off and nominal.
 
     Returns
     -------
-    Fit or ResponseFit
+    Fit
 
     Raises
     ------
     InputError
         Nothing to fit, no sensor in a record, unknown names, bounds that exclude the start, a parameter without any
-        influence, fewer readings than unknowns, validation on the training data.
+        influence, fewer readings than unknowns, validation on the training data, a response without covariance, options
+        that say nothing about the data given.
 
     Examples
     --------
@@ -135,59 +132,67 @@ def calibrate(system: System, data: Record | Sequence[Record] | FrequencyRespons
     >>> low < 100.0 < high < 101.0
     True
     """
-    _check_options(system, initial, loss, max_iterations, method)
-    if isinstance(data, FrequencyResponse):
-        _refuse_time_options(validation, initial, loss, noise, method)
-        return calibrate_response(system, data, parameters, operating_point or {}, max_iterations)
-    if operating_point is not None:
-        raise InputError("operating_point is given with a record", where="argument operating_point",
-                         remedy="Leave it out: a record brings its own inputs.")
+    check_options(system, initial, loss, max_iterations, method)
+    records, responses = measured_of(data, "data")
+    beside, responses_beside = measured_of(validation, "validation") if validation is not None else ([], [])
+    refuse_idle_options(bool(records), bool(responses or responses_beside), operating_point, initial, loss, noise,
+                        method)
     ranges = chosen_ranges(system, parameters)
-    training = as_data(system, data, "data")
-    held_out = as_data(system, validation, "validation") if validation is not None else []
+    training = as_data(system, records, "data") if records else []
+    held_out = as_data(system, beside, "validation") if beside else []
     refuse_same(training, held_out)
-    _refuse_double_start(ranges, initial)
+    refuse_same_response(responses, responses_beside)
+    refuse_double_start(ranges, initial)
     starts = [initial_of(system, one, initial) for one in training]
-    refuse_short(training, len(ranges.names))
-    problem = Problem(system, training, ranges, starts)
+    point = operating_point or {}
+    problem = JointProblem(Problem(system, training, ranges, starts), tuple(
+        ResponseProblem(system, measured_response(system, G, "data", point, thinned=False), ranges) for G in responses))
+    compared = [measured_response(system, G, "validation", point, thinned=False) for G in responses_beside]
+    refuse_short(problem.n_numbers, len(ranges.names))
     levels = declared_noise(system, training, noise)
     filtered = method == "prediction_error" and has_disturbance(system)
     if filtered:
-        _refuse_unknown_noise(levels)
+        refuse_unknown_noise(levels)
     solution = _solve(problem, levels, loss, max_iterations, filtered)
-    return _result(problem, solution, held_out, initial, loss)
+    return _result(solution, held_out, compared, initial, loss)
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where the optimizer ended: unknowns, noise levels, its status and iterations."""
+    """Where the optimizer ended: the problem as weighed last, unknowns, noise levels, its status and iterations."""
 
+    problem: JointProblem
     v: Floats
     noise: dict[str, float]
     converged: bool
     iterations: int
 
 
-def _solve(problem: Problem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool) -> Solution:
+def _solve(problem: JointProblem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool
+           ) -> Solution:
     """Minimize; weights that depend on the fit (an undeclared noise, a filter) are renewed and the fit repeated."""
-    unknown = [name for name, level in declared.items() if not level]
-    v = problem.v0
-    noise = dict(declared) | _levels(problem, v, unknown, loss)
-    _refuse_idle(problem, v)
-    left, enough = max_iterations, min(1e-6, 0.01 / problem.n_readings)  # of the cost: a small part of its own scatter
-    for _ in range(_ROUNDS):
-        problem.weigh = _weights(problem, v, noise, filtered)
-        run = least_squares(problem.vector, v, problem.jacobian, bounds=problem.bounds, x_scale="jac",
-                            loss=scipy_loss(loss, problem.n_readings), max_nfev=left, ftol=enough, xtol=1e-9, gtol=1e-9)
-        moved = np.abs(run.x - v)[:len(problem.ranges.names)] / problem.ranges.unit
+    unknown, records = [name for name, level in declared.items() if not level], problem.records
+    v = records.v0
+    noise = dict(declared) | _levels(records, v, unknown, loss)
+    refuse_idle(problem, v)
+    # of the cost: a small part of its own scatter; differences of a response are cheap and exact enough for more
+    left, enough = max_iterations, 1e-9 if problem.responses else min(1e-6, 0.01 / problem.n_numbers)
+    p, several = len(problem.ranges.names), problem.several
+    for number in range(_ROUNDS):
+        records.weigh = _weights(records, v, noise, filtered)
+        if several:  # by size first, from wherever the start is; then by combinations, which need to be near
+            problem = problem.weighed(v, combined=number > 0)
+        run = least_squares(problem.vector, v, problem.jacobian, bounds=records.bounds, x_scale="jac",
+                            loss=scipy_loss(loss, records.n_readings), max_nfev=left, ftol=enough, xtol=1e-9, gtol=1e-9)
+        moved = np.abs(run.x - v)[:p] / problem.ranges.unit
         v, left = run.x, left - run.nfev
-        new = _levels(problem, v, unknown, loss)
+        new = _levels(records, v, unknown, loss)
         settled = all(abs(new[name] / noise[name] - 1.0) < _SETTLED for name in unknown)
-        settled = settled and not (filtered and moved.max() > _STILL)
-        if settled or left < 1 or run.status == 0:
+        settled = settled and not ((filtered or several) and moved.max() > _STILL)
+        if settled and (number or not several) or left < 1 or run.status == 0:
             break
         noise |= new
-    return Solution(v, noise, run.status > 0 and settled, max_iterations - left)
+    return Solution(problem, v, noise, bool(run.status > 0 and settled), max_iterations - left)
 
 
 def _weights(problem: Problem, v: Floats, noise: dict[str, float], filtered: bool) -> list[Weigh]:
@@ -208,10 +213,12 @@ def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict
             for name in unknown}
 
 
-def _result(problem: Problem, solution: Solution, held_out: list[Data], initial: Start, loss: Loss) -> Fit:
-    ranges, v = problem.ranges, solution.v
+def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredResponse], initial: Start, loss: Loss
+            ) -> Fit:
+    joint, v = solution.problem, solution.v
+    problem, ranges = joint.records, joint.ranges
     values = problem.parameters(v)
-    known = information(problem, v, loss)
+    known = joint.information(v, loss)
     slopes = ranges.slopes(values)
     residuals = problem.residuals(v)
     system = problem.system.with_parameters(ranges.assigned(values))
@@ -238,6 +245,8 @@ def _result(problem: Problem, solution: Solution, held_out: list[Data], initial:
                                        in zip(problem.data, residuals, problem.weigh, strict=True)
                                        if name in one.sensors])
                    for name in solution.noise},
+        responses=tuple(comparison_of(system, part.one) for part in joint.responses),
+        validation_responses=tuple(comparison_of(system, one) for one in compared),
         iterations=solution.iterations,
         outcome=CalibrationCode.CONVERGED.outcome(),
     )
@@ -250,62 +259,3 @@ def _by_sensor(one: Data, values: Floats) -> dict[str, Floats]:
 
 def _by_lump(system: System, temperatures: Floats) -> dict[str, float]:
     return dict(zip(system.lump_names, temperatures.tolist(), strict=True))
-
-
-def _check_options(system: System, initial: str, loss: str, max_iterations: int, method: str) -> None:
-    if not isinstance(system, System):
-        raise InputError(f"system is a {type(system).__name__}", where="argument system",
-                         expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
-    for name, value, allowed in (("initial", initial, STARTS), ("loss", loss, LOSSES), ("method", method, METHODS)):
-        if value not in allowed:
-            raise InputError(f"{name} is {value!r}", where=f"argument {name}", expected="one of " + ", ".join(allowed))
-    if isinstance(max_iterations, bool) or not isinstance(max_iterations, int) or max_iterations < 1:
-        raise InputError(f"max_iterations is {max_iterations!r}", where="argument max_iterations",
-                         expected="a positive whole number")
-
-
-def _refuse_time_options(validation: object, initial: str, loss: str, noise: object, method: str) -> None:
-    given = {"validation": validation is not None, "initial": initial != "free", "loss": loss != "linear",
-             "noise": noise is not None, "method": method != "output_error"}
-    for name in (name for name, said in given.items() if said):
-        raise InputError(f"{name} is given with a frequency response", where=f"argument {name}",
-                         expected="parameters, max_iterations and operating_point only",
-                         remedy="Leave it out, or calibrate on the record itself.")
-
-
-def _refuse_unknown_noise(levels: Mapping[str, float]) -> None:
-    unknown = [name for name, level in levels.items() if not level]
-    if unknown:
-        raise InputError(f"the noise of sensor {unknown[0]!r} is not declared", where="argument method",
-                         expected="declared noise of every sensor: a filter weighs it against the lumps' disturbance",
-                         remedy=f'Give `noise` in [sensors.{unknown[0]}], or pass noise={{"{unknown[0]}": 0.1}}.')
-
-
-def _refuse_double_start(ranges: Ranges, initial: Start) -> None:
-    named = [name for name in ranges.flat if name.startswith("lumps.") and name.endswith(".initial")]
-    if named and initial != "system":
-        raise InputError(f"{named[0]!r} is a parameter, but initial is {initial!r}", where="argument parameters",
-                         remedy='Leave it out (a free start estimates it for every record), or use initial="system".')
-
-
-def _refuse_idle(problem: Problem, v: Floats) -> None:
-    """A parameter that no reading feels."""
-    ranges = problem.ranges
-    reach = np.zeros(len(ranges.names))
-    for run in problem.runs(v):
-        reach = np.maximum(reach, np.abs(run.by_parameter).max(axis=(0, 1), initial=0.0))
-    idle = np.flatnonzero(reach * ranges.spread < 1e-9)
-    if idle.size:
-        name = ranges.names[idle[0]]
-        raise InputError(f"{name!r} has no influence on any reading{_why_idle(problem, name)}", where="argument data",
-                         expected="data that excite every parameter",
-                         remedy="Take it out of the parameters, or use a record that excites it.")
-
-
-def _why_idle(problem: Problem, name: str) -> str:
-    table, _, rest = name.partition(".")
-    for source in (*problem.system.input_names, *problem.system.module_names):
-        if table in ("inputs", "modules") and rest.startswith(f"{source}.") and not any(
-                np.any(one.record[source]) for one in problem.data):
-            return f": {'heater' if table == 'inputs' else 'module'} {source!r} is never on"
-    return ""

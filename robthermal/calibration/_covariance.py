@@ -1,7 +1,8 @@
-"""Covariance of the estimates when residuals are correlated: the sandwich, initial temperatures marginalized."""
+"""Covariance of the estimates: what every data set says is added up; records by the sandwich, starts marginalized."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,8 +41,43 @@ class Information:
     scale: float
 
 
-def information(problem: Problem, v: Floats, loss: Loss) -> Information:
-    """Sandwich covariance at the estimate.
+@dataclass(frozen=True)
+class Share:
+    """What one kind of data says about the coordinates, priors left out.
+
+    Parameters
+    ----------
+    H, M : ndarray, shape (p, p)
+        Slope of the score and its covariance: alone the data give H⁻¹ M H⁻¹.
+    degrees_of_freedom : float
+        Of the noise in these data, at least 1.
+    scale : float
+        Factor by which their residuals exceed what M accounts for, at least 1.
+    """
+
+    H: Floats
+    M: Floats
+    degrees_of_freedom: float
+    scale: float
+
+
+def combined(ranges: Ranges, values: Floats, shares: Sequence[Share]) -> Information:
+    """Independent data sets together: H and M are sums, the scale is the largest.
+
+    Each share brings a variance of its own to the estimates; the degrees of freedom of their sum are Satterthwaite's,
+    (Σ a)² / Σ a²/ν with a the mean variance that a share brings, never fewer than the fewest.
+    """
+    H, M = (np.sum([getattr(one, name) for one in shares], axis=0) for name in "HM")
+    unit = ranges.unit
+    inverse = np.linalg.pinv(H * np.outer(unit, unit), rcond=_ZERO, hermitian=True)
+    part = np.array([max(float(np.trace(inverse @ (one.M * np.outer(unit, unit)))), 0.0) for one in shares])
+    own = np.array([one.degrees_of_freedom for one in shares])
+    freedom = float(part.sum() ** 2 / np.sum(part**2 / own)) if part.any() else float(own.min())
+    return with_priors(ranges, values, H, M, freedom, max(one.scale for one in shares))
+
+
+def record_share(problem: Problem, v: Floats, loss: Loss) -> Share:
+    """What the records say.
 
     H = Σ J̃ᵀ D J̃ + GᵀG + P and M = Σ J̃ᵀ Cov(ψ) J̃ + GᵀG + P with J̃ = J - X G the derivative after the initial
     temperatures (derivative X, unit prior) have answered: G = (XᵀDX + 1)⁻¹XᵀDJ. D holds ψ', and Cov(ψ) is that of an
@@ -82,8 +118,7 @@ def information(problem: Problem, v: Floats, loss: Loss) -> Information:
     larger, unit = _inflation(power, absorbed), problem.ranges.unit
     scale = covariance_scale(found * np.outer(unit, unit), larger * expected * np.outer(unit, unit),
                              sum(map(len, blocks)))
-    return with_priors(problem.ranges, problem.parameters(v), H, G2 + meat * larger, max(independent, 1.0),
-                       bias * scale)
+    return Share(H, G2 + meat * larger, max(independent, 1.0), bias * scale)
 
 
 def _same_sensors(problem: Problem) -> list[list[int]]:

@@ -7,19 +7,20 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from .._arrays import Floats
+from .._arrays import Complex, Floats
 from ..export import plain
 from ..fitting import rmse_by_sensor
 from ..signals import Record
 from ._estimates import Estimates
 from ._figure import draw
+from ._response_comparison import ResponseComparison
 from ._score import Score
 from ._whiteness import Whiteness
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fit(Estimates):
-    """Result of `calibrate` on records.
+    """Result of `calibrate`, on records, frequency responses or both.
 
     Parameters
     ----------
@@ -63,6 +64,8 @@ class Fit(Estimates):
         One per record.
     whiteness : dict
         `Whiteness` of the residuals by sensor.
+    responses, validation_responses : tuple of ResponseComparison
+        Frequency responses beside the model: fitted, and only compared.
     """
 
     noise: dict[str, float]
@@ -75,6 +78,8 @@ class Fit(Estimates):
     train: tuple[Score, ...]
     validation: tuple[Score, ...]
     whiteness: dict[str, Whiteness]
+    responses: tuple[ResponseComparison, ...]
+    validation_responses: tuple[ResponseComparison, ...]
 
     @property
     def rmse(self) -> dict[str, float]:
@@ -86,6 +91,16 @@ class Fit(Estimates):
         """Free-run root mean square residual by sensor over all validation records [K or V]; empty without any."""
         return rmse_by_sensor(self.validation_residuals)
 
+    @property
+    def response_residuals(self) -> tuple[Complex, ...]:
+        """Measured − modelled of every fitted response, (n_y, n_u, n_b) [output unit / input unit]."""
+        return tuple(one.residuals for one in self.responses)
+
+    @property
+    def misfit(self) -> float:
+        """Largest misfit of the fitted responses, near 1 if the model explains them [-]; nan without any."""
+        return max((one.misfit for one in self.responses), default=float("nan"))
+
     def plot(self) -> NDArray[Any]:
         """Measured and modelled readings [°C] with the residuals [K] below, one column per record.
 
@@ -93,7 +108,10 @@ class Fit(Estimates):
         -------
         ndarray of matplotlib.axes.Axes, shape (2, n_records), or (4, n_records) with voltages
             Training records first, then validation; voltages [V] and their residuals stand below the temperatures.
+            Without records: as the first response's own `plot`.
         """
+        if not self.data and not self.validation_data:
+            return self.responses[0].plot()
         fitted = zip(self.data, self.residuals, self.train, strict=True)
         held_out = zip(self.validation_data, self.validation_residuals, self.validation, strict=True)
         return draw([*fitted, *held_out], len(self.data), self.system.sensor_units)
@@ -111,6 +129,8 @@ class Fit(Estimates):
             "train": [_score(score) for score in self.train],
             "validation": [_score(score) for score in self.validation],
             "whiteness": {name: vars(test) for name, test in self.whiteness.items()},
+            "responses": [one.to_dict() for one in self.responses],
+            "validation_responses": [one.to_dict() for one in self.validation_responses],
         }
 
     def __str__(self) -> str:
@@ -119,6 +139,8 @@ class Fit(Estimates):
             for one in scores:
                 said = (f"{name} {e:.3g} {units.get(name, 'K')}" for name, e in one.rmse.items())
                 lines.append(f"{kind} {one.record}: " + ", ".join(said))
+        for kind, found in (("fitted", self.responses), ("validation", self.validation_responses)):
+            lines += [f"{kind} response {one}" for one in found]
         return "\n".join([*lines, str(self.outcome)])
 
 

@@ -2,115 +2,137 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import Complex, Floats
-from ..errors import Diverged
-from ..fitting import OperatingPoint, Ranges, residual, sampled_response
-from ..identify import FrequencyResponse
+from .._arrays import Floats
+from ..fitting import MeasuredResponse, Ranges, as_complex, residual
 from ..thermal import System
+from ._covariance import Share
 
 _DIFFERENCE = 1e-4  # step of the central differences, in `Ranges.spread`; their error is the square of it
+_CHUNK = 100  # bins whose correlation with their neighbors is computed at once
+_ZERO = 1e-10  # relative eigenvalue that is rounding
 
 
-@dataclass(frozen=True)
-class Bins:
-    """The part of a frequency response that is fitted.
-
-    Parameters
-    ----------
-    index : ndarray of int, shape (n_b,)
-        Positions in the response's frequencies.
-    channels : ndarray of int, shape (m,)
-        Entries of vec G, columns stacked, that the model has.
-    outputs, inputs : tuple of str
-        Names of what they are.
-    measured : ndarray, shape (n_b, m)
-        Measured vec G at the bins.
-    root : ndarray, shape (n_b, m, m)
-        L⁻¹ with covariance = L Lᴴ.
-    """
-
-    index: NDArray[np.intp]
-    channels: NDArray[np.intp]
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    measured: Complex
-    root: Complex
-
-
-@dataclass
+@dataclass(frozen=True, eq=False)
 class ResponseProblem:
-    """Weighted misfit (2.12) of the model, in the coordinates of the parameters.
+    """Weighted misfit (2.12) of the model to one response, in the coordinates of the parameters.
 
     Parameters
     ----------
     system : System
         System whose parameters are estimated.
-    response : FrequencyResponse
-        Measured frequency response.
-    bins : Bins
-        What of it is fitted.
+    one : MeasuredResponse
+        What of the response is fitted, and the whitener of the errors of every bin.
     ranges : Ranges
         Parameters to estimate.
-    operating_point : OperatingPoint
-        Where the model is linearized.
+    scale : float
+        What the residuals z, whitened bin by bin, are multiplied with.
+    combinations : ndarray, shape (k, 2 n_b m), optional
+        Instead of z itself: M^(-1/2) Jᵀ, what is multiplied with z.
     """
 
     system: System
-    response: FrequencyResponse
-    bins: Bins
+    one: MeasuredResponse
     ranges: Ranges
-    operating_point: OperatingPoint
+    scale: float = 1.0
+    combinations: Floats | None = None
 
-    def system_at(self, q: Floats) -> System:
-        """System at some coordinates."""
-        return self.system.with_parameters(self.ranges.assigned(self.ranges.values(q)))
+    @property
+    def size(self) -> int:
+        """Number of residuals."""
+        return self.one.readings.size if self.combinations is None else len(self.combinations)
 
-    def model(self, q: Floats) -> Complex:
-        """vec G of the model at the bins, (n_b, m)."""
-        frequencies = self.response.frequencies[self.bins.index]
-        G = sampled_response(self.system_at(q), frequencies, self.response.sample_time, self.operating_point,
-                             self.bins.outputs, self.bins.inputs)
-        return G.transpose(0, 2, 1).reshape(len(frequencies), -1)  # columns of G stacked
+    def weighed(self, q: Floats, *, combined: bool) -> ResponseProblem:
+        """The same, weighed so that it counts for as much as it knows.
 
-    def whitened(self, q: Floats) -> Complex:
-        """L⁻¹ (measured − modelled), (n_b, m)."""
-        white: Complex = np.einsum("kab,kb->ka", self.bins.root, residual(self.bins.measured, self.model(q)))
-        return white
+        Bins of a local method share data: the sum of squares of z claims to know more than the response does, H instead
+        of H M⁻¹ H. Times the mean eigenvalue of H M⁻¹ it may stand beside other data. The combinations Jᵀz, which alone
+        say where its minimum is, whitened by their covariance M, count for H M⁻¹ H in every direction.
+        """
+        J = self._jacobian(q)
+        root = _inverse_root(self._spread_of_score(J))
+        if combined:
+            return replace(self, combinations=root @ J.T)
+        known = float(np.sum((J @ root.T) ** 2)) / len(root)
+        return replace(self, scale=min(np.sqrt(known), 1.0))
 
-    def slopes(self, q: Floats) -> Complex:
-        """Derivative of `whitened` by central differences, (n_b, m, p); one-sided at a bound."""
+    def vector(self, q: Floats) -> Floats:
+        """Weighted residuals, measured − modelled."""
+        return self._weighted(self._whitened(q))
+
+    def jacobian(self, q: Floats) -> Floats:
+        """Derivative of `vector`, (size, p)."""
+        return self._weighted(self._jacobian(q))
+
+    def share(self, q: Floats) -> Share:
+        """What the response says about the coordinates: H and M as they are, or both H M⁻¹ H of the combinations."""
+        J, misfit = self._jacobian(q), float(np.mean(self._whitened(q) ** 2))
+        H, M = J.T @ J, self._spread_of_score(J)
+        if self.combinations is not None:
+            own = _inverse_root(M) @ H
+            H = M = own.T @ own
+        return Share(H, M, self._independent(), max(misfit, 1.0))
+
+    def _model(self, q: Floats) -> Floats:
+        return self.one.model(self.system.with_parameters(self.ranges.assigned(self.ranges.values(q))))
+
+    def _whitened(self, q: Floats) -> Floats:
+        return self.one.white(residual(self.one.readings, self._model(q))).ravel()
+
+    def _weighted(self, z: Floats) -> Floats:
+        return self.scale * z if self.combinations is None else self.combinations @ z
+
+    def _jacobian(self, q: Floats) -> Floats:
+        """Derivative of the whitened residuals by central differences, (2 n_b m, p); one-sided at a bound."""
         low, high = self.ranges.coordinates(self.ranges.lower), self.ranges.coordinates(self.ranges.upper)
-        out = np.empty((*self.bins.measured.shape, q.size), np.complex128)
+        change = np.empty((*self.one.readings.shape, q.size))
         for i, h in enumerate(_DIFFERENCE * self.ranges.spread):
             after, before = q.copy(), q.copy()
             after[i], before[i] = min(q[i] + h, high[i]), max(q[i] - h, low[i])
-            change = self.model(before) - self.model(after)  # of minus the model
-            out[..., i] = np.einsum("kab,kb->ka", self.bins.root, change) / (after[i] - before[i])
-        return out
+            change[..., i] = (self._model(before) - self._model(after)) / (after[i] - before[i])  # of −model
+        return self.one.white(change).reshape(-1, q.size)
 
-    def vector(self, q: Floats) -> Floats:
-        """Real residuals, whose half sum of squares is minus the log-likelihood, then the priors."""
-        prior = self.ranges.prior(self.ranges.values(q))
-        try:
-            return np.concatenate([_real(self.whitened(q)), prior])
-        except Diverged:  # no steady state: a rejected step
-            return np.full(2 * self.bins.measured.size + prior.size, np.inf)
+    def _spread_of_score(self, J: Floats) -> Floats:
+        """M = 2 Re Jᴴ L⁻¹ Σ L⁻ᴴ J, (p, p), with Σ the covariance between neighboring bins too.
 
-    def jacobian(self, q: Floats) -> Floats:
-        """Derivative of `vector`."""
-        known = np.isfinite(self.ranges.sigma)
-        prior = np.diag(self.ranges.prior_slopes(self.ranges.values(q)))[known]
-        slopes = self.slopes(q)
-        data = np.column_stack([_real(slopes[..., i]) for i in range(q.size)])
-        return np.concatenate([data, prior])
+        Each side is widened by √(q/(q - n_y - 1)): the weights are estimates themselves, with q degrees of freedom, and
+        a bin whose noise happens to look small gets too much weight.
+        """
+        G, index, roots = self.one.response, self.one.index, self.one.white.roots
+        n, m, p = index.size, roots.shape[1], J.shape[1]
+        q, n_y = G.degrees_of_freedom[index].astype(float), len(self.one.outputs)
+        wide = np.sqrt(q / (q - len(G.output_names) - 1.0))[:, None, None]
+        if not G.half_width:  # one bin shares nothing with another: what remains of L⁻¹ Σ L⁻ᴴ is the roots' correction
+            own = (J.reshape(2, n, m * p) * (wide * np.sqrt((q - n_y) / q)[:, None, None])[..., 0]).reshape(J.shape)
+            return np.asarray(own.T @ own)
+        slopes = as_complex(J.reshape(2 * n, m, p)) / np.sqrt(2.0)
+        A = np.einsum("kab,kap->kbp", roots.conj(), slopes * wide)  # L⁻ᴴ J
+        channels = np.array([G.input_names.index(i) * len(G.output_names) + G.output_names.index(o)
+                             for i in self.one.inputs for o in self.one.outputs])
+        M, block = np.zeros((p, p)), len(G.output_names) * len(G.input_names)
+        for first in range(0, n, _CHUNK):
+            part = slice(first, min(first + _CHUNK, n))
+            reach = 4 * G.half_width  # windows are shifted at the ends
+            near = np.flatnonzero((index >= index[part][0] - reach) & (index <= index[part][-1] + reach))
+            joint = G.joint_covariance(index[near]).reshape(near.size, block, near.size, block)
+            at = np.searchsorted(near, np.arange(part.start, part.stop))
+            joint = joint[at][:, channels][:, :, :, channels]
+            M += 2.0 * np.einsum("kap,kalb,lbq->pq", A[part].conj(), joint, A[near], optimize=True).real
+        return (M + M.T) / 2
+
+    def _independent(self) -> float:
+        """Degrees of freedom of the noise, all bins together: neighboring bins share their windows."""
+        G, index = self.one.response, self.one.index
+        stride = float(np.median(np.diff(index))) if index.size > 1 else 1.0
+        q = float(G.degrees_of_freedom[index].sum())
+        return max(q / max((2 * G.half_width + 1) / stride, 1.0), 1.0)
 
 
-def _real(z: Complex) -> Floats:
-    """Circular complex noise of unit variance has real and imaginary parts of variance one half."""
-    flat = np.sqrt(2.0) * z.ravel()
-    return np.concatenate([flat.real, flat.imag])
+def _inverse_root(M: Floats) -> Floats:
+    """W (k, p) with W M Wᵀ = 1 on the k directions that the data see at all."""
+    size, vectors = np.linalg.eigh(M)
+    kept = size > _ZERO * size[-1]
+    return np.asarray((vectors[:, kept] / np.sqrt(size[kept])).T)

@@ -157,14 +157,15 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 @app.command()
 def calibrate(system: SystemFile,
               records: Annotated[list[Path], typer.Argument(
-                  help="Training records, or one frequency response from `robthermal frf`.")],
-              validation: Annotated[list[Path] | None, typer.Option("--validation", help="Held-out record.")] = None,
+                  help="Training records, frequency responses from `robthermal frf`, or both.")],
+              validation: Annotated[list[Path] | None, typer.Option(
+                  "--validation", help="Held-out record or response.")] = None,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
               median_filter: MedianFilter = None,
               operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
               as_json: Json = False) -> None:
-    """Fit the parameters in the [fit] table of a system to records, or to a frequency response.
+    """Fit the parameters in the [fit] table of a system to records, frequency responses or both.
 
     Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
     """

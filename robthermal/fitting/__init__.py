@@ -9,6 +9,10 @@ from ._data import refuse_same as refuse_same
 from ._data import refuse_short as refuse_short
 from ._free_run import FreeRun as FreeRun
 from ._free_run import free_run as free_run
+from ._measured import Measured as Measured
+from ._measured import measured_of as measured_of
+from ._measured_response import MeasuredResponse as MeasuredResponse
+from ._measured_response import measured_response as measured_response
 from ._noise import LOSSES as LOSSES
 from ._noise import Loss as Loss
 from ._noise import declared_noise as declared_noise
@@ -18,7 +22,6 @@ from ._noise import scipy_loss as scipy_loss
 from ._noise import score as score
 from ._noise import score_slope as score_slope
 from ._noise import smallest_noise as smallest_noise
-from ._operating_point import OperatingPoint as OperatingPoint
 from ._problem import Problem as Problem
 from ._problem import Weigh as Weigh
 from ._problem import scaled as scaled
@@ -30,6 +33,9 @@ from ._residual import counted as counted
 from ._residual import residual as residual
 from ._residual import rmse as rmse
 from ._residual import rmse_by_sensor as rmse_by_sensor
+from ._response_whitening import ResponseWhitener as ResponseWhitener
+from ._response_whitening import as_complex as as_complex
+from ._response_whitening import as_real as as_real
 from ._sampled_response import sampled_response as sampled_response
 from ._start import STARTS as STARTS
 from ._start import Initial as Initial

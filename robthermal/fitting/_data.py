@@ -80,10 +80,9 @@ def refuse_same(training: list[Data], validation: list[Data]) -> None:
                                  remedy="Split a record with record.split(time), or measure another.")
 
 
-def refuse_short(training: list[Data], n_unknown: int) -> None:
-    """More readings than unknowns."""
-    n_readings = sum(one.readings.size for one in training)
-    if n_readings <= n_unknown:
-        raise InputError(f"{n_readings} readings for {n_unknown} unknowns", where="argument data",
+def refuse_short(n_numbers: int, n_unknown: int) -> None:
+    """More readings, and real numbers of responses, than unknowns."""
+    if n_numbers <= n_unknown:
+        raise InputError(f"{n_numbers} readings for {n_unknown} unknowns", where="argument data",
                          expected="more readings than parameters",
                          remedy="Use a longer record, or calibrate fewer parameters.")

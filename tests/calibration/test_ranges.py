@@ -138,7 +138,7 @@ def test_frequency_response() -> None:
     run = rt.thermal.simulate(bar(), rt.Record(sample_time=20.0, inputs=drive, outputs=np.zeros((400, 0)),
                                                input_names=["q"], output_names=[]))
 
-    def fit(seed: int) -> rt.calibration.ResponseFit:
+    def fit(seed: int) -> rt.calibration.Fit:
         G = rt.identify.lpm(noisy(seed, clean=run))
         return rt.calibrate(bar(**{CAPACITY: 62.0}), G, parameters=BOUNDS)
 

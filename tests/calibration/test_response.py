@@ -97,7 +97,7 @@ def test_correlation_between_bins_widens_the_intervals(tmp_path: Path) -> None:
     again = rt.identify.FrequencyResponse.load(tmp_path / "G.json")
     whole = rt.calibrate(started(), response, parameters=RANGES)
     part = rt.calibrate(started(), again, parameters=RANGES)
-    assert part.bins.size < whole.bins.size / 10
+    assert part.responses[0].bins.size < whole.responses[0].bins.size / 10
     for name, value in whole.parameters.items():
         assert abs(part.parameters[name] - value) < 3.0 * part.std[name]
         assert part.std[name] > whole.std[name]
@@ -118,23 +118,29 @@ def test_operating_point_of_a_nonlinear_system() -> None:
     ranges = {"links.a-room.radiation": (1e-10, 1e-8)}
     fit = rt.calibrate(start, response, parameters=ranges, operating_point={"q": 30.0})
     assert fit.parameters["links.a-room.radiation"] == pytest.approx(2e-9, rel=0.02)
-    cold = rt.calibrate(start, response, parameters=ranges)
+    own = rt.calibrate(start, response, parameters=ranges)  # the mean of its record
+    assert own.responses[0].operating_point == {"q": pytest.approx(heat.mean())}
+    assert own.parameters["links.a-room.radiation"] == pytest.approx(2e-9, rel=0.02)
+    cold = rt.calibrate(start, response, parameters=ranges, operating_point={"q": 0.0})
     assert cold.parameters["links.a-room.radiation"] > 2.5e-9
 
 
 def test_result_goes_to_json_text_and_picture() -> None:
     fit = rt.calibrate(started(), rt.identify.lpm(record(1, 400)), parameters=RANGES)
     again = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
-    assert again["n_frequencies"] == fit.bins.size
+    (one,) = fit.responses
+    assert again["responses"][0]["n_frequencies"] == one.bins.size
     assert "misfit" in str(fit)
     assert fit.plot().shape == (4, 2)
-    assert fit.model.shape == (2, 2, fit.bins.size)
+    assert one.model.shape == (2, 2, one.bins.size)
+    np.testing.assert_array_equal(one.residuals, fit.response_residuals[0])
+    np.testing.assert_allclose(one.residuals + one.model, one.response.response[:, :, one.bins], rtol=1e-12)
 
 
 def test_bad_input_is_refused_by_name() -> None:
     response = rt.identify.lpm(record(1, 400))
     for match, options in {
-        "validation is given with a frequency response": {"validation": record(2, 100)},
+        "the validation response": {"validation": response},
         "method is given": {"method": "prediction_error"},
         "no influence on the frequency response": {"parameters": {"sensors.T1.offset": (-1.0, 1.0)}},
     }.items():

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 import robthermal as rt
-from robthermal.diagnosis.data import as_complex, as_real
 from robthermal.diagnosis.data._frequency_data import response_data
-from robthermal.diagnosis.data._frequency_whitening import kept_bins
 from robthermal.diagnosis.evidence._frequency_tails import inflation, relative_degrees_of_freedom, tail
 from robthermal.diagnosis.path._linearized_response import slope
+from robthermal.fitting import as_complex, as_real
+from robthermal.fitting._response_whitening import kept_bins
 
 Array = NDArray[np.float64]
 Measure = Callable[..., rt.identify.FrequencyResponse]

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import Diverged, InputError
-from ...fitting import Initial, OperatingPoint, Start, sampled_response
+from ...fitting import Initial, MeasuredResponse, Start, as_complex, measured_response
 from ...identify import FrequencyResponse
 from ...thermal import System
 from ..effects import Candidate
-from ._frequency_whitening import ResponseWhitener, as_complex, as_real, kept_bins, response_whitener
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -22,38 +20,8 @@ NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temp
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseData:
-    """One frequency response and the part of it that is diagnosed.
-
-    Parameters
-    ----------
-    response : FrequencyResponse
-        Estimated frequency response with its covariance.
-    index : ndarray of int, shape (n_b,)
-        Positions of the bins used.
-    outputs, inputs : tuple of str
-        Channels that the system has.
-    readings : ndarray, shape (2 n_b, m)
-        vec G (columns stacked), real parts above imaginary parts [output unit / input unit].
-    white : ResponseWhitener
-        Of its errors.
-    operating_point : dict
-        Mean inputs of the experiment.
-    """
-
-    response: FrequencyResponse
-    index: NDArray[np.intp]
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    readings: Array
-    white: ResponseWhitener
-    operating_point: dict[str, float]
-    _points: dict[tuple[str, ...], OperatingPoint] = field(default_factory=dict)  # where Newton's method was last
-
-    @property
-    def label(self) -> str:
-        """Name for tables."""
-        return f"response ({self.response.method})"
+class ResponseData(MeasuredResponse):
+    """One frequency response and the part of it that is diagnosed: a `DataSet`."""
 
     @property
     def missing(self) -> None:
@@ -90,11 +58,6 @@ class ResponseData:
     def columns(self) -> NDArray[np.intp]:
         """All of them."""
         return np.arange(self.readings.shape[1])
-
-    @property
-    def frequencies(self) -> Array:
-        """Of the bins used [Hz]."""
-        return np.asarray(self.response.frequencies[self.index], np.float64)
 
     @property
     def noise(self) -> Array:
@@ -134,75 +97,9 @@ class ResponseData:
         window = self.index // (2 * self.response.half_width + 1)
         return [np.flatnonzero(window == number) for number in np.unique(window)]
 
-    def model(self, system: System, inputs: tuple[str, ...] | None = None) -> Array:
-        """Response of a system at its steady state, in the form of `readings`.
-
-        Parameters
-        ----------
-        system : System
-            System with any lumps.
-        inputs : tuple of str, optional
-            Inputs of the system instead of those of the response.
-
-        Returns
-        -------
-        ndarray, shape (2 n_b, m)
-        """
-        self.temperatures(system)
-        G = sampled_response(system, self.frequencies, self.response.sample_time, self._point(system), self.outputs,
-                             self.inputs if inputs is None else inputs)
-        return as_real(G.transpose(0, 2, 1).reshape(len(G), -1))
-
-    def temperatures(self, system: System) -> Array | None:
-        """Steady state [K]; None for a linear network, whose response is the same everywhere."""
-        point = self._point(system)
-        try:
-            found = point.temperatures(system)
-        except Diverged:
-            point.last = None  # search all branches
-            found = point.temperatures(system)
-        if found is None and point.last is None:  # where Newton's method starts once an effect is not linear
-            point.last = np.full(len(system.lumps), next(iter(system.ambients.values())).temperature)
-        return found
-
-    def _point(self, system: System) -> OperatingPoint:
-        """Operating point that knows where the steady state was; a new lump starts at the first ambient."""
-        names = system.lump_names
-        if names not in self._points:
-            known = {name: T for lumps, point in self._points.items() if point.last is not None
-                     for name, T in zip(lumps, point.last, strict=True)}
-            room = next(iter(system.ambients.values())).temperature
-            last = np.array([known.get(name, room) for name in names]) if self._points else None
-            self._points[names] = OperatingPoint(self.operating_point, last)
-        return self._points[names]
-
 
 def response_data(system: System, G: FrequencyResponse, where: str, operating_point: Mapping[str, float]
                   ) -> ResponseData:
     """Bins that are determined and trusted, channels that the system has, and their whitener."""
-    known = system.sensor_names or system.lump_names
-    outputs = tuple(name for name in G.output_names if name in known)
-    inputs = tuple(name for name in G.input_names if name in system.exogenous_names)
-    for what, found, own in (("output", outputs, known), ("input", inputs, system.exogenous_names)):
-        if not found:
-            raise InputError(f"the frequency response has no {what} of the system", where=f"argument {where}",
-                             expected="one of " + ", ".join(own), remedy="Name the channels like the system's.")
-    unknown = [name for name in operating_point if name not in system.exogenous_names]
-    if unknown:
-        raise InputError(f"there is no input {unknown[0]!r}", where="argument operating_point",
-                         expected="some of " + ", ".join(system.exogenous_names))
-    spare = G.degrees_of_freedom - len(G.output_names) - 1
-    # the lowest windows are shifted: what the local model extrapolates there is biased long before it is suspect
-    centered = G.frequencies * G.n_samples * G.sample_time > G.half_width + 0.5
-    good = np.flatnonzero(~np.isnan(G.response).any(axis=(0, 1)) & ~G.suspect & (spare > 0) & centered)
-    if not good.size:
-        raise InputError("no bin of the frequency response can be used: all are undetermined, suspect or short of "
-                         "degrees of freedom, so that their covariance is not known", where=f"argument {where}",
-                         remedy="Estimate it with rt.identify.lpm or lrmp, a larger half_width, better poles, or a "
-                                "longer record.")
-    o = np.array([G.output_names.index(name) for name in outputs], np.intp)
-    i = np.array([G.input_names.index(name) for name in inputs], np.intp)
-    index, factor = kept_bins(G, good, i)
-    measured = G.response[np.ix_(o, i, index)].transpose(2, 1, 0).reshape(index.size, -1)
-    return ResponseData(G, index, outputs, inputs, as_real(measured), response_whitener(G, index, factor, o, i),
-                        dict(operating_point))
+    one = measured_response(system, G, where, operating_point)
+    return ResponseData(one.response, one.index, one.outputs, one.inputs, one.readings, one.white, one.operating_point)

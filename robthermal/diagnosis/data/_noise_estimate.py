@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Outcome
-from ...fitting import Data, declared_noise, quantum, smallest_noise
+from ...fitting import Data, Measured, declared_noise, quantum, smallest_noise
 from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ._glitches import counted
-from ._measured import Measured, as_measured, records_of, responses_of
+from ._measured import as_measured, records_of, responses_of
 
 Array = NDArray[np.float64]
 _SHORTEST = 50  # samples

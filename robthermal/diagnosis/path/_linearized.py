@@ -9,8 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fitting import ResponseWhitener
 from ...thermal import System
-from ..data import DataSet, ResponseData, ResponseWhitener
+from ..data import DataSet, ResponseData
 from ..effects import Candidate, TrialContext
 from ._whitening import Whitener
 

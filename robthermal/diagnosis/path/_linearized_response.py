@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from ...errors import Diverged, InputError
-from ...fitting import residual
+from ...fitting import ResponseWhitener, as_complex, as_real, residual
 from ...thermal import Input, System
-from ..data import Complex, ResponseData, ResponseWhitener, as_complex, as_real
+from ..data import Complex, ResponseData
 from ..effects import Candidate
 from ._coarseness import coarse_names
 from ._linearized import Unknowns

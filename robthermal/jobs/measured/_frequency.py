@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...calibration import Fit, ResponseFit, calibrate
+from ...calibration import Fit, calibrate
 from ...errors import InputError
 from ...identify import (
     FrequencyResponse,
@@ -32,7 +32,8 @@ _METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
 def estimate_response(paths: Sequence[Path], *, system: System | None = None, inputs: Sequence[str] = (),
                       outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
                       poles: Sequence[float] = (), band: tuple[float, float] | None = None,
-                      tables: Sequence[ReadTable] = (), reading: Mapping[Path, Sequence[ReadTable]] | None = None
+                      operating_point: Mapping[str, float] | None = None, tables: Sequence[ReadTable] = (),
+                      reading: Mapping[Path, Sequence[ReadTable]] | None = None
                       ) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
@@ -54,6 +55,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         Prescribed poles [rad/s] for "lrmp"; empty: those of the system, else chosen from the data.
     band : tuple of float, optional
         Frequencies to keep [Hz].
+    operating_point : mapping, optional
+        Heaters [unit], currents [A] and ambients [K] instead of the means of the records, one by one.
     tables : sequence
         How the files are read, from `reading_from_text`.
     reading : mapping, optional
@@ -92,7 +95,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
          "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
     note = (f"Left out because they never change: {', '.join(constant)} ({IdentifyCode.CONSTANT_INPUT.code}).",)
-    G = G.replace(notes=G.notes + (note if constant else ()), operating_point=mean_inputs(parts))
+    G = G.replace(notes=G.notes + (note if constant else ()),
+                  operating_point=mean_inputs(parts) | dict(operating_point or {}))
     return G.between(*band) if band else G
 
 
@@ -246,32 +250,33 @@ def _response(path: Path) -> FrequencyResponse:
 
 def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
                     median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
-                    tables: Sequence[ReadTable] = ()) -> Fit | ResponseFit:
-    """Calibrate a system with record files, or with one file of a frequency response.
+                    tables: Sequence[ReadTable] = ()) -> Fit:
+    """Calibrate a system with files of records and of frequency responses together.
 
     Parameters
     ----------
     system : System
         With starting values and a [fit] table.
     records : sequence of Path
-        Training records, or one frequency response.
+        Training records and frequency responses, in any order.
     validation : sequence of Path
-        Records that the fit does not see; not for a frequency response.
+        Records and responses that the fit does not see.
     median_filter : float, optional
         Length of a median filter over the sensors of records [s].
     operating_point : mapping, optional
-        Of a frequency response: means of heaters [unit], module currents [A] and ambients [K].
+        Of the frequency responses: means of heaters [unit], module currents [A] and ambients [K], instead of those in
+        their files.
     tables : sequence
         How the files are read, from `reading_from_text`.
 
     Returns
     -------
-    Fit or ResponseFit
+    Fit
 
     Raises
     ------
     InputError
-        As the readers and `rt.calibrate`; for a response beside other files, or an operating point of records.
+        As the readers and `rt.calibrate`; for an operating point of records.
 
     Examples
     --------
@@ -279,21 +284,13 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
     >>> rt.jobs.measured.calibrate_files(rt.systems.two_module(), [])
     Traceback (most recent call last):
     ...
-    robthermal.errors.InputError: records: no file is given. Expected records, or one frequency response.
+    robthermal.errors.InputError: records: no file is given. Expected records, frequency responses or both.
     """
+    if not records:
+        raise InputError("no file is given", where="records", expected="records, frequency responses or both")
     train, held_out = (read_measured(paths, system, median_filter=median_filter, tables=tables)
                        for paths in (records, validation))
-    expected = "records, or one frequency response"
-    if not train:
-        raise InputError("no file is given", where="records", expected=expected)
-    runs = [one for one in train if isinstance(one, Record)]
-    seen = [one for one in held_out if isinstance(one, Record)]
-    if len(runs) == len(train) and len(seen) == len(held_out):
-        if operating_point:
-            raise InputError("an operating point is given with records", where="--operating-point",
-                             remedy="Leave it out: a record brings its own inputs.")
-        return calibrate(system, runs, validation=seen or None)
-    if len(train) > 1 or held_out or isinstance(train[0], Record):
-        raise InputError("a frequency response stands beside other files", where="records", expected=expected,
-                         remedy="Give all records of one machine to robthermal frf, and its result here, alone.")
-    return calibrate(system, train[0], operating_point=operating_point or None)
+    if operating_point and not any(isinstance(one, FrequencyResponse) for one in (*train, *held_out)):
+        raise InputError("an operating point is given with records", where="--operating-point",
+                         remedy="Leave it out: a record brings its own inputs.")
+    return calibrate(system, train, validation=held_out or None, operating_point=operating_point or None)

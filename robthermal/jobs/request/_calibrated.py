@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from ..._write import write
-from ...calibration import Estimates, Fit, ResponseFit
+from ...calibration import Estimates, Fit
 from ...errors import InputError, Outcome
 from ...report import file_hash
 from ...thermal import System
@@ -52,12 +52,12 @@ class _File(BaseModel):
     outcome: _Outcome
 
 
-def write_calibrated(fit: Fit | ResponseFit, files: Sequence[Path], path: Path) -> None:
+def write_calibrated(fit: Fit, files: Sequence[Path], path: Path) -> None:
     """Write calibrated.json: estimates, covariance, ranges, and the hashes of the data.
 
     Parameters
     ----------
-    fit : Fit or ResponseFit
+    fit : Fit
         From `rt.calibrate`.
     files : sequence of Path
         Input files: system and records.

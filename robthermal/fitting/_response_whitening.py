@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from ...errors import InputError
-from ...identify import FrequencyResponse
+from ..errors import InputError
+from ..identify import FrequencyResponse
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -101,6 +101,15 @@ def kept_bins(G: FrequencyResponse, good: Places, inputs: Places) -> tuple[Place
         raise InputError("the estimates at different frequencies are not independent of each other",
                          where="argument records", expected="windows that hold data of their own",
                          remedy="Estimate the response with a larger half_width, or from a longer record.") from None
+
+
+def every_bin(G: FrequencyResponse, good: Places) -> tuple[Places, Complex]:
+    """All bins if the response knows their correlation (one from a file does not); else one per window."""
+    if G.half_width and good.size > 1:
+        pair = G.joint_covariance(good[:2])
+        if not np.any(pair[:len(pair) // 2, len(pair) // 2:]):
+            return good[::2 * G.half_width + 1], _NONE
+    return good, _NONE
 
 
 def thinned(good: Places, step: int, most: int) -> Places:
