@@ -66,7 +66,7 @@ def channel_units(value: object, names: Sequence[str]) -> dict[str, str]:
 
 
 def channel_matrix(value: ArrayLike, names: Sequence[str], where: str, sample_time: float, start_time: float) -> Array:
-    """`value` as a read-only (n, channels) copy of finite floats, columns named by `names`."""
+    """`value` as read-only (n, channels) finite floats, columns named by `names`."""
     matrix = _two_dimensional(_real_numbers(value, where), where)
     if matrix.shape[1] != len(names):
         singular = where.removesuffix("s")
@@ -102,8 +102,10 @@ def _two_dimensional(array: Array, where: str) -> Array:
 
 
 def _real_numbers(value: ArrayLike, where: str) -> Array:
-    """A fresh C-contiguous float copy; text, booleans, complex numbers and dates are refused."""
+    """A C-contiguous float copy, or the array itself if it is read-only; other kinds of values are refused."""
     expected = "real numbers, an array (n_samples, channels)"
+    if _is_frozen(value):
+        return value  # type: ignore[return-value]
     if np.ma.isMaskedArray(value) and np.ma.is_masked(value):
         row = int(np.argwhere(np.ma.getmaskarray(value))[0][0])
         raise InputError(f"a value is masked (missing) in row {row}", where=f"argument {where}", expected=expected)
@@ -122,6 +124,14 @@ def _real_numbers(value: ArrayLike, where: str) -> Array:
         )
     with np.errstate(over="ignore"):  # a long double beyond float becomes inf, refused below with its row
         return np.array(raw, dtype=np.float64, order="C")
+
+
+def _is_frozen(value: object) -> bool:
+    """Whether nobody can change an array any more, so that no copy is needed."""
+    if type(value) is not np.ndarray or value.dtype != np.float64 or not value.flags.c_contiguous:
+        return False
+    base = value.base
+    return not value.flags.writeable and (base is None or type(base) is np.ndarray and not base.flags.writeable)
 
 
 def _unpacked(raw: NDArray[Any], where: str, expected: str) -> Array:

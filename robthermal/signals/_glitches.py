@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter as running_median
@@ -15,6 +17,7 @@ _NEIGHBORS = 5  # a jump of up to two samples cannot move the median of five
 _NOISE = 8.0  # times the noise: one false alarm in 10^15 samples of Gaussian noise
 _QUANTA = 4.0  # quantization steps that a sound reading may jump
 _SWING = 6.0  # times the spread of the middle three of seven neighbors
+_PIECE = 1 << 20  # rows examined at once
 _MAD = 1.4826  # median absolute deviation of a Gaussian, to its standard deviation
 
 
@@ -88,19 +91,57 @@ def median_filter(record: Record, window: float) -> Record:
 
 
 def glitch_rows(column: Array) -> NDArray[np.intp]:
-    """Rows of the glitches of one channel."""
+    """Rows of the glitches of one channel; what is computed on the way has twice the size of the channel."""
     if len(column) < _NEIGHBORS:
         return np.empty(0, dtype=np.intp)
-    # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
-    residual = np.abs(column - running_median(column, size=_NEIGHBORS, mode="mirror"))
+    column = np.ascontiguousarray(column)
     # On a steep stretch the median is the sample itself and hides the noise; second differences see it there too.
-    bends = np.abs(np.diff(column, 2)) / np.sqrt(6.0)
-    noise = _MAD * max(float(np.median(residual)), float(np.median(bends)))
-    rounding = 1e-9 * float(np.abs(column).max())
-    # A fast but real swing bends its neighbors too; a glitch leaves them where they were.
-    spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
+    noise = _MAD * max(_median_of(_residual, column, 0), _median_of(_bends, column, 2))
+    rounding = 1e-9 * max(abs(float(column.min())), abs(float(column.max())))
     least = max(_NOISE * noise, _QUANTA * _quantum(column), rounding)
-    return np.flatnonzero(residual > np.maximum(least, _SWING * spread))
+    found = []
+    for start, stop in _pieces(len(column)):
+        # A fast but real swing bends its neighbors too; a glitch leaves them where they were.
+        found.append(start + np.flatnonzero(_around(_excess, column, start, stop, 3) > least))
+    return np.concatenate(found)
+
+
+def _residual(column: Array) -> Array:
+    # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
+    return np.asarray(np.abs(column - running_median(column, size=_NEIGHBORS, mode="mirror")))
+
+
+def _excess(column: Array) -> Array:
+    """Residual where it is large beside the spread of its neighbors, else zero."""
+    residual = _residual(column)
+    spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
+    return np.where(residual > _SWING * spread, residual, 0.0)
+
+
+def _bends(column: Array) -> Array:
+    return np.asarray(np.abs(np.diff(column, 2)) / np.sqrt(6.0))
+
+
+def _pieces(n: int) -> Iterator[tuple[int, int]]:
+    for start in range(0, n, _PIECE):
+        yield start, min(start + _PIECE, n)
+
+
+def _around(what: Callable[[Array], Array], column: Array, start: int, stop: int, reach: int) -> Array:
+    """What a filter says of some rows, with the rows around that it looks at."""
+    first = max(start - reach, 0)
+    return what(column[first : stop + reach])[start - first : stop - first]
+
+
+def _median_of(what: Callable[[Array], Array], column: Array, lost: int) -> float:
+    """Median of a filter's output, which is `lost` rows shorter than the column."""
+    out = np.empty(len(column) - lost)
+    for start, stop in _pieces(len(out)):
+        if lost:
+            out[start:stop] = what(column[start : stop + lost])
+        else:
+            out[start:stop] = _around(what, column, start, stop, 3)
+    return float(np.median(out, overwrite_input=True))
 
 
 def filtered(column: Array, samples: int) -> Array:
@@ -129,8 +170,16 @@ def filter_note(window: float, samples: int) -> str:
 
 def _quantum(column: Array) -> float:
     """Quantization step: the usual distance between neighboring values that occur."""
-    gaps = np.diff(np.unique(column))
-    return float(np.median(gaps)) if gaps.size else 0.0
+    gaps = np.sort(column)
+    for start, stop in _pieces(len(gaps) - 1):
+        gaps[start:stop] = gaps[start + 1 : stop + 1] - gaps[start:stop]
+    gaps = gaps[:-1]
+    n = int(np.count_nonzero(gaps))
+    if not n:
+        return 0.0
+    middle = [len(gaps) - n + (n - 1) // 2, len(gaps) - n + n // 2]  # of those above zero
+    gaps.partition(middle)
+    return float(np.mean(gaps[middle]))
 
 
 def _require_record(record: object) -> None:

@@ -17,7 +17,7 @@ _MILLI = 100.0  # a current this many times beyond its limits is in mA
 
 
 def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: RowLabel, where: str) -> None:
-    """Refuse a column whose numbers belong to the other scale."""
+    """Refuse a column whose numbers belong to the other scale; nan is no reading."""
     wrong = np.flatnonzero(column < LOWEST_KELVIN if unit == "K" else column > HIGHEST_CELSIUS)
     if not wrong.size:
         return
@@ -28,7 +28,7 @@ def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: R
         looks, bound = "kelvin", f"above {HIGHEST_CELSIUS:g} °C"
     raise InputError(
         f"column {name!r} holds {column[k]:.6g} in {row(k)}, time {stamps[k]:.10g} s, declared {unit}: "
-        f"{bound}, this looks like {looks} ({wrong.size} of {len(column)} rows)",
+        f"{bound}, this looks like {looks} ({wrong.size} of {int(np.isfinite(column).sum())} rows)",
         where=where,
         expected=f"temperatures in {unit}",
         remedy="Correct temperature_unit, or the readings if single rows are wrong.",
@@ -49,7 +49,8 @@ def limit_notes(columns: Mapping[str, Array], current_limits: Any, input_limits:
 
 
 def _refuse_milliampere(name: str, column: Array, limits: tuple[float, float], where: str) -> None:
-    largest, bound = float(np.abs(column).max()), max(abs(limits[0]), abs(limits[1]))
+    largest = max(abs(float(np.nanmin(column))), abs(float(np.nanmax(column))))
+    bound = max(abs(limits[0]), abs(limits[1]))
     if bound > 0.0 and largest > _MILLI * bound:
         raise InputError(
             f"the current {name!r} reaches {largest:.6g} A, {largest / bound:.0f} times its declared limit of "
@@ -66,6 +67,6 @@ def _outside(name: str, column: Array, limits: tuple[float, float], unit: str, h
     if not count:
         return []
     return [
-        f"{name!r} lies outside its declared limits {limits[0]:g} ... {limits[1]:g}{unit} in {count} of {len(column)} "
-        f"rows (range {column.min():.6g} ... {column.max():.6g}{unit}{hint})"
+        f"{name!r} lies outside its declared limits {limits[0]:g} ... {limits[1]:g}{unit} in {count} of "
+        f"{int(np.isfinite(column).sum())} rows (range {np.nanmin(column):.6g} ... {np.nanmax(column):.6g}{unit}{hint})"
     ]

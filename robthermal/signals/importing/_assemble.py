@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,12 @@ import numpy as np
 
 from .._glitches import filter_note, filtered, glitch_rows, window_samples
 from .._record import Record
-from ._columns import SystemLike
+from ._columns import Channel, SystemLike
 from ._options import Declared
 from ._parts import Part
 from ._report import Import, ImportedColumn
-from ._stamps import Clock
 from ._table import Action, Array, Table
+from ._times import Clock
 from ._units import split_header
 from ._values import Values
 
@@ -45,45 +45,23 @@ def make_records(
     system: SystemLike | None,
 ) -> tuple[Record, ...]:
     driven, read = values.of("input", "current", "ambient"), values.of("sensor", "voltage", "output")
-    made: list[tuple[Array, Array]] = []
     glitches: dict[str, int] = {}
     notes: list[str] = []
+    smooth = [c for c in read if c.role != "voltage"]  # which jumps with its current, in both directions and at once
     for part in parts:
-        U = (
-            np.column_stack(
-                [part.linear(values.column(c)) if c.role == "ambient" else part.held(values.column(c)) for c in driven]
-            )
-            if driven
-            else np.zeros((part.samples, 0))
-        )
-        Y = np.empty((part.samples, len(read)))
-        for k, c in enumerate(read):
-            column = values.column(c)
-            if c.role == "voltage":  # jumps with its current, in both directions and at once
-                Y[:, k] = part.linear(column) if np.isnan(column[part.rows]).any() else part.held(column)
-                continue
-            found = glitch_rows(column[part.rows][np.isfinite(column[part.rows])])
-            if found.size:
-                glitches[c.name] = glitches.get(c.name, 0) + int(found.size)
-                table.actions.append(
-                    Action(
-                        "glitches",
-                        int(found.size),
-                        f"{c.name!r} has {found.size} glitch"
-                        f"{'es' if found.size > 1 else ''} at {_times(part, found)} (kept; median_filter= [s] "
-                        "removes them)",
-                        table.headers[c.place],
-                        [int(x) for x in table.lines[part.rows[found[:50]]]],
-                        [float(part.stamps[x]) for x in found[:50]],
-                    )
-                )
-            if median_filter is not None:  # before resampling: interpolation would smear a glitch over two samples
-                samples = window_samples(median_filter, part.sample_time, len(part.rows), "median_filter")
-                column = column.copy()
+        for c in smooth:
+            n = _say_glitches(table, part, c, values.column(c)[part.rows])
+            if n:
+                glitches[c.name] = glitches.get(c.name, 0) + n
+        if median_filter is not None:  # before resampling: interpolation would smear a glitch over two samples
+            samples = window_samples(median_filter, part.sample_time, part.n_rows, "median_filter")
+            for c in smooth:
+                column = values.column(c)
                 column[part.rows] = filtered(column[part.rows], samples)
-                notes = [filter_note(median_filter, samples)]
-            Y[:, k] = part.linear(column)
-        made.append((U, Y))
+            notes = [filter_note(median_filter, samples)]
+    made = [(_sampled(part, values.inputs, driven), _sampled(part, values.outputs, read)) for part in parts]
+    for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
+        _freeze(matrix)
     say_dropped(table, values, time)
     report = make_report(source, table, clock, time, values, parts, glitches, choice, system)
     said = [action.text for action in table.actions if action.what in _LOUD]
@@ -112,6 +90,46 @@ def make_records(
     )
 
 
+def _say_glitches(table: Table, part: Part, channel: Channel, column: Array) -> int:
+    """How many readings of a part jump away and back; they are said."""
+    there = np.isfinite(column)
+    found = glitch_rows(column if there.all() else column[there])
+    if not found.size:
+        return 0
+    if not there.all():
+        found = np.flatnonzero(there)[found]
+    text = (
+        f"{channel.name!r} has {found.size} glitch{'es' if found.size > 1 else ''} at {_times(part, found)} (kept; "
+        "median_filter= [s] removes them)"
+    )
+    lines, times = table.lines.of(part.rows.start + found), [float(part.stamps[x]) for x in found[:50]]
+    table.actions.append(Action("glitches", int(found.size), text, table.headers[channel.place], lines, times))
+    return int(found.size)
+
+
+def _sampled(part: Part, matrix: Array, channels: Sequence[Channel]) -> Array:
+    """Columns of a part on its grid: where the rows stand, unless the grid has more samples than there are rows."""
+    rows = matrix[part.rows]
+    fits = part.samples <= part.n_rows
+    out = rows[: part.samples] if fits else np.empty((part.samples, len(channels)))
+    for k, channel in enumerate(channels):
+        whole = bool(np.isfinite(rows[:, k]).all())
+        if part.exact and whole:
+            continue
+        reading = channel.role not in ("input", "current") and not (channel.role == "voltage" and whole)
+        values = rows[:, k].copy()
+        for span, sampled in (part.linear if reading else part.held)(values):
+            out[span, k] = sampled
+    return out
+
+
+def _freeze(matrix: Array) -> None:
+    """Make an array and the one it is a part of read-only: a record then takes it as it is."""
+    matrix.flags.writeable = False
+    if isinstance(matrix.base, np.ndarray):
+        matrix.base.flags.writeable = False
+
+
 def _times(part: Part, rows: Any) -> str:
     shown = ", ".join(f"{part.stamps[row]:.10g} s" for row in rows[:3])
     return shown + (" ..." if len(rows) > 3 else "")
@@ -120,25 +138,9 @@ def _times(part: Part, rows: Any) -> str:
 def say_dropped(table: Table, values: Values, time: tuple[int, ...]) -> None:
     used = {*time, *(c.place for c in values.channels)}
     for k, header in enumerate(table.headers):
-        if k in used:
-            continue
-        cells = table.columns[k]
-        empty = (
-            bool(np.isnan(cells).all())
-            if getattr(cells, "dtype", None) is not None and cells.dtype.kind == "f"
-            else False
-        )
-        if not header or empty:
-            table.actions.append(
-                Action(
-                    "dropped_column",
-                    1,
-                    f"column {k + 1} without a name left out"
-                    if not header
-                    else f"column {header!r} without a value left out",
-                    header,
-                )
-            )
+        if k not in used and (not header or k in table.empty):
+            words = f"column {header!r} without a value" if header else f"column {k + 1} without a name"
+            table.actions.append(Action("dropped_column", 1, f"{words} left out", header))
 
 
 def make_report(
@@ -152,7 +154,7 @@ def make_report(
     choice: Declared,
     system: SystemLike | None,
 ) -> Import:
-    used = sum(len(part.rows) for part in parts)
+    used = sum(part.n_rows for part in parts)
     facts = table.facts
     by_place = {c.place: c for c in values.channels}
     columns = []
@@ -162,7 +164,6 @@ def make_report(
             unit = split_header(header)[1] or ""
             columns.append(ImportedColumn(header, "", "time" if k in time else "unused", unit, unit))
             continue
-        kept = values.column(channel)
         columns.append(
             ImportedColumn(
                 header,
@@ -172,8 +173,7 @@ def make_report(
                 channel.unit,
                 channel.scale,
                 channel.offset,
-                float(np.nanmin(kept)),
-                float(np.nanmax(kept)),
+                *values.ranges[channel.name],
                 values.missing[k],
                 glitches.get(channel.name, 0),
             )
@@ -200,8 +200,8 @@ def make_report(
             {
                 "start": part.start,
                 "samples": part.samples,
-                "first_line": int(table.lines[part.rows[0]]),
-                "last_line": int(table.lines[part.rows[-1]]),
+                "first_line": table.lines[part.rows.start],
+                "last_line": table.lines[part.rows.stop - 1],
             }
             for part in parts
         ),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ._columns import Channel, kept_factor
 from ._options import ImportOptions
-from ._table import Action, Array, Table
+from ._table import Action, Array, Block, Table, spans
 from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short
 
 _CODES = (-127.0, -127.94, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)
@@ -15,48 +18,70 @@ _DOUBTED = 85.0  # what a DS18B20 says after power-up, and what a plate may have
 _JUMP = 10.0  # K or units: into the code, and back
 
 
-def numbers(table: Table, place: int, options: ImportOptions) -> Array:
-    """Numeric cells of a column as they are written, nan where missing.
+class NumberReader:
+    """Cells of one column as numbers, block by block.
 
-    Raises
-    ------
-    InputError
-        The first cell that is neither a number nor one of the words for a missing reading.
+    Parameters
+    ----------
+    table : Table
+        For the lines in messages.
+    place : int
+        Column of the table.
+    options : ImportOptions
+        Import options, of which `missing` is used.
     """
-    cells = table.columns[place]
-    header = table.headers[place]
-    codes = [code for code in options.missing if not isinstance(code, str)]
-    words = {code.strip().lower() for code in options.missing if isinstance(code, str)}
-    if cells.dtype.kind == "f":
-        values = np.where(np.isfinite(cells), cells, np.nan)
-    else:
+
+    def __init__(self, table: Table, place: int, options: ImportOptions):
+        self._table, self.place = table, place
+        self._words = {code.strip().lower() for code in options.missing if isinstance(code, str)}
+        self.fault: tuple[int, InputError] | None = None  # the first cell that is no number: its line, and what is said
+        self.n_faults = 0
+
+    def read(self, block: Block) -> Array:
+        """Cells as they are written, nan where missing; the first that is no number is remembered."""
+        cells = block.columns[self.place]
+        if cells.dtype.kind == "f":
+            return np.where(np.isfinite(cells), cells, np.nan)
         values = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
             if cell is None or isinstance(cell, float) and cell != cell:
                 continue
             text = str(cell).strip()
-            if is_missing(text) or text.lower() in words:
+            if is_missing(text) or text.lower() in self._words:
                 continue
-            values[row] = _number(table, row, header, text)
-    for code in codes:
+            try:
+                values[row] = _number(self._table, int(block.lines[row]), self._table.headers[self.place], text)
+            except InputError as error:
+                self.fault = self.fault or (int(block.lines[row]), error)
+                self.n_faults += 1
+        return values
+
+
+def refuse_faults(readers: Sequence[NumberReader]) -> None:
+    """Refuse the first cell, by line, that is neither a number nor one of the words for a missing reading."""
+    found = [(*reader.fault, reader.n_faults) for reader in readers if reader.fault is not None]
+    if found:
+        _, error, n = min(found, key=lambda one: one[0])
+        more = f" ({n} such cells)" if n > 1 else ""
+        raise InputError(error.what + more, where=error.where, expected=error.expected, remedy=error.remedy)
+
+
+def take_codes(table: Table, place: int, values: Array, options: ImportOptions) -> None:
+    """Declared fault codes become missing, in place, and are said."""
+    for code in options.missing:
+        if isinstance(code, str):
+            continue
         hit = values == code
         if hit.any():
-            table.actions.append(
-                Action(
-                    "fault_code",
-                    int(hit.sum()),
-                    f"{code:g} taken as missing in {header!r}",
-                    header,
-                    [int(k) for k in table.lines[hit][:50]],
-                )
-            )
-            values = np.where(hit, np.nan, values)
-    return values
+            header, n = table.headers[place], int(hit.sum())
+            text = f"{code:g} taken as missing in {header!r}"
+            table.actions.append(Action("fault_code", n, text, header, table.lines.of(hit)))
+            values[hit] = np.nan
 
 
-def _number(table: Table, row: int, header: str, text: str) -> float:
+def _number(table: Table, line: int, header: str, text: str) -> float:
     decimal = table.facts.get("decimal", ".")
-    where = table.place(row, header)
+    where = table.at(line, header)
     if THOUSANDS.fullmatch(text):
         raise InputError(
             f"{short(text)} has a decimal and a thousands separator",
@@ -92,48 +117,66 @@ def _number(table: Table, row: int, header: str, text: str) -> float:
     return value if np.isfinite(value) else float("nan")
 
 
-def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions) -> None:
-    """Refuse rows that jump to a known fault code and back; 85.0 is only said."""
+def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions, temperature: bool) -> None:
+    """Refuse rows that jump to a known fault code and back; 85.0 is only said.
+
+    Parameters
+    ----------
+    table : Table
+        For the lines in messages, and its list of actions.
+    header : str
+        Of the column.
+    raw : ndarray
+        Its cells as they are written, nan where missing.
+    declared : ImportOptions
+        Import options, of which `missing` is used.
+    temperature : bool
+        Whether the cells are temperatures: then a code that stays until the end is a broken sensor too.
+    """
     known = {float(code) for code in declared.missing if not isinstance(code, str)}
-    present = np.isfinite(raw)
-    index = np.flatnonzero(present)
-    values = raw[present]
-    if len(values) < 3:
+    doubted = [code for code in (*_CODES, _DOUBTED) if code not in known and (raw == code).any()]
+    if not doubted:
         return
-    for code in (*_CODES, _DOUBTED):
-        if code in known:
-            continue
+    index = np.flatnonzero(np.isfinite(raw))
+    values = raw[index]
+    for code in doubted if len(values) > 2 else ():
         hit = values == code
-        if not hit.any() or hit.all():
+        start, stop = _jump(values, hit, code, temperature and code != _DOUBTED)
+        if stop <= start:
             continue
-        before = np.flatnonzero(hit[1:] & ~hit[:-1] & (np.abs(values[1:] - values[:-1]) > _JUMP)) + 1
-        for start in before.tolist():
-            after = start + int(np.argmin(hit[start:]))
-            if hit[start:].all() or abs(values[after] - code) <= _JUMP:  # it stays there: a value like any other
-                continue
-            row = int(index[start])
-            if code == _DOUBTED:
-                table.actions.append(
-                    Action(
-                        "glitches",
-                        after - start,
-                        f"{header!r} reads exactly 85.0 in single rows: a "
-                        "DS18B20 after power-up? missing = [85.0] takes it as missing",
-                        header,
-                        [int(table.lines[row])],
-                    )
-                )
-                break
+        if code != _DOUBTED:
             raise InputError(
                 f"{code:g} jumps there and back, like a fault code ({int(hit.sum())} such cells)",
-                where=table.place(row, header),
+                where=table.place(int(index[start]), header),
                 expected="measured values",
                 remedy=f"Write missing = [{code:g}] to take it as missing.",
             )
+        text = f"{header!r} reads exactly 85.0 in single rows: a DS18B20 after power-up? "
+        text += "missing = [85.0] takes it as missing"
+        table.actions.append(Action("glitches", stop - start, text, header, [table.lines[int(index[start])]]))
 
 
-def in_si(channel: Channel, raw: Array) -> Array:
-    """Values of a channel in the unit that is kept."""
+def _jump(values: Array, hit: NDArray[np.bool_], code: float, may_stay: bool) -> tuple[int, int]:
+    """First run of a code with a jump on either side, (0, 0) if there is none; a single row at an end has one side."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], hit.astype(np.int8), [0]])))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if hit.all():
+            break
+        brief = stop - start == 1 or may_stay and start > 0
+        before = abs(values[start - 1] - code) > _JUMP if start else brief
+        after = abs(values[stop] - code) > _JUMP if stop < len(values) else brief
+        if before and after:
+            return start, stop
+    return 0, 0
+
+
+def to_si(channel: Channel, raw: Array) -> None:
+    """Values of a channel in the unit that is kept, in place."""
+    for part in spans(len(raw)):
+        raw[part] = _in_si(channel, raw[part])
+
+
+def _in_si(channel: Channel, raw: Array) -> Array:
     if channel.scaled:
         values = channel.scale * raw + channel.offset
         return channel.unit_read.to_si(values) if channel.unit == "K" and channel.unit_read else values

@@ -5,13 +5,11 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import numpy as np
-import pandas as pd
-
 from ...errors import InputError
+from ._dates import date_reader, stamp_reader
 from ._options import ImportOptions
-from ._stamps import Clock, read_stamps
-from ._table import Action, Table
+from ._table import Action, Source, Table
+from ._times import Counted, TimeReader
 from ._tokens import short
 from ._units import split_header, unit_of
 
@@ -102,28 +100,19 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
     )
 
 
-def read_clock(table: Table, places: tuple[int, ...], options: ImportOptions) -> Clock:
-    """Time of every row of a table."""
-    n = len(table.lines)
+def time_reader(source: Source, places: tuple[int, ...], options: ImportOptions) -> TimeReader:
+    """Reader of the time of every row of a source, chosen by its first rows."""
+    table, most = source.table, source.most_rows
     if not places:
-        return Clock(np.arange(n, dtype=np.float64) * float(options.sample_time or 1.0), None, "counted", 0.0)
+        return Counted(table, float(options.sample_time or 1.0))
     if len(places) == 2:
-        first, second = (table.columns[k] for k in places)
-        if first.dtype.kind != "O" or second.dtype.kind != "O":
-            raise InputError(
-                f"{table.headers[places[0]]!r} and {table.headers[places[1]]!r} are not both texts",
-                where=table.where,
-                expected="a date and a time of day in every row",
-            )
-        joined = pd.Series(first, dtype=object).str.strip() + " " + pd.Series(second, dtype=object).str.strip()
-        return read_stamps(table, table.headers[places[0]], joined.to_numpy(object), None, options)
+        return date_reader(table, places, most, options)
     header = table.headers[places[0]]
     unit = table.units[places[0]] if table.units and table.units[places[0]].strip("-") else split_header(header)[1]
     cells: Any = table.columns[places[0]]
-    known = unit is not None and unit_of(unit) is not None
-    if cells.dtype.kind == "O" and unit is not None and not known:
+    if cells.dtype.kind == "O" and unit is not None and unit_of(unit) is None:
         unit = None  # "Time [dd.mm.yyyy]" says how the text looks, which the text itself says
-    return read_stamps(table, header, cells, unit, options)
+    return stamp_reader(table, places, most, unit, options)
 
 
 def _place(table: Table, name: str) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError
-from ._table import Table
+from ._table import Lines, Table
 
 
 def is_in_memory(source: Any) -> bool:
@@ -74,7 +74,7 @@ def frame_table(frame: pd.DataFrame, where: str, first_row: int = 0) -> Table:
         headers.insert(0, str(index.name))
         columns.insert(0, np.asarray(index, float))
     return Table(
-        where, tuple(headers), columns, np.arange(first_row, first_row + len(frame)), facts={"rows": len(frame)}
+        where, tuple(headers), columns, Lines(np.arange(first_row, first_row + len(frame))), facts={"rows": len(frame)}
     )
 
 

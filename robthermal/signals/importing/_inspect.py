@@ -7,17 +7,21 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._glitches import glitch_rows
 from ._assemble import make_report, say_dropped
-from ._clock import read_clock, time_columns
+from ._cells import NumberReader, take_codes
+from ._clock import time_columns, time_reader
 from ._columns import Channel
-from ._open import open_table
-from ._options import declared
+from ._open import open_source
+from ._options import Declared, declared
 from ._report import Import, ImportedColumn
 from ._shorten import short_errors
+from ._table import Source
+from ._times import Clock, TimeReader
 from ._units import split_header, unit_of
-from ._values import Values, find_parts
+from ._values import Values, fill, find_parts
 
 
 def inspect(
@@ -53,32 +57,47 @@ def inspect(
     """
     with short_errors():
         choice = declared(*tables, (options, {}, "arguments"))
-        table = open_table(source, choice.record)
+        opened = open_source(source, choice.record)
+        table = opened.table
         time = time_columns(table, choice.record, frozenset())
-        clock = read_clock(table, time, choice.record)
         numeric = [
             k
             for k, cells in enumerate(table.columns)
-            if k not in time
-            and table.headers[k]
-            and getattr(cells, "dtype", np.dtype(object)).kind == "f"
-            and np.isfinite(cells).any()
+            if k not in time and table.headers[k] and getattr(cells, "dtype", np.dtype(object)).kind == "f"
         ]
-        channels = tuple(Channel(table.headers[k], "output", k, None, "") for k in numeric)
-        kept = np.column_stack([table.columns[k] for k in numeric]) if numeric else np.zeros((len(table.lines), 0))
-        values = Values(channels, kept, {k: int(np.isnan(table.columns[k]).sum()) for k in numeric})
-        parts = find_parts(table, clock, Values((), np.zeros((len(table.lines), 0)), {}), choice)
+        clock, values = _values(opened, numeric, choice, time_reader(opened, time, choice.record))
+        alone = Values((), np.zeros((len(table.lines), 0)), np.zeros((len(table.lines), 0)), {}, {})
+        before = table.lines
+        parts = find_parts(table, clock, alone, choice)
+        if table.lines is not before:  # rows that repeat a time are gone
+            values.keep(np.isin(before.numbers(), table.lines.numbers()))
         say_dropped(table, values, time)
-        glitches = {
-            c.name: sum(
-                len(glitch_rows(column[np.isfinite(column)]))
-                for part in parts
-                for column in (values.column(c)[part.rows],)
-            )
-            for c in channels
-        }
+        glitches = {c.name: sum(_glitches(values.column(c)[part.rows]) for part in parts) for c in values.channels}
         report = make_report(source, table, clock, time, values, parts, glitches, choice, None)
         return replace(report, columns=tuple(_unused(column) for column in report.columns))
+
+
+def _values(source: Source, numeric: Sequence[int], choice: Declared, times: TimeReader) -> tuple[Clock, Values]:
+    """Columns of numbers; those that turn out to be no numbers further down are left aside."""
+    table = source.table
+    readers = [NumberReader(table, k, choice.record) for k in numeric]
+    matrix = np.empty((source.most_rows, len(numeric)))
+    n = fill(source, times, readers, list(matrix.T))
+    clock, matrix = times.clock(), matrix[:n]
+    kept = [k for k, r in enumerate(readers) if r.fault is None and not np.isnan(matrix[:, k]).all()]
+    for k in kept:
+        take_codes(table, numeric[k], matrix[:, k], choice.record)
+    columns = {k: matrix[:, k] for k in kept}
+    channels = tuple(Channel(table.headers[numeric[k]], "output", numeric[k], None, "") for k in kept)
+    missing = {numeric[k]: int(np.isnan(column).sum()) for k, column in columns.items()}
+    ranges = {table.headers[numeric[k]]: (float(np.nanmin(x)), float(np.nanmax(x))) for k, x in columns.items()}
+    whole = matrix if len(kept) == len(numeric) else matrix[:, kept]
+    return clock, Values(channels, np.empty((n, 0)), whole, missing, ranges)
+
+
+def _glitches(column: NDArray[np.float64]) -> int:
+    there = np.isfinite(column)
+    return len(glitch_rows(column if there.all() else column[there]))
 
 
 def _unused(column: ImportedColumn) -> ImportedColumn:

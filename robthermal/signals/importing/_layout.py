@@ -14,7 +14,6 @@ from ._units import unit_of
 DELIMITERS = (";", "\t", ",", "|")
 _ROWS = 5  # that must follow a header
 _SEARCHED = 1000  # lines
-_NAMES = {"\t": "tab"}
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class Layout:
     Parameters
     ----------
     delimiter, decimal : str
-        Between cells, within numbers.
+        Between cells, within numbers; decimal is empty where the head has whole numbers only.
     thousands : str or None
         Within numbers, where declared.
     headers : tuple of str
@@ -130,7 +129,7 @@ def _candidates(lines: Sequence[str], content: list[int], d: str, options: Impor
         enough = len(rows) == _ROWS or (place == 0 or options.header_line is not None) and rows
         width = len(rows[0]) if rows else 0
         if enough and all(_fits(row, width, cells) for row in rows):
-            if found and _is_units(cells):  # the units row below the header that was just found
+            if found and (_is_units(cells) or cells == split[found[0][0]]):  # its units row, or it stands there again
                 continue
             found.append((k, d, width))
     return found
@@ -239,7 +238,7 @@ def _decimal(lines: Sequence[str], rows: list[int], d: str, options: ImportOptio
             expected="one of the two",
             remedy='Write decimal = "," or decimal = ".".',
         )
-    return "," if comma is not None else "."
+    return "," if comma is not None else "." if point is not None or d == "," else ""
 
 
 def _no_header(
@@ -292,8 +291,3 @@ def _no_header(
         expected='a header row; cells separated by ";", tab, "," or "|"',
         remedy='Write header_line = N, or delimiter = "…".',
     )
-
-
-def delimiter_name(delimiter: str) -> str:
-    """For people."""
-    return _NAMES.get(delimiter, delimiter)

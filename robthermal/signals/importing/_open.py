@@ -10,15 +10,15 @@ from .._source import check_file
 from ._frames import is_in_memory, read_frame
 from ._options import ImportOptions
 from ._sheets import read_workbook
-from ._table import Table
-from ._text import read_text
+from ._table import Source, Whole
+from ._text import TextSource
 from ._typed import read_mat, read_parquet, read_tdms
 
 _HEAD = 1024
 
 
-def open_table(source: Any, options: ImportOptions, max_bytes: float | None = None) -> Table:
-    """A source as a table, whatever it is.
+def open_source(source: Any, options: ImportOptions, max_bytes: float | None = None) -> Source:
+    """A source of rows, whatever it is.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
         Files that are none of the known kinds.
     """
     if is_in_memory(source):
-        return read_frame(source)
+        return Whole(read_frame(source))
     if not isinstance(source, str | Path):
         raise InputError(
             f"the source is a {type(source).__name__}",
@@ -48,13 +48,13 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
         head = file.read(_HEAD)
     kind = _kind(head, path)
     if kind == "workbook":
-        return read_workbook(path, options)
+        return Whole(read_workbook(path, options))
     if kind == "parquet":
-        return read_parquet(path, max_bytes)
+        return Whole(read_parquet(path, max_bytes))
     if kind == "mat":
-        return read_mat(path, options, max_bytes)
+        return Whole(read_mat(path, options, max_bytes))
     if kind == "tdms":
-        return read_tdms(path, max_bytes)
+        return Whole(read_tdms(path, max_bytes))
     if kind:
         raise InputError(
             f"the file is {kind}",
@@ -62,7 +62,7 @@ def open_table(source: Any, options: ImportOptions, max_bytes: float | None = No
             expected="a table of measured columns",
             remedy="Export it as CSV, XLSX, Parquet, MATLAB or TDMS.",
         )
-    return read_text(path, options)
+    return TextSource(path, options)
 
 
 def _kind(head: bytes, path: Path) -> str:

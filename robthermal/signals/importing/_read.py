@@ -10,9 +10,9 @@ from ...errors import InputError
 from .._checks import channel_names, distinct, positive_number
 from .._record import Record
 from ._assemble import make_records, system_names
-from ._clock import read_clock, time_columns
+from ._clock import time_columns, time_reader
 from ._columns import SystemLike, channels_of_names, channels_of_system
-from ._open import open_table
+from ._open import open_source
 from ._options import declared
 from ._shorten import short_errors
 from ._values import check_limits, find_parts, read_values
@@ -186,15 +186,15 @@ def _read(
         limit = None if max_bytes is None else positive_number(max_bytes, "max_bytes", "B")
         ins, outs = _names(system, inputs, outputs)
         wanted = frozenset((*ins, *outs, *(system_names(system) if system is not None else ())))
-        table = open_table(source, choice.record, limit)
+        opened = open_source(source, choice.record, limit)
+        table = opened.table
         place = time_columns(table, choice.record, wanted)
         channels = (
             channels_of_names(table, ins, outs, choice, place)
             if system is None
             else channels_of_system(table, system, choice, place)
         )
-        clock = read_clock(table, place, choice.record)
-        values = read_values(table, channels, choice, clock)
+        values, clock = read_values(opened, channels, choice, time_reader(opened, place, choice.record))
         if system is not None:
             check_limits(table, values, system)
         parts = find_parts(table, clock, values, choice)

@@ -14,7 +14,7 @@ import pandas as pd
 from ...errors import InputError
 from ._frames import plain_column
 from ._options import ImportOptions
-from ._table import Action, Table
+from ._table import Action, Lines, Table
 from ._tokens import is_missing, is_value, short
 from ._units import unit_of
 
@@ -136,7 +136,7 @@ def _table(cells: pd.DataFrame, header: int, path: Path, sheet: str, digest: str
         f"{path} [{sheet}]",
         names,
         columns,
-        np.flatnonzero(kept) + start + 1,
+        Lines(np.flatnonzero(kept) + start + 1),
         units,
         actions,
         {"sha256": digest, "header_line": header + 1, "skipped_lines": header, "rows": int(kept.sum())},

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,9 +57,55 @@ class Action:
         }
 
 
+class Lines:
+    """Line of every row: runs of neighboring lines, of which even large files have few.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, optional
+        Lines of the first rows.
+    """
+
+    def __init__(self, numbers: NDArray[np.int64] | None = None):
+        self._rows: list[int] = []  # first row of every run
+        self._firsts: list[int] = []  # its line
+        self._n = 0
+        if numbers is not None:
+            self.add(numbers)
+
+    def add(self, numbers: NDArray[np.int64]) -> None:
+        """Lines of further rows, increasing."""
+        if not len(numbers):
+            return
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(numbers) != 1) + 1])
+        if self._n and numbers[0] == self[self._n - 1] + 1:
+            starts = starts[1:]
+        self._rows += (self._n + starts).tolist()
+        self._firsts += numbers[starts].tolist()
+        self._n += len(numbers)
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __getitem__(self, row: int) -> int:
+        run = bisect_right(self._rows, row) - 1
+        return self._firsts[run] + int(row) - self._rows[run]
+
+    def of(self, rows: NDArray[Any]) -> list[int]:
+        """Lines of the first fifty of some rows, given by number or by a mask."""
+        if rows.dtype == bool:
+            rows = np.flatnonzero(rows)
+        return [self[int(row)] for row in rows[:50]]
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Line of every row."""
+        runs = np.searchsorted(self._rows, np.arange(self._n), side="right") - 1
+        return np.asarray(np.asarray(self._firsts)[runs] + np.arange(self._n) - np.asarray(self._rows)[runs])
+
+
 @dataclass
 class Table:
-    """A measured file as columns.
+    """What is known of a measured file, and its first rows; a table in memory is known whole.
 
     Parameters
     ----------
@@ -66,27 +114,83 @@ class Table:
     headers : tuple of str
         As written; "" for a column without a name.
     columns : list of ndarray
-        Equally long: float64 with nan for missing, or text (dtype object) where a column is no numbers.
-    lines : ndarray of int
-        Line of every row, counted from 1; for sources without lines the row, counted from 0.
+        First rows, equally long: float64 with nan for missing, or text (dtype object) where a column is no numbers.
+    lines : Lines
+        Line of every row, counted from 1; for sources without lines the row, counted from 0. Of a text file those of
+        the rows that were read.
     units : tuple of str
         Of a units row; empty without one.
     actions : list of Action
         What reading did.
     facts : dict
         encoding, delimiter, decimal, header_line, skipped_lines, sha256, origin where they apply.
+    empty : set of int
+        Columns that are not used and hold no value.
     """
 
     where: str
     headers: tuple[str, ...]
     columns: list[Any]
-    lines: NDArray[np.int64]
+    lines: Lines
     units: tuple[str, ...] = ()
     actions: list[Action] = field(default_factory=list)
     facts: dict[str, Any] = field(default_factory=dict)
+    empty: set[int] = field(default_factory=set)
 
     def place(self, row: int, header: str = "") -> str:
         """Words for a row, with its column."""
-        number = int(self.lines[row])
-        words = f"line {number}" if self.facts.get("delimiter") else f"row {number}"
+        return self.at(self.lines[row], header)
+
+    def at(self, line: int, header: str = "") -> str:
+        """Words for a line, with its column."""
+        words = f"line {line}" if self.facts.get("delimiter") else f"row {line}"
         return f"{self.where}, {words}" + (f", column {header!r}" if header else "")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Rows that follow each other.
+
+    Parameters
+    ----------
+    columns : dict of int to ndarray or Series
+        Cells of the columns that were asked for, by place.
+    lines : ndarray of int
+        Line of every row.
+    """
+
+    columns: dict[int, Any]
+    lines: NDArray[np.int64]
+
+
+def spans(n: int, size: int = 1 << 20) -> Iterator[slice]:
+    """Slices that cover `n` rows, so that what is computed on the way stays small."""
+    for start in range(0, n, size):
+        yield slice(start, min(start + size, n))
+
+
+class Source(Protocol):
+    """A measured file or table whose rows come block by block."""
+
+    table: Table
+    most_rows: int  # at least as many as it has
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
+        """All rows: columns that are to be numbers, and columns that are left as texts where they are texts."""
+        ...
+
+
+class Whole:
+    """A table that is in memory."""
+
+    def __init__(self, table: Table):
+        self.table = table
+        self.most_rows = len(table.lines)
+        table.empty = {
+            k for k, cells in enumerate(table.columns)
+            if isinstance(cells, np.ndarray) and cells.dtype.kind == "f" and bool(np.isnan(cells).all())
+        }
+
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
+        """All rows at once."""
+        yield Block(dict(enumerate(self.table.columns)), self.table.lines.numbers())

@@ -1,11 +1,12 @@
-"""Text files, block by block: what is no row is left out and said, the rest becomes columns."""
+"""Delimited text files, block by block: the head decides how they are laid out, only columns that are used are read."""
 
 from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,30 +14,22 @@ import numpy as np
 import pandas as pd
 
 from ...errors import InputError
-from ._decode import Decoded, decode
-from ._layout import Layout, cells_of, delimiter_name, find_layout, is_content
+from ._decode import examine
+from ._layout import Layout, find_layout
 from ._options import ImportOptions
-from ._table import Action, Table
+from ._rows import RowReader, count
+from ._table import Action, Block, Lines, Table
 from ._tokens import DECIMAL_COMMA, NUMBER, THOUSANDS, is_missing, na_values, short
 
 _HEAD = 400_000  # characters in which the header is searched
 _LONGEST = 64 * 1024  # characters of a line
-_BLOCK = 16_000_000  # characters parsed at once
+BLOCK = 8_000_000  # bytes read at once
 # Before version 3 the parser rounds the last digit unless it is told not to; since then it is exact and says so.
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
-@dataclass
-class _Left:
-    """Lines that are no rows."""
-
-    blank: list[int] = field(default_factory=list)
-    repeated: list[int] = field(default_factory=list)
-    incomplete: list[int] = field(default_factory=list)
-
-
-def read_text(path: Path, options: ImportOptions) -> Table:
-    """A delimited text file as a table.
+class TextSource:
+    """A delimited text file.
 
     Parameters
     ----------
@@ -48,146 +41,104 @@ def read_text(path: Path, options: ImportOptions) -> Table:
     Raises
     ------
     InputError
-        Binary files, no header, ragged rows, text in a column of numbers is left to the columns that are used.
+        Binary files, no header, ragged rows; text in a column of numbers is left to the columns that are used.
     """
-    with path.open("rb") as file:
-        head = file.read(_LONGEST)
-        if len(head) == _LONGEST and b"\n" not in head and b"\r" not in head and b"\0" not in head:
-            raise InputError(
-                f"the first line is longer than {_LONGEST // 1024} KiB",
-                where=str(path),
-                expected="a text file with a header row and one row per sample",
-            )
-        content = head + file.read()
-    digest = hashlib.sha256(content).hexdigest()
-    where = str(path)
-    decoded = decode(content, where, options.encoding)
-    del content
-    layout = find_layout(decoded.text[:_HEAD].split("\n"), options, where)
-    left, columns, lines = _Left(), _Columns(layout, options), []
-    for text, numbers in _blocks(decoded.text, layout, left, where):
-        columns.add(text, numbers, where)
-        lines.append(numbers)
-    if not lines:
-        raise InputError("the file has a header and no data rows", where=where, expected="a row per sample")
-    table = Table(
-        where,
-        layout.headers,
-        columns.joined(),
-        np.concatenate(lines),
-        layout.units,
-        _actions(decoded, layout, left),
-        {
-            "sha256": digest,
-            "encoding": decoded.encoding,
-            "delimiter": layout.delimiter,
-            "decimal": layout.decimal,
-            "header_line": layout.header_line,
-            "skipped_lines": len(layout.skipped),
-            "rows": sum(map(len, lines)) + len(left.incomplete),
-        },
-    )
-    return table
 
-
-def _blocks(text: str, layout: Layout, left: _Left, where: str) -> Iterator[tuple[str, Any]]:
-    """Parts of the text that hold nothing but rows, with the line of each row."""
-    start = 0
-    for _ in range(layout.first_line - 1):
-        start = text.find("\n", start) + 1
-        if not start:
-            return
-    number = layout.first_line
-    while start < len(text):
-        stop = len(text) if start + _BLOCK >= len(text) else text.rfind("\n", start, start + _BLOCK) + 1 or len(text)
-        part = text[start:stop]
-        rows = part.split("\n")
-        if rows and not rows[-1]:
-            rows.pop()
-        kept, numbers = _rows(part, rows, number, layout, left, where, last=stop == len(text))
-        if len(numbers):
-            yield (part if len(kept) == len(rows) else "\n".join(kept) + "\n"), numbers
-        number += len(rows)
-        start = stop
-
-
-def _rows(
-    part: str, rows: list[str], first: int, layout: Layout, left: _Left, where: str, *, last: bool
-) -> tuple[list[str], Any]:
-    """The lines that are rows, and their numbers; ragged ones are refused. Most files have no other lines: be quick."""
-    d, expected = layout.delimiter, len(layout.headers) - 1
-    quoted = '"' in part
-    counts = np.fromiter((len(cells_of(row, d)) - 1 if quoted else row.count(d) for row in rows), np.int64, len(rows))
-    odd = np.flatnonzero(counts != expected)
-    doubtful = part[:1] in "# \t\n" or any(mark in part for mark in ("\n#", "\n\n", "\n ", "\n\t"))
-    marked = [k for k, row in enumerate(rows) if not is_content(row)] if doubtful else []
-    header = _header_text(rows, layout) if layout.headers[0] in part else ""
-    again = [k for k, row in enumerate(rows) if row == header] if header else []
-    drop = set(marked) | set(again)
-    left.repeated += [first + k for k in again]
-    left.blank += [first + k for k in marked]
-    for k in odd.tolist():
-        if k in drop:
-            continue
-        if not is_content(rows[k]) or [cell for cell in cells_of(rows[k], d)] == list(layout.headers):
-            (left.repeated if is_content(rows[k]) else left.blank).append(first + k)
-        elif last and counts[k] < expected and not any(is_content(row) for row in rows[k + 1 :]):
-            left.incomplete.append(first + k)
-        else:
-            raise _ragged(rows[k], first + k, int(counts[k]) + 1, layout, where)
-        drop.add(k)
-    numbers = np.arange(first, first + len(rows))
-    if not drop:
-        return rows, numbers
-    keep = np.ones(len(rows), bool)
-    keep[list(drop)] = False
-    return [row for k, row in enumerate(rows) if k not in drop], numbers[keep]
-
-
-def _header_text(rows: list[str], layout: Layout) -> str:
-    """Spelling of a repeated header in these rows, if any; empty if none."""
-    first = layout.headers[0]
-    if not first or NUMBER.fullmatch(first):
-        return ""
-    return next(
-        (
-            row
-            for row in rows
-            if row.lstrip('" \t').startswith(first) and cells_of(row, layout.delimiter) == list(layout.headers)
-        ),
-        "",
-    )
-
-
-def _ragged(line: str, number: int, count: int, layout: Layout, where: str) -> InputError:
-    n = len(layout.headers)
-    remedy = "Repair or remove the line."
-    if layout.delimiter == "," and count in (2 * n, 2 * n - 1):
-        remedy = 'Decimal commas between commas? Export with ";" between the cells, or with decimal points.'
-    return InputError(
-        f"the row has {count} cells and the header has {n}: {short(line)}",
-        where=f"{where}, line {number}",
-        expected="as many cells as the header",
-        remedy=remedy,
-    )
-
-
-class _Columns:
-    """Columns of all blocks: numbers where a column is numbers, else text."""
-
-    def __init__(self, layout: Layout, options: ImportOptions):
-        self._layout = layout
+    def __init__(self, path: Path, options: ImportOptions):
+        where = self._where = str(path)
+        _refuse_long_line(path)
+        self._encoded = examine(path, options.encoding)
         self._missing = na_values(options.missing)
-        self._parts: list[list[Any]] = [[] for _ in layout.headers]
+        head, whole = self._head()
+        lines = head.split("\n")
+        layout = find_layout(lines if whole else lines[:-1], options, where)
+        if not layout.decimal:  # the head has neither
+            layout = replace(layout, decimal=self._decimal(layout))
+        self._layout = layout
+        reader = RowReader(layout, where)
+        pieces = head if whole else head[: head.rfind("\n") + 1]
+        blocks = [(text, numbers) for text, numbers in reader.rows(iter([pieces]))]
+        if not blocks and whole:
+            raise InputError("the file has a header and no data rows", where=where, expected="a row per sample")
+        everything = range(len(layout.headers))
+        columns, first_lines = [np.zeros(0) for _ in everything], Lines()
+        for text, numbers in blocks:  # one, as the head comes in one piece
+            first_lines.add(numbers)
+            parsed = self._parsed(text, numbers, everything, ())
+            columns = [_plain(parsed[k], layout) for k in everything]
+        self.table = Table(
+            where,
+            layout.headers,
+            columns,
+            first_lines,
+            layout.units,
+            _actions(self._encoded.assumed, self._encoded.encoding, layout),
+            {
+                "encoding": self._encoded.encoding,
+                "delimiter": layout.delimiter,
+                "decimal": layout.decimal,
+                "header_line": layout.header_line,
+                "skipped_lines": len(layout.skipped),
+            },
+        )
+        self.most_rows = self._encoded.most_lines
 
-    def add(self, text: str, numbers: Any, where: str) -> None:
+    def blocks(self, numbers: Sequence[int], texts: Sequence[int]) -> Iterator[Block]:
+        """All rows of the columns that are used; the others are only asked whether they are empty.
+
+        Parameters
+        ----------
+        numbers, texts : sequence of int
+            Columns whose cells are to be numbers, and columns that are left as texts.
+        """
+        table, used = self.table, {*numbers, *texts}
+        digest = hashlib.sha256()
+        reader = RowReader(self._layout, table.where)
+        table.lines = Lines()
+        empty = {k for k, cells in enumerate(table.columns) if k not in used and _is_empty(cells)}
+        for text, lines in reader.rows(self._encoded.text(digest, BLOCK)):
+            parsed = self._parsed(text, lines, [*used, *empty], [*texts, *empty])
+            table.lines.add(lines)
+            empty = {k for k in empty if not parsed[k].notna().any()}
+            columns = {k: parsed[k] if k in texts else _plain(parsed[k], self._layout) for k in used}
+            yield Block(columns, lines)
+        if not reader.n_rows:
+            raise InputError("the file has a header and no data rows", where=table.where, expected="a row per sample")
+        table.empty = empty
+        table.actions.extend(reader.actions())
+        table.facts |= {"sha256": digest.hexdigest(), "rows": reader.n_file()}
+
+    def _decimal(self, layout: Layout) -> str:
+        """Decimal sign of a file whose first rows have whole numbers only: one more pass."""
+        d = re.escape(layout.delimiter)
+        cell = re.compile(rf'(?:^|{d})[ \t"]*[+-]?\d*([.,])\d+(?:[eE][+-]?\d+)?[ \t"]*(?={d}|$)'.encode(), re.M)
+        for text, _ in RowReader(layout, self._where).rows(self._encoded.text()):
+            found = cell.search(text) if b"," in text or b"." in text else None
+            if found is not None:
+                return found[1].decode()
+        return "."
+
+    def _head(self) -> tuple[str, bool]:
+        """The first characters of the file, and whether they are all."""
+        head, pieces = "", self._encoded.text()
+        for piece in pieces:
+            head += piece
+            if len(head) > _HEAD:
+                return head[:_HEAD], False
+        return head, True
+
+    def _parsed(self, text: bytes, lines: Any, places: Sequence[int], texts: Sequence[int]) -> pd.DataFrame:
         layout = self._layout
+        if not places:
+            return pd.DataFrame(index=range(len(lines)))
         try:
-            frame = pd.read_csv(
-                io.StringIO(text),
+            return pd.read_csv(
+                io.BytesIO(text),
                 sep=layout.delimiter,
                 header=None,
                 names=range(len(layout.headers)),
+                usecols=sorted(places),
+                dtype=dict.fromkeys(texts, str),
                 decimal=layout.decimal,
                 thousands=layout.thousands,
                 na_values=self._missing,
@@ -202,21 +153,24 @@ class _Columns:
         except (pd.errors.ParserError, ValueError) as error:
             raise InputError(
                 f"the rows cannot be read: {short(error, 120)}",
-                where=f"{where}, line {numbers[0]}",
+                where=f"{self._where}, line {lines[0]}",
                 expected="one row per line",
             ) from None
-        for k, part in enumerate(self._parts):
-            part.append(_plain(frame[k], layout))
 
-    def joined(self) -> list[Any]:
-        """Every column in one piece; text as soon as one of its blocks is text."""
-        found = []
-        for parts in self._parts:
-            if all(part.dtype.kind == "f" for part in parts):
-                found.append(np.concatenate(parts))
-            else:
-                found.append(np.concatenate([part if part.dtype.kind == "O" else _as_text(part) for part in parts]))
-        return found
+
+def _refuse_long_line(path: Path) -> None:
+    with path.open("rb") as file:
+        head = file.read(_LONGEST)
+    if len(head) == _LONGEST and b"\n" not in head and b"\r" not in head and b"\0" not in head:
+        raise InputError(
+            f"the first line is longer than {_LONGEST // 1024} KiB",
+            where=str(path),
+            expected="a text file with a header row and one row per sample",
+        )
+
+
+def _is_empty(cells: Any) -> bool:
+    return bool(cells.dtype.kind == "f" and np.isnan(cells).all())
 
 
 def _plain(column: pd.Series[Any], layout: Layout) -> Any:
@@ -245,60 +199,13 @@ def _plain(column: pd.Series[Any], layout: Layout) -> Any:
     return numbers
 
 
-def _as_text(part: Any) -> Any:
-    return np.array([np.nan if np.isnan(value) else f"{value:.15g}" for value in part], object)
-
-
-def _actions(decoded: Decoded, layout: Layout, left: _Left) -> list[Action]:
+def _actions(assumed: bool, encoding: str, layout: Layout) -> list[Action]:
     found = []
-    if decoded.assumed:
-        found.append(Action("decoded", 1, f"not UTF-8; read as {decoded.encoding}, which all its letters fit"))
+    if assumed:
+        found.append(Action("decoded", 1, f"not UTF-8; read as {encoding}, which all its letters fit"))
     if layout.skipped:
-        found.append(
-            Action(
-                "skipped",
-                len(layout.skipped),
-                f"{_count(len(layout.skipped), 'line')} before the header skipped",
-                lines=list(layout.skipped),
-            )
-        )
+        text = f"{count(len(layout.skipped), 'line')} before the header skipped"
+        found.append(Action("skipped", len(layout.skipped), text, lines=list(layout.skipped)))
     if layout.units_line:
         found.append(Action("units_row", 1, f"line {layout.units_line} holds the units", lines=[layout.units_line]))
-    if left.blank:
-        found.append(
-            Action(
-                "skipped",
-                len(left.blank),
-                f"{_count(len(left.blank), 'blank or comment line')} skipped",
-                lines=left.blank[:50],
-            )
-        )
-    if left.repeated:
-        found.append(
-            Action(
-                "skipped",
-                len(left.repeated),
-                f"the header is repeated {_count(len(left.repeated), 'time')}; skipped",
-                lines=left.repeated[:50],
-            )
-        )
-    if left.incomplete:
-        found.append(
-            Action(
-                "dropped_row",
-                len(left.incomplete),
-                f"the last row, line {left.incomplete[0]}, is incomplete; dropped",
-                lines=left.incomplete,
-                rows=len(left.incomplete),
-            )
-        )
     return found
-
-
-def _count(n: int, noun: str) -> str:
-    return f"{n} {noun}" + ("" if n == 1 else "s")
-
-
-def delimiter_in_words(table: Table) -> str:
-    """Delimiter of a table for people."""
-    return delimiter_name(table.facts.get("delimiter", ""))

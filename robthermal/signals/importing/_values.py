@@ -2,93 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from .._plausible import check_temperature, limit_notes
-from ._cells import in_si, numbers, refuse_codes
+from ._cells import NumberReader, refuse_codes, refuse_faults, take_codes, to_si
 from ._columns import Channel, SystemLike, mapped_actions
 from ._options import Declared
 from ._parts import Part, parts_of, say_resampled
-from ._samples import Rows, runs, single
-from ._stamps import Clock
-from ._table import Action, Array, Table
+from ._samples import runs, single
+from ._table import Action, Array, Lines, Source, Table
+from ._times import Clock, TimeReader
+
+_INPUTS = ("input", "current", "ambient")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Values:
-    """Values of the channels, file rows down, in the units that are kept."""
+    """Values of the channels, file rows down, in the units that are kept.
+
+    Parameters
+    ----------
+    channels : tuple of Channel
+        Inputs, currents and ambients, then sensors and other outputs.
+    inputs, outputs : ndarray, shape (n_rows, channels)
+        Where a large file lies in memory, once; nan where missing.
+    missing : dict of int to int
+        Cells without a value, by column of the table.
+    ranges : dict of str to (float, float)
+        Least and largest value of every channel.
+    """
 
     channels: tuple[Channel, ...]
-    kept: Array
+    inputs: Array
+    outputs: Array
     missing: dict[int, int]
+    ranges: dict[str, tuple[float, float]]
 
     def of(self, *roles: str) -> tuple[Channel, ...]:
+        """Channels of some roles."""
         return tuple(c for c in self.channels if c.role in roles)
 
-    def columns(self, *roles: str) -> Array:
-        return self.kept[:, [k for k, c in enumerate(self.channels) if c.role in roles]]
-
     def column(self, channel: Channel) -> Array:
-        return self.kept[:, self.channels.index(channel)]
+        """All values of a channel."""
+        return _column(self.channels, self.inputs, self.outputs, channel)
+
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget the other rows."""
+        self.inputs, self.outputs = self.inputs[rows], self.outputs[rows]
 
 
-def read_values(table: Table, channels: tuple[Channel, ...], choice: Declared, clock: Clock) -> Values:
-    table.actions.extend(mapped_actions(table, channels))
-    kept = np.full((len(table.lines), len(channels)), np.nan)
-    missing: dict[int, int] = {}
-    for k, channel in enumerate(channels):
-        header = table.headers[channel.place]
-        raw = numbers(table, channel.place, choice.record)
-        missing[channel.place] = int(np.isnan(raw).sum())
-        if missing[channel.place] == len(raw):
-            raise InputError(
-                f"column {header!r} holds no value at all",
-                where=table.where,
-                expected="numbers",
-                remedy="Leave it out, or name another column with --column.",
-            )
-        if channel.role != "voltage":  # a voltage may jump anywhere with its current
-            refuse_codes(table, header, raw, choice.record)
-        if (
-            channel.unit == "K"
-            and channel.unit_read is not None
-            and not channel.scaled
-            and channel.unit_read.name in ("K", "degC")
-        ):
-            there = np.isfinite(raw)
-            places = _places(table, np.flatnonzero(there))
-            unit = channel.unit_read.name
-            check_temperature(header, raw[there], clock.seconds[there], unit, places, table.where)
-        kept[:, k] = in_si(channel, raw)
-    return Values(channels, kept, missing)
+def _column(channels: Sequence[Channel], inputs: Array, outputs: Array, channel: Channel) -> Array:
+    n_in = inputs.shape[1]
+    k = channels.index(channel)
+    return inputs[:, k] if k < n_in else outputs[:, k - n_in]
 
 
-def _places(table: Table, rows: Rows) -> Callable[[int], str]:
-    """Words for the place of some rows of a table."""
-    return lambda row: table.place(int(rows[row])).rpartition(", ")[2]
+def read_values(
+    source: Source, channels: Sequence[Channel], choice: Declared, times: TimeReader
+) -> tuple[Values, Clock]:
+    """Values of the channels and the time of every row, on one pass through the rows.
+
+    Parameters
+    ----------
+    source : Source
+        The rows.
+    channels : sequence of Channel
+        Columns that are used.
+    choice : Declared
+        What is declared.
+    times : TimeReader
+        Reader of the time column.
+
+    Raises
+    ------
+    InputError
+        Cells that are no numbers or times, columns without a value, undeclared fault codes, the wrong unit.
+    """
+    table = source.table
+    ordered = tuple(c for inputs in (True, False) for c in channels if (c.role in _INPUTS) == inputs)
+    n_in = sum(c.role in _INPUTS for c in ordered)
+    U, Y = np.empty((source.most_rows, n_in)), np.empty((source.most_rows, len(ordered) - n_in))
+    readers = [NumberReader(table, c.place, choice.record) for c in ordered]
+    n = fill(source, times, readers, [_column(ordered, U, Y, c) for c in ordered])
+    U, Y = U[:n], Y[:n]
+    clock = times.clock()
+    refuse_faults(readers)
+    table.actions.extend(mapped_actions(table, ordered))
+    values = Values(ordered, U, Y, {}, {})
+    for channel in ordered:
+        raw = values.column(channel)
+        take_codes(table, channel.place, raw, choice.record)
+        values.missing[channel.place] = int(np.isnan(raw).sum())
+        _check(table, channel, raw, choice, clock)
+        to_si(channel, raw)
+        values.ranges[channel.name] = float(np.nanmin(raw)), float(np.nanmax(raw))
+    return values, clock
+
+
+def fill(source: Source, times: TimeReader, readers: Sequence[NumberReader], columns: Sequence[Array]) -> int:
+    """Cells of all blocks into the columns; how many rows."""
+    n = 0
+    clock = {"texts": times.places, "numbers": ()} if times.text else {"texts": (), "numbers": times.places}
+    for block in source.blocks([*clock["numbers"], *(r.place for r in readers)], clock["texts"]):
+        times.add(block)
+        stop = n + len(block.lines)
+        for reader, column in zip(readers, columns, strict=True):
+            column[n:stop] = reader.read(block)
+        n = stop
+    return n
+
+
+def _check(table: Table, channel: Channel, raw: Array, choice: Declared, clock: Clock) -> None:
+    header = table.headers[channel.place]
+    if len(raw) and np.isnan(raw).all():
+        raise InputError(
+            f"column {header!r} holds no value at all",
+            where=table.where,
+            expected="numbers",
+            remedy="Leave it out, or name another column with --column.",
+        )
+    if channel.role != "voltage":  # a voltage may jump anywhere with its current
+        refuse_codes(table, header, raw, choice.record, channel.unit == "K")
+    unit = channel.unit_read.name if channel.unit_read is not None else ""
+    if channel.unit == "K" and not channel.scaled and unit in ("K", "degC"):
+        def words(row: int) -> str:
+            return table.place(row).rpartition(", ")[2]
+
+        check_temperature(header, raw, clock.seconds, unit, words, table.where)
 
 
 def check_limits(table: Table, values: Values, system: SystemLike) -> None:
-    raw = {c.name: values.column(c)[np.isfinite(values.column(c))] for c in values.channels}
-    raw = {name: column for name, column in raw.items() if len(column)}
+    """Say what is outside of declared limits; a current in milliampere is refused."""
+    raw = {c.name: values.column(c) for c in values.channels}
     for text in limit_notes(raw, system.current_limits, system.input_limits, table.where):
         table.actions.append(Action("glitches", 1, text))
 
 
 def find_parts(table: Table, clock: Clock, values: Values, choice: Declared) -> list[Part]:
-    pieces = []
-    for rows in runs(table, clock, choice.record):
-        kept, stamps = single(table, clock, rows, values.kept, choice.record)
-        pieces.append((kept, clock.seconds[kept] if stamps is None else stamps))
-    driven, read = values.columns("input", "current"), values.columns("ambient", "sensor", "voltage", "output")
-    headers = tuple(
-        tuple(table.headers[c.place] for c in values.of(*roles))
-        for roles in (("input", "current"), ("ambient", "sensor", "voltage", "output"))
-    )
-    parts = parts_of(table, pieces, driven, read, choice.record, (headers[0], headers[1]))
+    """Uninterrupted parts of a file; rows that repeat a time leave the values and the table's lines."""
+    pieces, stamps = runs(table, clock, choice.record), clock.seconds
+    stamps, keep = single(table, stamps, pieces, (values.inputs, values.outputs), choice.record)
+    if keep is not None:
+        values.keep(keep)
+        before = np.concatenate([[0], np.cumsum(keep)])
+        pieces = [slice(int(before[rows.start]), int(before[rows.stop])) for rows in pieces]
+        table.lines, stamps = Lines(table.lines.numbers()[keep]), stamps[keep]
+    named = {c: (table.headers[c.place], values.column(c)) for c in values.channels}
+    driven = [named[c] for c in values.of("input", "current")]
+    read = [named[c] for c in values.of("ambient", "sensor", "voltage", "output")]
+    parts = parts_of(table, stamps, pieces, driven, read, choice.record)
     say_resampled(table, parts, {c.name: values.column(c) for c in values.of("ambient", "sensor")})
     return parts
