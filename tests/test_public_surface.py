@@ -35,13 +35,13 @@ SURFACE = {
     """,
     "design": """
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput Design DesignCode
-        DisturbanceObserver
-        Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver LinearController Matrices
-        MatrixController ObserverModel PID Placement Polarity Reach Reachable RegulatedPoint RobustAgainst Seen
-        StateFeedback StepResponseLinearity
+        DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
+        LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
+        Polarity Reach Reachable RegulatedPoint RobustAgainst Seen StateFeedback StepResponseLinearity Tuning
         certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
-        feedback_linearization hinf linear_controller load_controller loop_poles observer pid place_sensors reachable
-        regulated_points simulate_loop state_feedback step_response_linearity unobservable
+        feedback_linearization hinf linear_controller load_controller loop_margins loop_poles observer pid
+        place_sensors reachable regulated_points simulate_loop state_feedback step_response_linearity tune_pi
+        unobservable
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck

@@ -21,8 +21,12 @@ from ._linearization import Reach as Reach
 from ._linearization import feedback_linearization as feedback_linearization
 from ._loop import ClosedLoop as ClosedLoop
 from ._loop import simulate_loop as simulate_loop
+from ._loop_margins import LoopMargins as LoopMargins
+from ._loop_margins import PlantMargins as PlantMargins
+from ._loop_margins import loop_margins as loop_margins
 from ._lti import LinearController as LinearController
 from ._lti import linear_controller as linear_controller
+from ._margins import Margins as Margins
 from ._matrices import Matrices as Matrices
 from ._matrix_controller import MatrixController as MatrixController
 from ._matrix_controller import load_controller as load_controller
@@ -49,6 +53,8 @@ from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 from ._step_response_linearity import StepResponseLinearity as StepResponseLinearity
 from ._step_response_linearity import step_response_linearity as step_response_linearity
+from ._tuning import Tuning as Tuning
+from ._tuning import tune_pi as tune_pi
 
 # Former names, kept for one version.
 Collapse = StepResponseLinearity
@@ -57,9 +63,10 @@ collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
            "ControllerInput", "Design", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
-           "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "Matrices", "MatrixController",
-           "ObserverModel", "PID", "Placement", "Polarity", "Reach", "Reachable", "RegulatedPoint", "RobustAgainst",
-           "Seen", "StateFeedback", "StepResponseLinearity", "certify_loop", "check_polarity", "cold_side", "collapse",
-           "constant_gain", "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "hinf",
-           "linear_controller", "load_controller", "loop_poles", "observer", "pid", "place_sensors", "reachable",
-           "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "unobservable"]
+           "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
+           "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity", "Reach",
+           "Reachable", "RegulatedPoint", "RobustAgainst", "Seen", "StateFeedback", "StepResponseLinearity", "Tuning",
+           "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain", "corner_plants",
+           "disturbance_observer", "feed_forward", "feedback_linearization", "hinf", "linear_controller",
+           "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable",
+           "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]

@@ -20,6 +20,9 @@ class DesignCode(OutcomeCode):
     FOUND = (True, "A set of sensors was found whose observer is certified.")
     LIMITED = (False, "A limit of a current was active: the loop is not linear there, or cannot hold its set-point.",
                "rt.design.reachable tells what it can hold with this load.")
+    MARGINS = (True, "The linearized loop is stable for every plant that was computed; its margins are known.")
+    MARGINS_MISSED = (False, "The loop does not keep a margin that was asked for.",
+                      "Ask for less bandwidth; the text says how much is possible.")
     MOVING = (False, "A cold face still moves towards its set-point.",
               "Simulate longer.")
     NONE = (False, "No set of sensors was certified over the box.",
@@ -30,13 +33,20 @@ class DesignCode(OutcomeCode):
                        "Lower the current, allow more time, or add sensors at the modules.")
     NOT_FOUND = (False, "No state feedback was found for all plants; the gains are those for the nominal one.",
                  "Narrow the range of the plants, or ask for less bandwidth.")
+    NOT_HELD = (False, "A plant of the parameter ranges cannot hold the set-points within the limits.",
+                "Move the set-points, narrow the ranges, or cool the hot side better.")
+    NOT_TUNED = (False, "No bandwidth keeps the margins that were asked for.",
+                 "Ask for less margin; the text says what limits the loop.")
     RAN_AWAY = (False, "The simulated machine ran away: a temperature left the sensible range.",
                 "Lower the limits of the currents, the load or the bandwidth.")
     REACHABLE = (True, "The set-points can be held.")
     REVERSED = (False, "Reversed polarity fits the data better than the declared one.",
                 "Swap the leads, or the sign of the current column, or hot and cold in the system file.")
     SETTLED = (True, "Every cold face stays at its set-point.")
+    TUNED = (True, "The largest bandwidth that keeps the margins was found.")
     UNDECIDED = (False, "The wirings fit almost equally badly.",
                  "Step the currents further from rest, or calibrate first.")
     UNREACHABLE = (False, "These set-points cannot be held; the text says which can.",
                    "Choose set-points within it, lower the load, or cool the hot side better.")
+    UNSTABLE = (False, "The linearized loop is unstable for a plant of the parameter ranges.",
+                "Ask for less bandwidth, or narrow the ranges.")

@@ -113,10 +113,9 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
                          expected="one of the two")
     m = len(plant.law.names)
     if bandwidth is not None:
-        w = positive_number(bandwidth, "bandwidth", "rad/s")
         check_pairs(plant)
-        kp = 1 / np.abs(np.diag(plant.response(w)[0]))
-        ki, kd = kp * w / 4, np.zeros(m)
+        tuned = pi_of_bandwidth(plant, positive_number(bandwidth, "bandwidth", "rad/s"), h)
+        kp, ki, kd = tuned.proportional, tuned.integral, tuned.derivative
     else:
         kp, ki, kd = (per_module(gain, m, name, unit) for gain, name, unit in (
             (proportional, "proportional", "W/K"), (integral, "integral", "W/(K s)"),
@@ -129,6 +128,23 @@ def pid(plant: ColdSide, *, sample_time: float, bandwidth: float | None = None,
     controller = PID(kp, ki, kd, tau, tracking, h)
     check_sampling(plant, controller, lambda time: PID(kp, ki, kd, max(tau, 2 * time), tracking, time))
     return controller
+
+
+def pi_of_bandwidth(plant: ColdSide, bandwidth: float, sample_time: float) -> PID:
+    """PI whose proportional part crosses 1 at a bandwidth, stable or not.
+
+    Parameters
+    ----------
+    plant : ColdSide
+        What it controls.
+    bandwidth : float
+        Crossover of the loops [rad/s].
+    sample_time : float
+        Time between two samples [s].
+    """
+    kp = 1 / np.abs(np.diag(plant.response(bandwidth)[0]))
+    ki = kp * bandwidth / 4
+    return PID(kp, ki, np.zeros(len(kp)), 2 * sample_time, np.maximum(kp / ki, sample_time), sample_time)
 
 
 def check_pairs(plant: ColdSide) -> None:

@@ -145,6 +145,38 @@ def reachable(law: FeedbackLinearization, setpoint: Mapping[str, float] | float,
     return Reachable(wanted, passive, far, current, why, outcome, faces, lumps)
 
 
+def held_near(law: FeedbackLinearization, points: tuple[RegulatedPoint, ...], setpoint: Array,
+              inputs: Mapping[str, float], near: tuple[Array, Array]) -> tuple[Array, Array] | None:
+    """Lumps and currents that hold set-points, by Newton's method from those of a similar machine.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        Its system and current limits.
+    points : tuple of RegulatedPoint
+        What is regulated.
+    setpoint : ndarray
+        Set-points of the points [K].
+    inputs : mapping
+        Ambients [K] and heaters [unit].
+    near : tuple of ndarray
+        Lumps [K] and currents [A] to start from.
+
+    Returns
+    -------
+    tuple of ndarray or None
+        None where no stable steady state within the limits is found so.
+    """
+    eq = Equations(law.system)
+    u = eq.nominal()
+    for name, value in inputs.items():
+        u[law.system.exogenous_names.index(name)] = value
+    search = _Search(law, eq, u, np.zeros(len(near[0])), near[0], points)
+    goal = np.array([float(point.temperature(value)) for point, value in zip(points, setpoint, strict=True)])
+    found = search._solve(goal, *near)
+    return None if found is None or search._limit(*found) else found
+
+
 @dataclass(frozen=True)
 class _Search:
     """Marches along a line of set-points, from the passive faces, through stable steady states only."""
