@@ -150,7 +150,8 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -
     assert titles == ["Contraction at the current limits", "The box is never left",
                       "Contraction in the box that is never left", "The observer's error shrinks"]
     cases = ElementTree.parse(out / "junit.xml").findall(".//testcase")
-    gates = ["not_certified", "not_verified", "current_beyond_invariance", "nominal_only"]  # looked for, none failed
+    gates = ["not_certified", "not_verified", "current_beyond_invariance", "not_robust", "margin_missed",
+             "loop_not_robust", "nominal_only"]  # looked for, none failed
     assert [case.get("name") for case in cases] == titles + gates
     assert not [case for case in cases if case.find("failure") is not None]
     assert run("verify", out).status == 0

@@ -23,7 +23,7 @@ CODES = {
     "coupling": """-axis +gap -infeasible -limit +met +nominal -not_proven ?not_reduced -not_robust -not_stable
         +robust""",
     "design": """+as_declared +certified +certified_sampled_model +collapsed +designed +found -limited +margins
-        -margins_missed -moving -none -not_certified -not_contracting -not_found -not_held -not_tuned -ran_away
+        -moving -none -not_certified -not_contracting -not_found -not_held -not_tuned -ran_away
         +reachable -reversed +settled +tuned -undecided -unreachable -unstable""",
     "diagnosis": """+adequate -ambiguous +consistent +converged +declared -doubtful +estimated +found -inadequate
         -inexact +named -none -not_converged -not_predicted +nothing +predicted +selected -unexplained""",

@@ -266,11 +266,21 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            current: Annotated[list[str] | None, typer.Option(
                help="Limits of one module [A]; default the largest that are certified.", metavar="NAME=LO:HI")] = None,
            ambient: AmbientRange = None, temperature: Box = None,
-           bandwidth: Annotated[float, typer.Option(help="Crossover of the loops [rad/s].")] = 0.02,
+           bandwidth: Annotated[float | None, typer.Option(
+               help="Crossover of the loops [rad/s]; default the largest that keeps the margins, else 0.02.")] = None,
+           margin: Annotated[list[str] | None, typer.Option(
+               help="Least gain [-], phase [deg], modulus [-] or delay [s] margin of every loop, may repeat.",
+               metavar="NAME=VALUE")] = None,
            sample_time: Annotated[float, typer.Option(help="[s].")] = 1.0,
            sensors: Annotated[str | None, typer.Option(
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+           parameters: Annotated[list[str] | None, typer.Option(
+               help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
+               metavar="FILE.json|NAME=LO:HI")] = None,
+           confidence: Annotated[float, typer.Option(help="Of ranges from a calibration, above 0.5.")] = 0.95,
+           export: Annotated[str | None, typer.Option(
+               help="Law, controller and observer for other programs too: c, mat, json, with commas.")] = None,
            as_json: Json = False) -> None:
     """Design a controller: certified current limits, linearizing feedback law, PI, observer, certificates, report.
 
@@ -279,12 +289,15 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
     found = rt.read_system(system)
     wanted = rt.jobs.design.design_from_text(
         found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
-        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method, regulate=regulate or [])
+        bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method, regulate=regulate or [],
+        margins=margin or [], export=export,
+        parameters=rt.jobs.request.ranges_from_text(found, parameters or [], confidence))
     rt.jobs.folder.check_free(out)
     with progress() as stage:
         result = rt.jobs.design_system(found, wanted, stage)
         stage("writing the report")
-        report = rt.jobs.write_design(result, (system,), out)
+        given = [Path(text) for text in parameters or [] if text.endswith(".json")]
+        report = rt.jobs.write_design(result, (system, *given), out)
     show_report(report, out, as_json, controller=str(out / "design.json"))
 
 

@@ -54,6 +54,7 @@ from ._state_feedback import state_feedback as state_feedback
 from ._step_response_linearity import StepResponseLinearity as StepResponseLinearity
 from ._step_response_linearity import step_response_linearity as step_response_linearity
 from ._tuning import Tuning as Tuning
+from ._tuning import checked_margins as checked_margins
 from ._tuning import tune_pi as tune_pi
 
 # Former names, kept for one version.
@@ -66,7 +67,8 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
            "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity", "Reach",
            "Reachable", "RegulatedPoint", "RobustAgainst", "Seen", "StateFeedback", "StepResponseLinearity", "Tuning",
-           "certify_loop", "check_polarity", "cold_side", "collapse", "constant_gain", "corner_plants",
-           "disturbance_observer", "feed_forward", "feedback_linearization", "hinf", "linear_controller",
-           "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable",
-           "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]
+           "certify_loop", "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain",
+           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "hinf",
+           "linear_controller", "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors",
+           "reachable", "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "tune_pi",
+           "unobservable"]

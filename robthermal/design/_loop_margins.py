@@ -14,7 +14,7 @@ from ._controller import Controller
 from ._corner_values import Corner, Ranges, checked_ranges, corners
 from ._linearization import FeedbackLinearization
 from ._margin_plots import plot_bode, plot_nyquist
-from ._margins import KEYS, UNSTABLE, Margins, disk, frequencies, margins
+from ._margins import KEYS, UNITS, UNSTABLE, Margins, disk, frequencies, margins
 from ._modules import Array
 from ._numbers import expect
 from ._observer import GainObserver
@@ -107,6 +107,25 @@ class LoopMargins:
             "gain", "phase", "modulus" or "delay".
         """
         return min(self.plants, key=lambda plant: getattr(plant.margins[loop], margin))
+
+    def missed(self, wanted: Mapping[str, float]) -> tuple[str, ...]:
+        """Margins that are not kept for all plants, in words; empty where all are kept.
+
+        Parameters
+        ----------
+        wanted : mapping
+            Least "gain" [-], "phase" [deg], "modulus" [-], "delay" [s]; some of them.
+        """
+        said = []
+        for loop in self.loops:
+            for key, least in wanted.items():
+                plant = self.worst_plant(loop, key)
+                value = getattr(plant.margins[loop], key)
+                if value < least * (1 - 1e-9):
+                    at = ", ".join(f"{name} = {number:.6g}" for name, number in plant.corner.items())
+                    said.append(f"the {key} margin of {loop} is {value:.3g}{UNITS[key]}, not {least:g}{UNITS[key]}"
+                                + (f", with {at}" if at else ""))
+        return tuple(said)
 
     @property
     def disk(self) -> float:
@@ -253,7 +272,7 @@ def analyzed(plant: OperatedPlant | None, corner: Corner, parts: LoopParts, freq
     parts : LoopParts
         Law, controller and observer.
     frequency : ndarray
-        Angular frequencies [rad/s].
+        Angular frequencies of the responses [rad/s].
     """
     names = parts.law.names
     if plant is None:

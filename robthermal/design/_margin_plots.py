@@ -19,7 +19,7 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
     Parameters
     ----------
     frequency : ndarray
-        Angular frequencies [rad/s].
+        Angular frequencies of the responses [rad/s].
     nominal : ndarray
         Loop transfer of the nominal plant.
     corners : sequence of ndarray

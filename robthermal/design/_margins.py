@@ -13,6 +13,7 @@ from ._modules import Array
 from ._sampled_loop import SampledLoop
 
 KEYS = ("gain", "phase", "modulus", "delay")
+UNITS = {"gain": "", "phase": " deg", "modulus": "", "delay": " s"}
 POINTS = 300
 
 

@@ -99,7 +99,8 @@ class GainObserver(Observer):
         """
         return largest_radius(self.model, self.gain, blocks(self.model.system, current, temperature))
 
-    def certify(self, current: Mapping[str, Interval], temperature: Temperatures) -> Certificate:
+    def certify(self, current: Mapping[str, Interval], temperature: Temperatures,
+                parameters: Mapping[str, Interval] | None = None) -> Certificate:
         """Certificate that the error decays for every temperature, estimate and current of a box.
 
         Parameters
@@ -108,6 +109,8 @@ class GainObserver(Observer):
             [A], every module named.
         temperature : (lower, upper) or mapping of lump to (lower, upper)
             Temperature range of all lumps, or of each [K].
+        parameters : mapping, optional
+            Ranges of uncertain numbers of the system, as in `rt.certify.observer`.
 
         Returns
         -------
@@ -117,7 +120,8 @@ class GainObserver(Observer):
         # the certificate's sensors read gain times their lump, this observer undoes that first
         gain = self.gain / np.array([self.model.system.sensors[name].gain for name in self.sensors])
         return certify_observer(self.model.system, gain=gain, sensors=list(self.sensors),
-                                sample_time=self.sample_time, current=current, temperature=temperature)
+                                sample_time=self.sample_time, current=current, temperature=temperature,
+                                parameters=parameters)
 
     def frozen_limit(self, temperature: Temperatures,
                      direction: Literal["symmetric", "cooling", "heating"] = "symmetric") -> float:

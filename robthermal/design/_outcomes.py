@@ -21,8 +21,6 @@ class DesignCode(OutcomeCode):
     LIMITED = (False, "A limit of a current was active: the loop is not linear there, or cannot hold its set-point.",
                "rt.design.reachable tells what it can hold with this load.")
     MARGINS = (True, "The linearized loop is stable for every plant that was computed; its margins are known.")
-    MARGINS_MISSED = (False, "The loop does not keep a margin that was asked for.",
-                      "Ask for less bandwidth; the text says how much is possible.")
     MOVING = (False, "A cold face still moves towards its set-point.",
               "Simulate longer.")
     NONE = (False, "No set of sensors was certified over the box.",

@@ -101,7 +101,8 @@ def regulated_points(law: FeedbackLinearization, regulate: Regulate = None) -> t
     Raises
     ------
     InputError
-        Unknown modules, sensors or lumps; a name that is a lump, and a sensor on another one; a sensor of gain 0.
+        Unknown modules, sensors or lumps; a name that is a lump, and a sensor on another one; a sensor of
+        a voltage.
 
     Examples
     --------
@@ -121,20 +122,17 @@ def regulated_points(law: FeedbackLinearization, regulate: Regulate = None) -> t
 
 def _point(law: FeedbackLinearization, module: str, name: str, named: bool) -> RegulatedPoint:
     system = law.system
-    sensor = system.sensors.get(name) if named else None
+    sensor = system.thermometer(name, f"regulate {module}") if named and name in system.sensors else None
     if sensor is None:
         if name not in system.lumps:
             raise InputError(f"there is no sensor or lump {name!r}", where=f"regulate {module}", expected="one of "
-                             + ", ".join((*system.sensors, *system.lumps)))
+                             + ", ".join((*system.thermometers, *system.lumps)))
         return RegulatedPoint(module, name, "lump", name)
     system.thermometer(name, f"regulate {module}")
     if name in system.lumps and sensor.lump != name:
         raise InputError(f"{name!r} is a lump, and a sensor on another lump, {sensor.lump!r}",
                          where=f"regulate {module}", expected="a name that means one thing",
                          remedy="Rename the sensor.")
-    if not sensor.gain:
-        raise InputError(f"sensor {name!r} has gain 0: it reads nothing", where=f"regulate {module}",
-                         expected="a sensor that follows its lump")
     reference = next(iter(system.ambients.values())).temperature
     return RegulatedPoint(module, name, "sensor", sensor.lump, sensor.gain, sensor.offset, reference,
                           sensor.time_constant, sensor.delay)

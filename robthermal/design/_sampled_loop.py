@@ -227,10 +227,10 @@ def law_slopes(law: FeedbackLinearization, temperatures: Array, current: Array) 
     S1, R1, K1 = (np.array([getattr(part, key).slope for part in law.modules.parts])
                   for key in ("seebeck", "resistance", "conductance"))
     across, I = p.hot - p.cold, current  # noqa: E741 - I is the current
-    bent = 0.5 * K1 * across + 0.25 * R1 * I**2 - 0.5 * S1 * p.cold * I  # by the mean temperature of the faces
+    by_mean = 0.5 * K1 * across + 0.25 * R1 * I**2 - 0.5 * S1 * p.cold * I  # by the mean temperature of the faces
     by_current = p.R * I - p.S * p.cold
     by_faces = np.zeros((len(I), len(law.system.lumps)))
     for i, (hot, cold) in enumerate(zip(law.modules.hot, law.modules.cold, strict=True)):
-        by_faces[i, hot] = -(p.K + bent)[i] / by_current[i]
-        by_faces[i, cold] = -(bent - p.K - p.S * I)[i] / by_current[i]
+        by_faces[i, hot] = -(p.K + by_mean)[i] / by_current[i]
+        by_faces[i, cold] = -(by_mean - p.K - p.S * I)[i] / by_current[i]
     return np.diag(1.0 / by_current), by_faces

@@ -12,7 +12,7 @@ from ..errors import InputError, Outcome
 from ._corner_values import Corner, Ranges, checked_ranges
 from ._linearization import FeedbackLinearization
 from ._loop_margins import LoopMargins, analyzed, margins_of
-from ._margins import KEYS, frequencies
+from ._margins import KEYS, UNITS, frequencies
 from ._numbers import expect
 from ._observer import GainObserver
 from ._operated_plants import Operation
@@ -27,7 +27,6 @@ _GRID = 60
 _LITTLE = np.radians(5.0)  # phase below which nothing is said to limit a loop
 _FINE = 1.005  # ratio of bandwidths at which the search ends
 _LIMITS = {"gain": (1.0, np.inf), "phase": (0.0, 90.0), "modulus": (0.0, 1.0), "delay": (0.0, np.inf)}
-_UNITS = {"gain": "", "phase": " deg", "modulus": "", "delay": " s"}
 
 
 @dataclass(frozen=True)
@@ -78,34 +77,12 @@ def checked_margins(wanted: Mapping[str, float]) -> dict[str, float]:
         number, (low, high) = finite_number(value, f"margins {key}"), _LIMITS[key]
         if not low < number < high:
             raise InputError(f"{key} = {number:g}", where="margins", expected=f"above {low:g}"
-                             + (f" and below {high:g}" if np.isfinite(high) else "") + _UNITS[key])
+                             + (f" and below {high:g}" if np.isfinite(high) else "") + UNITS[key])
         found[key] = number
     if not found:
         raise InputError("no margin is given", where="margins", expected="some of " + ", ".join(KEYS),
                          remedy="For example gain = 2.0, phase = 45.0, modulus = 0.5.")
     return found
-
-
-def misses(found: LoopMargins, wanted: Mapping[str, float]) -> list[str]:
-    """Margins that are not kept for all plants, in words.
-
-    Parameters
-    ----------
-    found : LoopMargins
-        Of the loop.
-    wanted : mapping
-        Margins that are asked for.
-    """
-    said = []
-    for loop in found.loops:
-        for key, least in wanted.items():
-            plant = found.worst_plant(loop, key)
-            value = getattr(plant.margins[loop], key)
-            if value < least * (1 - 1e-9):
-                at = ", ".join(f"{name} = {number:.6g}" for name, number in plant.corner.items())
-                said.append(f"the {key} margin of {loop} is {value:.3g}{_UNITS[key]}, not {least:g}{_UNITS[key]}"
-                            + (f", with {at}" if at else ""))
-    return said
 
 
 def tune_pi(law: FeedbackLinearization, setpoint: Mapping[str, float] | float, *, margins: Mapping[str, float],
@@ -229,7 +206,7 @@ def limiting(plant: ColdSide, i: int, frequency: float, sample_time: float) -> s
     plant : ColdSide
         With its regulated points.
     i : int
-        Which module.
+        Position of the module in the law.
     frequency : float
         In angular frequency [rad/s].
     sample_time : float
@@ -250,7 +227,7 @@ def limiting(plant: ColdSide, i: int, frequency: float, sample_time: float) -> s
 
 
 def _said(wanted: Mapping[str, float]) -> str:
-    return ", ".join(f"{key} {least:g}{_UNITS[key]}" for key, least in wanted.items())
+    return ", ".join(f"{key} {least:g}{UNITS[key]}" for key, least in wanted.items())
 
 
 def _not_tuned(search: _Search, wanted: Mapping[str, float], checked: Sequence[Corner],

@@ -50,6 +50,10 @@ class GateCode(Enum):
                        "Give `noise` in [sensors.NAME].")
     NOMINAL_ONLY = ("The claims are about exactly the parameters of the model, not about ranges of them.",
                     "Calibrate with data, or give [certify] parameters.")
+    MARGIN_MISSED = ("A loop does not keep a margin that was asked for.",
+                     "Ask for less bandwidth or margin; the reason says how much bandwidth is possible.")
+    LOOP_NOT_ROBUST = ("A loop is unstable, or cannot hold its set-point, for some parameters in their ranges.",
+                       "Ask for less bandwidth, move the set-points, or measure the parameter that is named better.")
     REPORT_CHANGED = ("report.json is not what the job wrote.", "Run the job again.")
 
     def __init__(self, meaning: str, remedy: str) -> None:

@@ -82,7 +82,7 @@ def claim_of(file: str, certificate: Certificate, verdict: Verdict | None, *, ti
                  seconds=seconds if seconds is not None else verdict.seconds if verdict else 0.0)
 
 
-_JOB = ("contraction", "box", "box_contraction")
+_JOB = ("contraction", "box", "box_contraction", "observer")
 
 
 def _sentence(key: str, certificate: Certificate, usable: bool) -> str:

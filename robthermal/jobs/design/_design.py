@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...certify import contraction
+from ...certify import RunawayFree
 from ...design import (
     PID,
     ClosedLoop,
     Collapse,
     FeedbackLinearization,
     GainObserver,
+    LoopMargins,
     Reachable,
     RegulatedPoint,
     cold_side,
@@ -26,19 +27,19 @@ from ...design import (
 )
 from ...errors import InputError
 from ...thermal import System
-from ...verification import Certificate, verify
-from ..claims import Certification, Checked
-from ..request import Boxes
+from ..claims import Certification
+from ._claims import certified_design, certified_observer
 from ._limits import (
     Pairs,
     ambient_ends,
     candidates,
     certified_limits,
     check_given,
-    coldest_faces,
-    contain,
+    hottest,
     worst_runaway,
 )
+from ._loops import BANDWIDTH as _BANDWIDTH
+from ._loops import Loops, tuned_loops
 from ._request import DesignRequest, celsius
 
 _LONG = 12.0  # simulated time in units of 1/bandwidth
@@ -69,6 +70,16 @@ class ControllerDesign:
         Simulated step from rest to the set-points, with the observer and its sensors' noise.
     collapse : Collapse or None
         Normalized steps with the feedback law and without it; None where the set-points leave no room for steps.
+    margins : LoopMargins
+        Of every loop, for the nominal and all corner plants of the parameter ranges.
+    bandwidth : float
+        Crossover of the loops, asked for or tuned [rad/s].
+    missed : tuple of str
+        Margins that were asked for and are not kept, with the bandwidth that would keep them.
+    robust : RunawayFree or None
+        The box that is never left for all parameters in their ranges; None without ranges.
+    tuning : str
+        How the bandwidth was found, where it was tuned.
     """
 
     request: DesignRequest
@@ -79,6 +90,11 @@ class ControllerDesign:
     reach: Reachable
     loop: ClosedLoop
     collapse: Collapse | None
+    margins: LoopMargins
+    bandwidth: float
+    missed: tuple[str, ...] = ()
+    robust: RunawayFree | None = None
+    tuning: str = ""
 
     @property
     def points(self) -> dict[str, RegulatedPoint]:
@@ -87,14 +103,13 @@ class ControllerDesign:
 
     @property
     def holds(self) -> bool:
-        """Whether all that is required is certified and verified, and its box is never left and inside the stated."""
-        return self.certification.holds and self.contained
+        """Whether what is required is certified and verified, its box inside the stated one, and the margins kept."""
+        return self.certification.holds and self.contained and bool(self.margins.outcome) and not self.missed
 
     @property
     def contained(self) -> bool:
         """Whether the box that is never left ends below the upper end of the stated one."""
-        hottest = max((high for _, high in self.certification.safe.temperature.values()), default=float("inf"))
-        return hottest <= self.request.temperature[1]
+        return all(hottest(box) <= self.request.temperature[1] for box in (self.certification.safe, self.robust) if box)
 
 
 def design_system(system: System, request: DesignRequest,
@@ -137,11 +152,12 @@ def design_system(system: System, request: DesignRequest,
     progress("asking whether the set-points can be held")
     free = feedback_linearization(system, current_limits=_asked(system, request))  # refusals before the long work
     plant = cold_side(free, regulate=request.regulate)
-    controller = pid(plant, bandwidth=request.bandwidth, sample_time=request.sample_time)
     kalman = _kalman(system, request)
     possible = _reach(free, request)
     if not possible.outcome:
         raise _refusal(possible)
+    if request.bandwidth is not None or request.margins is None:
+        pid(plant, bandwidth=request.bandwidth or _BANDWIDTH, sample_time=request.sample_time)
     progress("searching the runaway limit")
     fold = worst_runaway(system, request)
     progress("searching the contraction limits")
@@ -152,33 +168,19 @@ def design_system(system: System, request: DesignRequest,
     pairs = {name: (float(low), float(high)) for name, low, high in
              zip(law.names, law.current_low, law.current_high, strict=True)}
     progress("certifying the observer")
-    watcher, seen = _certified_observer(kalman, request, pairs)
+    watcher, seen = certified_observer(kalman, request, pairs)
+    progress("tuning the loops and searching their margins")
+    loops = tuned_loops(law, request, watcher)
     progress("certifying contraction and the box that is never left")
-    box = contraction(system, current=pairs, temperature=request.temperature, method=request.method)
-    safe = contain(system, request, pairs)
-    found = [("contraction", "Contraction at the current limits", box, True),
-             ("box", "The box is never left", safe.invariance, True)]
-    if safe.contraction is not safe.invariance:
-        found.append(("box_contraction", "Contraction in the box that is never left", safe.contraction, True))
-    if seen is not None:
-        found.append(("observer", "The observer's error shrinks", seen, True))
-    found += [(f"limit_{li.method}_{li.direction}", f"Contraction limit, {li.direction}: not a limit for use",
-               li.certificate, False) for li in certified if li.certificate.holds]
-    found += [(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, False)
-              for name, cert in fold.certificates.items()]
-    progress("verifying every certificate")
-    checked = tuple(Checked(key, title, cert, verify(cert) if cert.holds else None, required)
-                    for key, title, cert, required in found)
-    boxes = Boxes(request.temperature, request.ambient, pairs, None, coldest_faces(system, request),
-                  request.method)
-    certification = Certification(system, boxes, checked, certified, fold, safe)
+    certification, robust = certified_design(system, request, pairs, watcher, seen, fold, certified)
     progress("simulating the step to the set-points")
     target = [request.setpoint[name] for name in law.names]
-    loop = simulate_loop(system, controller, target, law=law, duration=2 * _LONG / request.bandwidth, observer=watcher,
-                         noise_seed=0 if watcher else None, regulate=request.regulate)
+    loop = simulate_loop(system, loops.controller, target, law=law, duration=2 * _LONG / loops.bandwidth,
+                         observer=watcher, noise_seed=0 if watcher else None, regulate=request.regulate)
     progress("comparing steps with and without the feedback law")
-    return ControllerDesign(request, certification, law, controller, watcher, reach, loop,
-                            _collapse(law, controller, request, reach))
+    return ControllerDesign(request, certification, law, loops.controller, watcher, reach, loop,
+                            _collapse(law, loops, request, reach), loops.margins, loops.bandwidth, loops.missed, robust,
+                            loops.tuning)
 
 
 def _asked(system: System, request: DesignRequest) -> Pairs:
@@ -224,24 +226,7 @@ def _kalman(system: System, request: DesignRequest) -> GainObserver | None:
     return made
 
 
-def _certified_observer(kalman: GainObserver | None, request: DesignRequest,
-                        pairs: Pairs) -> tuple[GainObserver | None, Certificate | None]:
-    """The Kalman gain; the positive gain where only that one is certified."""
-    if kalman is None:
-        return None, None
-    certificate = kalman.certify(pairs, request.temperature)
-    system = kalman.model.system
-    nonlinear = any(link.natural is not None or link.radiation is not None for link in system.links)
-    if certificate.holds or nonlinear:  # a positive gain needs linear links
-        return kalman, certificate
-    other = observer(system, request.sensors, sample_time=request.sample_time, method="positive", current=pairs,
-                     temperature=request.temperature)
-    assert isinstance(other, GainObserver)
-    second = other.certify(pairs, request.temperature)
-    return (other, second) if second.holds else (kalman, certificate)
-
-
-def _collapse(law: FeedbackLinearization, controller: PID, request: DesignRequest, reach: Reachable) -> Collapse | None:
+def _collapse(law: FeedbackLinearization, loops: Loops, request: DesignRequest, reach: Reachable) -> Collapse | None:
     """Steps around the middle of the way to the set-points, halved until no limit of the law is active."""
     passive, target = (float(np.mean(list(part.values()))) for part in (reach.passive, reach.setpoint))
     base, size = 0.5 * (passive + target), min(0.5 * abs(target - passive), _LARGEST_STEP)
@@ -250,8 +235,8 @@ def _collapse(law: FeedbackLinearization, controller: PID, request: DesignReques
         return None
     for _ in range(_TRIES):
         steps = (-size, -0.5 * size, 0.5 * size, size)
-        done = collapse(law.system, controller, law=law, base=base, steps=steps,
-                        duration=_LONG / request.bandwidth, regulate=request.regulate)
+        done = collapse(law.system, loops.controller, law=law, base=base, steps=steps,
+                        duration=_LONG / loops.bandwidth, regulate=request.regulate)
         if done.outcome:
             return done
         size /= 2

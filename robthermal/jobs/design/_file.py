@@ -22,6 +22,7 @@ _PI = ("v = proportional (r - y) + z, then the law gives I and v_achieved, then 
        "z <- z + sample_time integral (r - y) + (1 - exp(-sample_time/tracking_time)) (v_achieved - v). "
        "Start with z = v_achieved of the current that flows. y is what the module regulates: the reading of a sensor "
        "at this sample as it is, or the temperature of a lump, measured or the observer's estimate.")
+_MARGIN_UNITS = {"gain": "-", "phase": "deg", "modulus": "-", "delay": "s", "crossover": "rad/s"}
 _OBSERVER = ("x <- A_d x + Gamma f + L (y - C x); y = reference + (reading - offset - reference)/gain; C x is x at the "
              "sensors' lumps; f = B w + modules + nonlinear links, w: heaters, then ambients. A module adds S x_hot I "
              "+ R I^2/2 - (K - conductance.value)(x_hot - x_cold) to its hot lump and -S x_cold I + R I^2/2 + "
@@ -49,8 +50,9 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
         "certified_in": {"temperature": {"value": list(result.request.temperature), "unit": "K"}},
         "law": {"equation": _LAW,
                 "modules": {name: _module(result, i, name) for i, name in enumerate(result.law.names)}},
-        "controller": {"equation": _PI, "bandwidth": {"value": result.request.bandwidth, "unit": "rad/s"},
+        "controller": {"equation": _PI, "bandwidth": {"value": result.bandwidth, "unit": "rad/s"},
                        "modules": {name: _gains(result, i) for i, name in enumerate(result.law.names)}},
+        "margins": result.margins.to_dict(), "margin_units": _MARGIN_UNITS, "margins_missed": list(result.missed),
         "observer": None if result.observer is None else _observer(system, result.observer),
         "linearity": None if result.collapse is None else {
             "meaning": "largest spread of the normalized step responses",

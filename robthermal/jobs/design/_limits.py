@@ -10,6 +10,7 @@ from ...certify import (
     CurrentLimit,
     Runaway,
     RunawayFree,
+    UsableCurrent,
     contraction,
     heater_heat,
     largest_current,
@@ -20,10 +21,12 @@ from ...certify import (
 from ...design import feedback_linearization, reachable
 from ...errors import InputError
 from ...thermal import System
+from ...verification import Certificate
 from ..request import Method
 from ._request import DesignRequest
 
 Pairs = dict[str, tuple[float, float]]
+Ranges = Mapping[str, tuple[float, float]] | None
 BELOW_FOLD = 0.98  # of I*: at the fold itself the loop has no gain left
 _FINE = 0.01  # of a range
 
@@ -42,10 +45,29 @@ def cold_faces(system: System, request: DesignRequest, ambient: Mapping[str, flo
     return reachable(free, request.setpoint, inputs=ambient, regulate=request.regulate).faces
 
 
-def coldest_faces(system: System, request: DesignRequest) -> dict[str, float]:
-    """The same at the end of the ambient ranges where they are coldest [K]."""
+def face_ranges(system: System, request: DesignRequest) -> dict[str, tuple[float, float]]:
+    """Range of every cold face while the set-points are held, over ambients, and parameters one by one added up [K]."""
     found = [cold_faces(system, request, at) for at in ambient_ends(request)]
-    return {name: min(faces[name] for faces in found) for name in request.setpoint}
+    ranges = {name: (min(faces[name] for faces in found), max(faces[name] for faces in found))
+              for name in request.setpoint}
+    if not (request.regulate and request.parameters):
+        return ranges
+    for at, middle in zip(ambient_ends(request), found, strict=True):
+        low, high = dict.fromkeys(middle, 0.0), dict.fromkeys(middle, 0.0)
+        for name, pair in request.parameters.items():
+            moved = [cold_faces(system.with_parameters({name: end}), request, at) for end in pair]
+            for module, face in middle.items():
+                changes = [faces[module] - face for faces in moved]
+                low[module] += min(*changes, 0.0)
+                high[module] += max(*changes, 0.0)
+        ranges = {module: (min(pair[0], middle[module] + low[module]), max(pair[1], middle[module] + high[module]))
+                  for module, pair in ranges.items()}
+    return ranges
+
+
+def coldest_faces(system: System, request: DesignRequest) -> dict[str, float]:
+    """Temperatures of the cold faces where they are coldest [K]."""
+    return {name: low for name, (low, _) in face_ranges(system, request).items()}
 
 
 def ambient_ends(request: DesignRequest) -> list[dict[str, float]]:
@@ -69,6 +91,9 @@ def candidates(system: System, request: DesignRequest, fold: Runaway,
     that contract in the temperature box; then, where nothing is certified, what file and fold allow.
     """
     widest = _widest(system, fold, certified)
+    if request.parameters:
+        most = usable_cooling(system, request).current
+        widest = {name: (low, min(high, most)) for name, (low, high) in widest.items()}
     for holds in (lambda pairs: _contained(system, request, pairs), lambda pairs: _contracts(system, request, pairs)):
         found = _largest(widest, request.current or {}, holds)
         if found is not None:
@@ -94,13 +119,19 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
                              remedy="Narrow it, or the box with --temperature.")
     given = {**dict.fromkeys(system.modules, (0.0, 0.0)), **(request.current or {})}
     if request.current and not _contained(system, request, given):
-        usable = usable_current(system, temperature=request.temperature, ambient=request.ambient,
-                                setpoint=coldest_faces(system, request), lower="reported", method=_fast(request))
+        usable = usable_cooling(system, request)
         name, (low, high) = max(request.current.items(), key=lambda item: max(-item[1][0], item[1][1]))
         raise InputError("with these currents no box below the upper end of the temperature box is proven never to be "
                          "left", where=f"--current {name}={low:g}:{high:g}",
                          expected=f"at most the usable current, {usable.current:.3g} A when cooling, limited by "
                          f"{usable.limited_by}", remedy="Leave --current out for the largest usable limits.")
+
+
+def usable_cooling(system: System, request: DesignRequest) -> UsableCurrent:
+    """Usable cooling current at the set-points, for the parameter ranges where there are some."""
+    return usable_current(system, temperature=request.temperature, ambient=request.ambient,
+                          setpoint=face_ranges(system, request), lower="reported", method=_fast(request),
+                          parameters=request.parameters)
 
 
 def _fast(request: DesignRequest) -> Method:
@@ -150,16 +181,27 @@ def _share(holds: Callable[[float], bool]) -> float:
     return low
 
 
-def contain(system: System, request: DesignRequest, pairs: Pairs) -> RunawayFree:
+def contain(system: System, request: DesignRequest, pairs: Pairs, parameters: Ranges = None) -> RunawayFree:
     """The claim that a box is never left with these currents."""
-    return runaway_free(system, current=pairs, ambient=request.ambient, heat=heater_heat(system), method=request.method)
+    return runaway_free(system, current=pairs, ambient=request.ambient, heat=heater_heat(system, parameters),
+                        method=request.method, parameters=parameters)
+
+
+def contract(system: System, request: DesignRequest, pairs: Pairs, parameters: Ranges = None) -> Certificate:
+    """The claim that the network contracts in the temperature box with these currents."""
+    return contraction(system, current=pairs, temperature=request.temperature, method=request.method,
+                       parameters=parameters)
+
+
+def hottest(safe: RunawayFree) -> float:
+    """Upper end of a box that is never left [K]; infinite where there is none."""
+    return max((high for _, high in safe.temperature.values()), default=float("inf"))
 
 
 def _contained(system: System, request: DesignRequest, pairs: Pairs) -> bool:
-    safe = contain(system, request, pairs)
-    hottest = max((high for _, high in safe.temperature.values()), default=float("inf"))
-    return safe.holds and hottest <= request.temperature[1] and _contracts(system, request, pairs)
+    safe = contain(system, request, pairs, request.parameters)
+    return safe.holds and hottest(safe) <= request.temperature[1] and _contracts(system, request, pairs)
 
 
 def _contracts(system: System, request: DesignRequest, pairs: Pairs) -> bool:
-    return contraction(system, current=pairs, temperature=request.temperature, method=request.method).holds
+    return contract(system, request, pairs, request.parameters).holds

@@ -19,9 +19,11 @@ from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance, subtitle
+from ._claims import OBSERVER_RANGES
 from ._design import ControllerDesign
 from ._file import write_design_file
 from ._limits import BELOW_FOLD
+from ._margin_section import margin_section
 
 _LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
 
@@ -84,8 +86,23 @@ def design_report(result: ControllerDesign, files: tuple[Path, ...]) -> Report:
     system = result.certification.system
     return Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
                   claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
-                  provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
-                  generated=now(), gate=tuple(_reasons(result)), gates=_GATES)
+                  provenance=provenance(files), generated=now(), gate=tuple(_reasons(result)), gates=_GATES,
+                  assumptions=(*machine_assumptions(system, bool(result.request.parameters)), *_ASSUMPTIONS),
+                  data={"design": _summary(result)})
+
+
+def _summary(result: ControllerDesign) -> dict[str, Any]:
+    """What the summary of a design says."""
+    ranges = result.request.parameters or {}
+    return {"holds": result.holds, "setpoint": result.request.setpoint,
+            "regulates": {name: point.name for name, point in result.points.items()},
+            "current_limits": {name: [float(low), float(high)] for name, low, high in
+                               zip(result.law.names, result.law.current_low, result.law.current_high, strict=True)},
+            "bandwidth": result.bandwidth, "tuning": result.tuning, "sample_time": result.controller.sample_time,
+            "margins": result.margins.to_dict(), "margins_missed": list(result.missed),
+            "parameters": {name: list(pair) for name, pair in ranges.items()},
+            "nominal": {one.title: one.good for one in result.certification.checked if one.parameters == "nominal"},
+            "robust": {one.title: one.good for one in result.certification.checked if one.parameters == "ranges"}}
 
 
 def save_design(result: ControllerDesign, folder: Path) -> None:
@@ -109,12 +126,19 @@ _ASSUMPTIONS = (
 
 
 _GATES = tuple(code.code for code in (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.CURRENT_BEYOND_INVARIANCE,
+                                      GateCode.NOT_ROBUST, GateCode.MARGIN_MISSED, GateCode.LOOP_NOT_ROBUST,
                                       GateCode.NOMINAL_ONLY))
 
 
 def _reasons(result: ControllerDesign) -> Iterator[Reason]:
     """What the verdict knows beside the claims."""
-    box = result.certification.safe.temperature
+    if result.missed:
+        yield Reason("fail", GateCode.MARGIN_MISSED.code, "design", "margins",
+                     "; ".join(result.missed)[:1].upper() + "; ".join(result.missed)[1:], GateCode.MARGIN_MISSED.remedy)
+    if not result.margins.outcome:
+        yield Reason("fail", GateCode.LOOP_NOT_ROBUST.code, "design", "margins", result.margins.outcome.text,
+                     GateCode.LOOP_NOT_ROBUST.remedy)
+    box = (result.robust or result.certification.safe).temperature
     if box and not result.contained:
         lump, (_, high) = max(box.items(), key=lambda item: item[1][1])
         top = result.request.temperature[1]
@@ -123,12 +147,19 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
                      "stated box.",
                      "The set-points need more than the usable current: cool the hot side better, move the "
                      "set-points, or narrow ambients and heats.", high, top)
-    yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
-                 "robthermal run with [calibrate] and [certify] makes the claims for the calibrated ranges.")
+    for one in result.certification.checked:
+        if one.key == OBSERVER_RANGES and not one.required:
+            yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "observer", "That the error of the observer "
+                         "shrinks is claimed for exactly the parameters of the model, not for their ranges: "
+                         f"{one.certificate.reason}", "The margins are computed with it for all corner plants.")
+    if not result.request.parameters:
+        yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
+                     "Give --parameters with the calibrated.json of a calibration, or with ranges.")
 
 
 def _sections(result: ControllerDesign) -> Iterator[Section]:
     yield _controller_section(result)
+    yield margin_section(result)
     yield _step_section(result)
     if result.collapse is not None:
         yield _linearity_section(result)
@@ -154,9 +185,8 @@ def _controller_section(result: ControllerDesign) -> Section:
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
         "lower ones are the largest with which that box is still never left.")
     text = ("A linearizing feedback law turns the heat that the PI asks for into a current, within the limits; the PI "
-            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of "
-            f"{result.request.bandwidth:g} rad/s. {own}\n\ndesign.json "
-            "has every number with its unit, and the equations to program.")
+            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of {result.bandwidth:.4g} rad/s. "
+            f"{result.tuning}{own}\n\ndesign.json has every number with its unit, and the equations to program.")
     table = Table(pd.DataFrame(rows), "Limits and gains.")
     return Section("The controller", text, tables=(table,), anchor="controller")
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..._celsius import ZERO_CELSIUS
-from ...design import RegulatedPoint, feedback_linearization, regulated_points
+from ...design import RegulatedPoint, checked_margins, feedback_linearization, regulated_points
 from ...errors import InputError
 from ...thermal import System
-from ..request import Method, boxes_from_text
+from ..request import Method
 
+FORMATS = ("c", "mat", "json")
 _MOST_LUMPS = 40  # of an observer's certificate, a dense matrix inequality
 
 
@@ -29,7 +29,7 @@ class DesignRequest:
     temperature : tuple of float
         Box of the certificates, for all lumps [K].
     bandwidth : float
-        Crossover of the loops [rad/s].
+        Crossover of the loops [rad/s]; default the largest that keeps `margins`, 0.02 where there are none.
     sample_time : float
         Of controller and observer [s].
     sensors : tuple of str
@@ -39,24 +39,34 @@ class DesignRequest:
     regulate : dict
         Module to the sensor or lump that it regulates; modules that are left out regulate their cold face. With a
         lag, offset or distance to the module these are part of the loop.
+    margins : dict
+        Least "gain" [-], "phase" [deg], "modulus" [-] and "delay" [s] of every loop, some of them, for all plants of
+        the parameter ranges. With a bandwidth they are checked, without one it is tuned to keep them.
+    export : tuple of str
+        Formats in which law, controller and observer are written too: "c", "mat", "json".
+    parameters : dict
+        {parameter name: (lower, upper)}: limits, claims and margins are for all of these too.
 
     Examples
     --------
     >>> import robthermal as rt
     >>> wanted = rt.jobs.DesignRequest(setpoint={"m1": 278.15, "m2": 278.15}, sensors=("T6", "T7"))
-    >>> wanted.temperature, wanted.bandwidth
-    ((278.15, 358.15), 0.02)
+    >>> wanted.temperature, wanted.sample_time
+    ((278.15, 358.15), 1.0)
     """
 
     setpoint: dict[str, float]
     current: dict[str, tuple[float, float]] | None = None
     ambient: dict[str, tuple[float, float]] | None = None
     temperature: tuple[float, float] = (278.15, 358.15)
-    bandwidth: float = 0.02
+    bandwidth: float | None = None
     sample_time: float = 1.0
     sensors: tuple[str, ...] = ()
     method: Method = "energy"
     regulate: dict[str, str] | None = None
+    margins: dict[str, float] | None = None
+    export: tuple[str, ...] = ()
+    parameters: dict[str, tuple[float, float]] | None = None
 
     def points(self, system: System) -> dict[str, RegulatedPoint]:
         """What every module regulates.
@@ -80,12 +90,14 @@ class DesignRequest:
         ------
         InputError
             No modules; a module without set-point, or one that does not exist; a set-point outside of the box; current
-            limits beyond the file's or without zero; too many lumps for a certified observer.
+            limits beyond the file's or without zero; too many lumps for a certified observer; points, margins or
+            parameters that there are not; another format.
         """
         if not system.modules:
             raise InputError(f"{system.name!r} has no thermoelectric module", where="design",
                              remedy="Add a [modules.NAME] table, or control its heaters directly.")
-        for option, given in (("--setpoint", self.setpoint), ("--current", self.current or {})):
+        for option, given in (("--setpoint", self.setpoint), ("--current", self.current or {}),
+                              ("--regulate", self.regulate or {})):
             unknown = [name for name in given if name not in system.modules]
             if unknown:
                 raise InputError(f"there is no module {unknown[0]!r}", where=option,
@@ -109,84 +121,17 @@ class DesignRequest:
                 raise InputError(f"{name} at {celsius(value)} is outside of the box {celsius(low)} to {celsius(high)}",
                                  where="--setpoint", expected="a set-point inside it",
                                  remedy="Widen the box with --temperature, or move the set-point.")
+        if self.margins is not None:
+            checked_margins(self.margins)
+        unknown = [name for name in self.export if name not in FORMATS]
+        if unknown:
+            raise InputError(f"there is no format {unknown[0]!r}", where="--export", expected=" or ".join(FORMATS))
+        for name in self.parameters or {}:
+            system.parameter(name)  # refuses unknown names
         if self.sensors and len(system.lumps) > _MOST_LUMPS:
             raise InputError(f"{len(system.lumps)} lumps are too many for a certified observer", where=system.name,
                              expected=f"at most {_MOST_LUMPS}", remedy="Reduce the system with rt.thermal.reduce, or "
                              "take its sensors out to design without an observer.")
-
-
-def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: Sequence[str] = (),
-                     ambient: Sequence[str] = (), temperature: tuple[float, float] | None = None,
-                     bandwidth: float = 0.02, sample_time: float = 1.0, sensors: str | None = None,
-                     method: str = "energy", regulate: Sequence[str] = ()) -> DesignRequest:
-    """Request from command-line values.
-
-    Parameters
-    ----------
-    system : System
-        Whose names and temperature unit apply.
-    setpoint : sequence of str
-        ``NAME=VALUE`` [unit of the file]; default the lower end of the box for every module, where I* is smallest.
-    current, ambient : sequence of str
-        ``NAME=LO:HI`` [A], [unit of the file].
-    temperature : tuple of float, optional
-        Box of all lumps [unit of the file].
-    bandwidth, sample_time : float
-        Bandwidth of the closed loop [rad/s] and time between two samples [s].
-    sensors : str, optional
-        Names, separated by commas; default the first sensor on every lump that does not lag.
-    method : str
-        "energy", "sum", "max" or "lyapunov".
-    regulate : sequence of str
-        ``MODULE=NAME`` of a sensor or lump; default the cold face of every module.
-
-    Returns
-    -------
-    DesignRequest
-
-    Raises
-    ------
-    InputError
-        A value that does not read, or does not fit the system.
-
-    Examples
-    --------
-    >>> import robthermal as rt
-    >>> wanted = rt.jobs.design.design_from_text(rt.systems.two_module(), setpoint=["m1=5", "m2=8"], sensors="T6,T7")
-    >>> wanted.setpoint, wanted.sensors
-    ({'m1': 278.15, 'm2': 281.15}, ('T6', 'T7'))
-    """
-    boxes = boxes_from_text(system, temperature=temperature, current=current, ambient=ambient, setpoint=setpoint,
-                            method=method)
-    named = {text.rpartition("=")[0] for text in current}
-    targets = boxes.setpoint or dict.fromkeys(system.modules, boxes.temperature[0])
-    limits = {name: pair for name, pair in (boxes.current or {}).items() if name in named}
-    request = DesignRequest(targets, limits, boxes.ambient, boxes.temperature, bandwidth, sample_time,
-                            _sensors(system, sensors, sample_time), boxes.method, _regulate(regulate))
-    request.check(system)
-    return request
-
-
-def _regulate(texts: Sequence[str]) -> dict[str, str] | None:
-    found = {}
-    for text in texts:
-        module, equals, name = text.partition("=")
-        if not (module and equals and name) or module in found:
-            raise InputError(f"{text!r}", where="--regulate", expected="MODULE=NAME, every module at most once, for "
-                             "example m1=T_stage")
-        found[module] = name
-    return found or None
-
-
-def _sensors(system: System, text: str | None, sample_time: float) -> tuple[str, ...]:
-    if text is not None:
-        names = tuple(name.strip() for name in text.split(","))
-        for name in names:
-            system.thermometer(name, "--sensors")
-        return names
-    first = {sensor.lump: name for name, sensor in reversed(system.thermometers.items())
-             if not sensor.time_constant and not sensor.delay}
-    return tuple(name for name in system.thermometers if name in first.values())
 
 
 def celsius(kelvin: float) -> str:
