@@ -38,10 +38,10 @@ SURFACE = {
         DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
         LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
         Polarity Reach Reachable RegulatedPoint RobustAgainst Seen StateFeedback StepResponseLinearity Tuning
-        certify_loop check_polarity cold_side collapse constant_gain corner_plants disturbance_observer feed_forward
-        feedback_linearization hinf linear_controller load_controller loop_margins loop_poles observer pid
-        place_sensors reachable regulated_points simulate_loop state_feedback step_response_linearity tune_pi
-        unobservable
+        certify_loop check_polarity checked_margins cold_side collapse constant_gain corner_plants
+        disturbance_observer feed_forward feedback_linearization hinf linear_controller load_controller loop_margins
+        loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
+        step_response_linearity tune_pi unobservable
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck

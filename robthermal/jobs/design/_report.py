@@ -185,8 +185,8 @@ def _controller_section(result: ControllerDesign) -> Section:
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
         "lower ones are the largest with which that box is still never left.")
     text = ("A linearizing feedback law turns the heat that the PI asks for into a current, within the limits; the PI "
-            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of {result.bandwidth:.4g} rad/s. "
-            f"{result.tuning}{own}\n\ndesign.json has every number with its unit, and the equations to program.")
+            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of {result.bandwidth:.4g} "
+            f"rad/s. {result.tuning}{own}\n\ndesign.json has every number with its unit, and the equations to program.")
     table = Table(pd.DataFrame(rows), "Limits and gains.")
     return Section("The controller", text, tables=(table,), anchor="controller")
 
