@@ -24,7 +24,7 @@ from robthermal.cli.terminal import duration, progress, progress_bar
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
 COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "design", "map", "certify",
-            "couple", "diagnose", "report", "verify", "new", "explain"]
+            "couple", "diagnose", "report", "verify", "new", "explain", "datasheet"]
 
 SYSTEM = """
 [system]

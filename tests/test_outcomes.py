@@ -32,7 +32,7 @@ CODES = {
     "jobs": "-circles_left_out -frf_without_covariance",
     "signals": "+designed -not_lower +resolved -undetermined -unresolved",
     "synthesis": "+certified -infeasible -not_certified -not_found",
-    "thermal": "+agrees +closed -disagrees +found -none -not_reducible +reduced +rounded +unchecked",
+    "thermal": "+agrees +closed -disagrees +found +held -none -not_held -not_reducible +reduced +rounded +unchecked",
 }
 
 

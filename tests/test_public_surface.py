@@ -58,9 +58,10 @@ SURFACE = {
         FrequencyResponse IdentifyCode bla closed_loop etfe is_response lpm lrm lrmp mean_inputs read_response spectral
     """,
     "jobs": """
-        Boxes DesignRequest MapRequest certify_system couple_subsystems demo_project design_system diagnose_records
-        explain explainable map_system new_project read_coupling read_project rebuild_report run_job run_project
-        verify_files write_certify write_coupling write_design write_diagnosis write_job write_map
+        Boxes DesignRequest MapRequest certify_system compare_modules couple_subsystems demo_project design_system
+        diagnose_records explain explainable map_system new_project read_coupling read_project read_sheets
+        rebuild_report run_job run_project verify_files write_certify write_coupling write_design write_diagnosis
+        write_job write_map write_modules
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed
@@ -91,13 +92,14 @@ SURFACE = {
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module
     """,
     "thermal": """
-        AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
-        Feedthrough FitRange Hysteresis Input Layer Lead Linear Link LoadCurve Lump Material MatrixImport Module
-        ModuleParameters Natural Periodic PolynomialFit Polynomials Reduction Sensor SteadyState Step Stepper
-        System ThermalCode Trajectory add_effect effects fit_in_kelvin fold format_modelica format_system hinf_error
-        linearize load_curve materials module_from_datasheet module_from_polynomials parse_system read_matrices
-        read_system reduce simulate steady_state system_from_matrices time_constants trajectory voltage_slopes
-        write_modelica write_system
+        AddedEffect Ambient Assembly Basis Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
+        Feedthrough FitRange Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
+        Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties Rating Reduction
+        Sensor SheetInversion SinkSize SteadyState Step Stepper System ThermalCode Trajectory add_effect effects
+        fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials
+        module_from_datasheet module_from_polynomials module_point parse_system read_matrices read_system reduce
+        simulate size_sink steady_state system_from_matrices time_constants trajectory voltage_slopes write_modelica
+        write_system
     """,
     "verification": """
         Certificate Verdict claim_sentence establish machine_hash not_certified same_system verify

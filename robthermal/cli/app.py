@@ -345,7 +345,7 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
     show_report(report, out, as_json, job.remarks, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
 
 
-for _command in (results.report, results.verify, learn.new, learn.explain):
+for _command in (results.report, results.verify, learn.new, learn.explain, learn.datasheet):
     app.command()(_command)
 
 

@@ -10,6 +10,9 @@ from .chain import run_project as run_project
 from .couple import couple_subsystems as couple_subsystems
 from .couple import read_coupling as read_coupling
 from .couple import write_coupling as write_coupling
+from .datasheet import compare_modules as compare_modules
+from .datasheet import read_sheets as read_sheets
+from .datasheet import write_modules as write_modules
 from .design import DesignRequest as DesignRequest
 from .design import design_system as design_system
 from .design import write_design as write_design
@@ -29,7 +32,8 @@ from .starter import demo_project as demo_project
 from .starter import new_project as new_project
 from .verify import verify_files as verify_files
 
-__all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "couple_subsystems", "demo_project",
-           "design_system", "diagnose_records", "explain", "explainable", "map_system", "new_project", "read_coupling",
-           "read_project", "rebuild_report", "run_job", "run_project", "verify_files", "write_certify",
-           "write_coupling", "write_design", "write_diagnosis", "write_job", "write_map"]
+__all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "compare_modules", "couple_subsystems",
+           "demo_project", "design_system", "diagnose_records", "explain", "explainable", "map_system", "new_project",
+           "read_coupling", "read_project", "read_sheets", "rebuild_report", "run_job", "run_project", "verify_files",
+           "write_certify", "write_coupling", "write_design", "write_diagnosis", "write_job", "write_map",
+           "write_modules"]

@@ -22,6 +22,10 @@ from ._matrices import system_from_matrices as system_from_matrices
 from ._matrix_files import read_matrices as read_matrices
 from ._modelica import format_modelica as format_modelica
 from ._modelica import write_modelica as write_modelica
+from ._module_point import ModulePoint as ModulePoint
+from ._module_point import SinkSize as SinkSize
+from ._module_point import module_point as module_point
+from ._module_point import size_sink as size_sink
 from ._outcomes import ThermalCode as ThermalCode
 from ._parts import Ambient as Ambient
 from ._parts import Condensation as Condensation
@@ -42,11 +46,17 @@ from ._parts import Step as Step
 from ._polynomials import PolynomialFit as PolynomialFit
 from ._polynomials import Polynomials as Polynomials
 from ._polynomials import module_from_polynomials as module_from_polynomials
+from ._rating import Properties as Properties
+from ._rating import Rating as Rating
 from ._reduce import Reduction as Reduction
 from ._reduce import hinf_error as hinf_error
 from ._reduce import reduce as reduce
 from ._regulated import LoadCurve as LoadCurve
 from ._regulated import load_curve as load_curve
+from ._sheet_columns import Basis as Basis
+from ._sheet_columns import Inversion as Inversion
+from ._sheet_columns import SheetInversion as SheetInversion
+from ._sheet_columns import invert_datasheet as invert_datasheet
 from ._simulate import Trajectory as Trajectory
 from ._simulate import simulate as simulate
 from ._simulate import trajectory as trajectory
@@ -61,12 +71,13 @@ from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Ef
 from .effects import add_effect as add_effect
 from .effects import effects as effects
 
-__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
-           "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Layer", "Lead", "Linear",
-           "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters", "Natural",
-           "Periodic", "PolynomialFit", "Polynomials", "Reduction", "Sensor", "SteadyState", "Step", "Stepper",
-           "System", "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
-           "format_system", "hinf_error", "linearize", "load_curve", "materials", "module_from_datasheet",
-           "module_from_polynomials", "parse_system", "read_matrices", "read_system", "reduce", "simulate",
-           "steady_state", "system_from_matrices", "time_constants", "trajectory",
-           "voltage_slopes", "write_modelica", "write_system"]
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Basis", "Condensation", "Contact", "DatasheetFit", "Drive",
+           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
+           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
+           "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
+           "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SteadyState", "Step", "Stepper", "System",
+           "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
+           "format_system", "hinf_error", "invert_datasheet", "linearize", "load_curve", "materials",
+           "module_from_datasheet", "module_from_polynomials", "module_point", "parse_system", "read_matrices",
+           "read_system", "reduce", "simulate", "size_sink", "steady_state", "system_from_matrices", "time_constants",
+           "trajectory", "voltage_slopes", "write_modelica", "write_system"]

@@ -8,7 +8,6 @@ whatever the slopes of S, R, K. Hence
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,7 +130,7 @@ class Properties:
     >>> p = rt.thermal.Properties(*(rt.thermal.Linear(value=value) for value in (0.05, 2.0, 0.5)), 300.0)
     >>> rated = p.rated(300.0)
     >>> round(rated.v_max, 3), round(rated.dt_max, 2)
-    (15.0, 70.85)
+    (15.0, 67.54)
     """
 
     seebeck: Linear
@@ -203,12 +202,6 @@ class Properties:
             if p.slope > 0:
                 low = max(low, 2 * (self.reference_temperature - 0.999 * p.value / p.slope) - t_hot)
         return low
-
-    def text(self) -> str:
-        """Keys of a [modules.NAME] table of a system file, temperature in kelvin."""
-        rows: Mapping[str, Linear] = {"seebeck": self.seebeck, "resistance": self.resistance,
-                                      "conductance": self.conductance}
-        return "\n".join(f"{name} = {{ value = {p.value:.7g}, slope = {p.slope:.5g} }}" for name, p in rows.items())
 
 
 def misfit(found: Rating, sheet: Rating) -> dict[str, float]:

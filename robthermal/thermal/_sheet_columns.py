@@ -177,9 +177,9 @@ def invert_datasheet(ratings: Sequence[Rating]) -> SheetInversion:
     >>> warm = rt.thermal.Rating(t_hot=323.15, v_max=15.5, i_max=4.3, dt_max=64.0, q_max=40.6)
     >>> found = rt.thermal.invert_datasheet([cold, warm])
     >>> round(found.voltage.properties.resistance.value, 3), round(found.voltage.properties.resistance.slope, 4)
-    (2.747, 0.0127)
-    >>> found.outcome.code
-    'agrees'
+    (2.746, 0.0138)
+    >>> found.outcome.code, round(found.voltage.misfits[1]["q_max"], 3)
+    ('disagrees', -0.101)
     """
     columns = tuple(sorted(ratings, key=lambda one: one.t_hot))
     if not columns or not all(isinstance(one, Rating) for one in columns):
