@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from .._checks import finite_number, positive_number
 from ..errors import InputError, Outcome
-from ._checks import finite, kelvin, non_negative, positive
+from ._checks import kelvin, non_negative
 from ._outcomes import ThermalCode
 from ._rating import Properties
 
@@ -96,8 +97,8 @@ def module_point(properties: Properties, *, hot: float, cold: float, load: float
     if load is not None and current is not None:
         raise InputError("both are given", where="arguments load and current", expected="one of them")
     if load is None:
-        return _point(properties, hot, cold, finite(current, "argument current", "A"), ThermalCode.HELD.outcome())
-    wanted = finite(load, "argument load", "W")
+        return _point(properties, hot, cold, finite_number(current, "current", "A"), ThermalCode.HELD.outcome())
+    wanted = finite_number(load, "load", "W")
     S, R, K = properties.at(0.5 * (hot + cold))
     pumped, square = wanted + K * (hot - cold), (S * cold) ** 2
     if square < 2 * R * pumped:
@@ -150,7 +151,7 @@ class SinkSize:
         ModulePoint
             With "not_held", the point of the largest resistance, where this one is larger.
         """
-        wanted = positive(resistance, "argument resistance", "K/W")
+        wanted = positive_number(resistance, "resistance", "K/W")
         if not self.outcome or wanted > self.resistance:
             most = self.limit
             why = ThermalCode.NOT_HELD.outcome(f"The sink has {wanted:.4g} K/W, at most {self.resistance:.4g} K/W hold "
