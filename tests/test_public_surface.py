@@ -92,7 +92,7 @@ SURFACE = {
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module
     """,
     "thermal": """
-        AddedEffect Ambient Assembly Basis Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
+        AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
         Feedthrough FitRange Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
         Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties Rating Reduction
         Sensor SheetInversion SinkSize SteadyState Step Stepper System ThermalCode Trajectory add_effect effects

@@ -53,7 +53,6 @@ from ._reduce import hinf_error as hinf_error
 from ._reduce import reduce as reduce
 from ._regulated import LoadCurve as LoadCurve
 from ._regulated import load_curve as load_curve
-from ._sheet_columns import Basis as Basis
 from ._sheet_columns import Inversion as Inversion
 from ._sheet_columns import SheetInversion as SheetInversion
 from ._sheet_columns import invert_datasheet as invert_datasheet
@@ -71,7 +70,7 @@ from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Ef
 from .effects import add_effect as add_effect
 from .effects import effects as effects
 
-__all__ = ["AddedEffect", "Ambient", "Assembly", "Basis", "Condensation", "Contact", "DatasheetFit", "Drive",
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive",
            "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
            "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
            "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",

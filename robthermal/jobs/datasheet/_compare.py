@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 
 from ..._celsius import HIGHEST_CELSIUS, ZERO_CELSIUS
 from ...errors import InputError
 from ...thermal import (
-    Basis,
     Inversion,
     ModulePoint,
     Rating,
@@ -22,6 +21,8 @@ from ...thermal import (
     size_sink,
 )
 from ._sheets import Sheets
+
+Basis = Literal["voltage", "heat"]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class ComparedModule:
     name : str
         Name of the module.
     sheet : SheetInversion
-        Both inversions.
+        Both inversions of its datasheet.
     point : ModulePoint or None
         Operating point; None where none was asked for.
     size : SinkSize or None
