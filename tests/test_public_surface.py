@@ -34,14 +34,15 @@ SURFACE = {
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """
-        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput Design DesignCode
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DesignCode
         DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
         LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
-        Polarity Reach Reachable RegulatedPoint RobustAgainst Seen StateFeedback StepResponseLinearity Tuning
+        Polarity Reach Reachable RegulatedPoint Seen StateFeedback StepResponseLinearity Tuning
         certify_loop check_polarity checked_margins cold_side collapse constant_gain corner_plants
-        disturbance_observer feed_forward feedback_linearization hinf linear_controller load_controller loop_margins
+        disturbance_observer feed_forward feedback_linearization linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tune_pi unobservable
+        Design RobustAgainst h2 hinf
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck
@@ -86,7 +87,7 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design RobustAgainst SynthesisCode hinf
+        Design RobustAgainst SynthesisCode h2 hinf
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

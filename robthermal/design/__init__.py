@@ -2,6 +2,7 @@
 
 from ..synthesis import Design as Design
 from ..synthesis import RobustAgainst as RobustAgainst
+from ..synthesis import h2 as h2
 from ..synthesis import hinf as hinf
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
@@ -63,12 +64,13 @@ Seen = ControllerInput
 collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "ControllerInput", "Design", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
+           "ControllerInput", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
            "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
            "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity", "Reach",
-           "Reachable", "RegulatedPoint", "RobustAgainst", "Seen", "StateFeedback", "StepResponseLinearity", "Tuning",
+           "Reachable", "RegulatedPoint", "Seen", "StateFeedback", "StepResponseLinearity", "Tuning",
            "certify_loop", "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain",
-           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization", "hinf",
+           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization",
            "linear_controller", "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors",
            "reachable", "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "tune_pi",
            "unobservable"]
+__all__ += ["Design", "RobustAgainst", "h2", "hinf"]  # of the package synthesis

@@ -5,7 +5,8 @@ For any linear plant; thermal front ends are in `robthermal.design`, which also 
 
 from ._design import Design as Design
 from ._design import RobustAgainst as RobustAgainst
+from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
 from ._outcomes import SynthesisCode as SynthesisCode
 
-__all__ = ["Design", "RobustAgainst", "SynthesisCode", "hinf"]
+__all__ = ["Design", "RobustAgainst", "SynthesisCode", "h2", "hinf"]

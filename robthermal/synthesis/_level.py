@@ -18,7 +18,7 @@ from ._plant import GeneralizedPlant, balanced
 
 _FREE = 1e30  # a level at which the disturbance costs nothing: the H2 controller
 _MOST = 80  # bisections
-_MOST_CHECKED = 40  # states of a plant whose optimum in floats is confirmed in balls
+_MOST_CHECKED = 16  # states of a plant whose optimum in floats is confirmed in balls
 _SPAN = 1e-9  # of the H2 controller's norm: below it the optimum counts as zero
 _PRECISIONS: tuple[Floats | Balls, ...] = (Floats(), Balls(192), Balls(448))
 _FURTHER = (1.5, 2.0, 3.0, 5.0, 10.0)  # times the optimum, in search of a smaller gain
