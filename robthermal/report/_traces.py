@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike], *,
-                           residual: bool = True, title: str = "") -> Any:
+                           residual: bool = True, title: str = "", unit: str = "K") -> Any:
     """Draw readings, the model's answer, and their difference.
 
     Parameters
@@ -34,6 +34,8 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         Whether the residual, measured − modelled, is drawn below.
     title : str, optional
         Heading of the drawing.
+    unit : str, optional
+        Unit of all readings: "K", drawn in °C, or "V".
 
     Returns
     -------
@@ -54,24 +56,25 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
     """
     t = np.asarray(time, dtype=float)
     pairs = _pairs(t, measured, model)
-    scale, unit = time_unit(t)
+    scale, time_name = time_unit(t)
+    zero, label = (ZERO_CELSIUS, "temperature [°C]") if unit == "K" else (0.0, f"voltage [{unit}]")
     with house_style():
         figure, axes = canvas(4.4 if residual else 3.0, 2 if residual else 1, sharex=True, squeeze=False,
                               height_ratios=(2, 1) if residual else None)
         above, below = axes[0, 0], axes[-1, 0]
         for i, (name, (data, answer)) in enumerate(pairs.items()):
             color, dashes = COLORS[i % len(COLORS)], ("-", "--", ":")[i // len(COLORS) % 3]
-            _dots(above, *thin(t / scale, data - ZERO_CELSIUS), color)
-            above.plot(*thin(t / scale, answer - ZERO_CELSIUS), dashes, color=color, label=plain(name))
+            _dots(above, *thin(t / scale, data - zero), color)
+            above.plot(*thin(t / scale, answer - zero), dashes, color=color, label=plain(name))
             if residual:
                 below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=color, linewidth=0.8)
-        above.set(ylabel="temperature [°C]", title=plain(title))
+        above.set(ylabel=label, title=plain(title))
         _legend(above, len(pairs))
         if residual:
             below.axhline(0.0, color="black", linewidth=0.6)
-            below.set(ylabel="measured −\nmodel [K]")
+            below.set(ylabel=f"measured −\nmodel [{unit}]")
             figure.align_ylabels()
-        below.set(xlabel=f"time [{unit}]")
+        below.set(xlabel=f"time [{time_name}]")
         below.margins(x=0.01)
     return figure
 

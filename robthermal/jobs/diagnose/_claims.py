@@ -57,8 +57,10 @@ def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
     """
     yield "A name is the best explanation among the effects of the catalog; a cause outside it has no name here."
     yield "Nothing is proven: all numbers are estimates, and all answers are tests on these records."
+    units = found.system.sensor_units
     yield ("Noise of the sensors and random heats are white and Gaussian, with levels near the declared ones: "
-           + ", ".join(f"{name} {level:.3g} K" for name, level in found.noise_floor.noise.items()) + ".")
+           + ", ".join(f"{name} {level:.3g} {units.get(name, 'K')}"
+                       for name, level in found.noise_floor.noise.items()) + ".")
     yield "Inputs and ambients are held between samples; sensors are read at the samples."
     if found.hold_out is None:
         yield "No validation record was given: that validation records are predicted was not tested."

@@ -89,7 +89,9 @@ def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Seque
     records = [one.record for one in comparisons]
     names = dict.fromkeys(name for record in records for name in record.input_names)
     sensors = dict.fromkeys(name for record in records for name in record.output_names)
-    ends = [_range(records, name) for name in (*sensors, *(name for name in names if name in system.ambients))]
+    ends = [_range(records, name) for name in (
+        *(name for name in sensors if system.sensor_units.get(name, "K") == "K"),
+        *(name for name in names if name in system.ambients))]
     actions = [(report.file, action["what"]) for record in records if (report := record.imported)
                for action in report.actions]
     return DataFacts(

@@ -91,8 +91,8 @@ def _misfits(misfits: Sequence[Misfit]) -> Iterator[Reason]:
             code = codes[one.kind]
             yield Reason("fail" if one.beyond else "remark", code.code, "calibrate", f"{one.record}: {one.sensor}",
                          f"In the {'validation' if one.kind == 'validation' else 'training'} record {one.record} "
-                         f"{one.sensor} is {one.rms:.3g} K rms off the model at {one.noise:.2g} K of noise: "
-                         f"{one.excess:.3g} K more, tolerance {one.tolerance:.3g} K.",
+                         f"{one.sensor} is {one.rms:.3g} {one.unit} rms off the model at {one.noise:.2g} {one.unit} of "
+                         f"noise: {one.excess:.3g} {one.unit} more, tolerance {one.tolerance:.3g} {one.unit}.",
                          code.remedy if one.beyond else "", one.excess, one.tolerance)
 
 

@@ -125,7 +125,8 @@ def _misfits(comparisons: Sequence[Comparison], system: System, gate: Gate) -> t
     for one in comparisons:
         for name, e in one.residuals(one.calibrated).items():
             noise = system.sensors[name].noise or noise_of_readings(one.record[name])
-            found.append(misfit(one.kind, one.record.name or "record", name, e, noise, gate.of(name, noise)))
+            found.append(misfit(one.kind, one.record.name or "record", name, e, noise, gate.of(name, noise),
+                                system.sensors[name].unit))
     return tuple(found)
 
 

@@ -39,6 +39,8 @@ class Misfit:
         Largest excess that is accepted [K].
     p_value : float
         Chance of a residual as large, if it were noise.
+    unit : str
+        Unit of the residual: "K", or "V" of the voltage of a module.
     """
 
     kind: str
@@ -50,6 +52,7 @@ class Misfit:
     excess: float
     tolerance: float
     p_value: float
+    unit: str = "K"
 
     @property
     def significant(self) -> bool:
@@ -62,7 +65,8 @@ class Misfit:
         return self.significant and self.excess > self.tolerance
 
 
-def misfit(kind: str, record: str, sensor: str, residual: Array, noise: float, tolerance: float) -> Misfit:
+def misfit(kind: str, record: str, sensor: str, residual: Array, noise: float, tolerance: float,
+           unit: str = "K") -> Misfit:
     """Compare a residual with the noise.
 
     Parameters
@@ -72,14 +76,16 @@ def misfit(kind: str, record: str, sensor: str, residual: Array, noise: float, t
     residual : ndarray, shape (n,)
         Measured − modelled [K]; samples that are not finite are left out.
     noise, tolerance : float
-        As in `Misfit` [K].
+        As in `Misfit` [K or V].
+    unit : str
+        Unit of all of them.
     """
     e = residual[np.isfinite(residual)]
     power = float(np.mean(e**2)) if e.size else 0.0
     count = effective_count(e)
     p = float(chi2.sf(count * power / noise**2, count)) if e.size else 1.0
     return Misfit(kind, record, sensor, float(e.mean()) if e.size else 0.0, power**0.5, noise,
-                  max(power - noise**2, 0.0) ** 0.5, tolerance, p)
+                  max(power - noise**2, 0.0) ** 0.5, tolerance, p, unit)
 
 
 def effective_count(e: Array) -> float:

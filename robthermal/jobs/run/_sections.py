@@ -14,8 +14,8 @@ from ._result import Comparison
 
 def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> Section:
     """Model against data: residuals before and after, every record drawn."""
-    rows = [{"record": f"{c.kind}: {c.record.name}", "sensor": name, "nominal model [K]": before,
-             "calibrated model [K]": c.rmse(c.calibrated)[name]}
+    rows = [{"record": f"{c.kind}: {c.record.name}", "sensor": _named(name, c.record.units.get(name)),
+             "nominal model [K]": before, "calibrated model [K]": c.rmse(c.calibrated)[name]}
             for c in comparisons for name, before in c.rmse(c.nominal).items()]
     table = pd.DataFrame(rows)
     text = ("Both models run free: they see only the currents, heaters and ambients. On training records the "
@@ -24,7 +24,7 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> 
             "every sensor; for the calibrated model these are the numbers of the calibration itself.")
     if fit is not None:
         text += f"\n\n{fit.outcome.text}"
-    figures = tuple(_comparison_figure(c) for c in comparisons)
+    figures = tuple(figure for c in comparisons for figure in _comparison_figures(c))
     return Section("Model against data", text, figures=figures,
                    tables=(Table(table, "Residuals (measured − model), root mean square."),), anchor="model")
 
@@ -36,7 +36,7 @@ def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ..
     what = ("records that were held out" if kind == "validation" else
             "its own training records: none was held out, so that nothing is known about its predictions")
     return Section("Model against data", f"The calibrated model, run freely, beside {what}.",
-                   figures=(_comparison_figure(worst),),
+                   figures=_comparison_figures(worst),
                    tables=(misfit_table(misfits),), anchor="validation")
 
 
@@ -49,9 +49,9 @@ def misfit_table(misfits: Sequence[Misfit]) -> Table:
         Of all records.
     """
     rows = _shown(misfits)
-    frame = pd.DataFrame([{"record": one.record, "sensor": one.sensor, "mean [K]": one.mean, "rms [K]": one.rms,
-                           "noise [K]": one.noise, "beyond noise [K]": one.excess, "tolerance [K]": one.tolerance,
-                           "answer": _answer(one)} for one in rows])
+    frame = pd.DataFrame([{"record": one.record, "sensor": _named(one.sensor, one.unit), "mean [K]": one.mean,
+                           "rms [K]": one.rms, "noise [K]": one.noise, "beyond noise [K]": one.excess,
+                           "tolerance [K]": one.tolerance, "answer": _answer(one)} for one in rows])
     return Table(frame.head(_ROWS), f"Residual measured − modelled by sensor, the largest first"
                  f"{f'; {_ROWS} of {len(frame)}' * (len(frame) > _ROWS)}.", digits=3)
 
@@ -64,26 +64,39 @@ def _shown(misfits: Sequence[Misfit]) -> list[Misfit]:
 _ROWS = 6
 
 
+def _named(sensor: str, unit: str | None) -> str:
+    """Sensor of a row whose numbers are kelvin, unless it says volts."""
+    return f"{sensor} (all in V)" if unit == "V" else sensor
+
+
 def _answer(one: Misfit) -> str:
     if not one.significant:
         return "within the noise"
     return "NOT within the tolerance" if one.beyond else "beyond the noise, within the tolerance"
 
 
-def _comparison_figure(c: Comparison) -> Figure:
-    names = _worst(c, 4)
-    figure = measured_against_model(c.record.time, {n: c.record[n] for n in names},
-                                    {n: c.calibrated[n] for n in names}, title=f"{c.kind}: {c.record.name}")
-    alt = f"Time plot of measured and simulated temperatures, {c.kind} record, with residuals below."
-    shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(c.record.output_names) else (
+def _comparison_figures(c: Comparison) -> tuple[Figure, ...]:
+    """One drawing of the temperatures, and one of the voltages where the record has any."""
+    units = {name: c.record.units.get(name) for name in c.rmse(c.calibrated)}
+    groups = {"K": [n for n, own in units.items() if own != "V"], "V": [n for n, own in units.items() if own == "V"]}
+    return tuple(_comparison_figure(c, names, unit) for unit, names in groups.items() if names)
+
+
+def _comparison_figure(c: Comparison, sensors: list[str], unit: str) -> Figure:
+    names = _worst(c, sensors, 4)
+    figure = measured_against_model(c.record.time, {n: c.record[n] for n in names}, {n: c.calibrated[n] for n in names},
+                                    title=f"{c.kind}: {c.record.name}", unit=unit)
+    what = "voltages" if unit == "V" else "temperatures"
+    alt = f"Time plot of measured and simulated {what}, {c.kind} record, with residuals below."
+    shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(sensors) else (
         "every sensor")
     caption = f"Measured (dots) and calibrated model (lines), {c.kind} record; {shown}."
     return Figure.draw(figure, alt=alt, caption=caption)
 
 
-def _worst(c: Comparison, count: int) -> list[str]:
+def _worst(c: Comparison, sensors: list[str], count: int) -> list[str]:
     rmse = c.rmse(c.calibrated)
-    return sorted(rmse, key=lambda name: -rmse[name])[:count]
+    return sorted(sensors, key=lambda name: -rmse[name])[:count]
 
 
 def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
