@@ -34,14 +34,14 @@ SURFACE = {
         inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
     """,
     "design": """
-        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DesignCode
-        DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
+        Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DESIGN_FORMAT
+        DesignCode DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
         LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
-        Polarity Reach Reachable RegulatedPoint Seen StateFeedback StepResponseLinearity Tuning
-        certify_loop check_polarity checked_margins cold_side collapse constant_gain corner_plants
-        disturbance_observer feed_forward feedback_linearization linear_controller load_controller loop_margins
-        loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
-        step_response_linearity tune_pi unobservable
+        Polarity Reach Reachable RegulatedPoint Seen StateFeedback StepResponseLinearity Tuning certify_loop
+        check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
+        feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins loop_poles
+        observer pid place_sensors reachable regulated_points simulate_loop state_feedback step_response_linearity
+        tune_pi unobservable
         Design RobustAgainst h2 hinf
     """,
     "diagnosis": """

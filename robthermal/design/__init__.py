@@ -29,7 +29,9 @@ from ._lti import LinearController as LinearController
 from ._lti import linear_controller as linear_controller
 from ._margins import Margins as Margins
 from ._matrices import Matrices as Matrices
+from ._matrix_controller import DESIGN_FORMAT as DESIGN_FORMAT
 from ._matrix_controller import MatrixController as MatrixController
+from ._matrix_controller import gains_digest as gains_digest
 from ._matrix_controller import load_controller as load_controller
 from ._observer import GainObserver as GainObserver
 from ._observer import observer as observer
@@ -64,13 +66,13 @@ Seen = ControllerInput
 collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "ControllerInput", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
-           "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
-           "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity", "Reach",
-           "Reachable", "RegulatedPoint", "Seen", "StateFeedback", "StepResponseLinearity", "Tuning",
-           "certify_loop", "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain",
-           "corner_plants", "disturbance_observer", "feed_forward", "feedback_linearization",
-           "linear_controller", "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors",
-           "reachable", "regulated_points", "simulate_loop", "state_feedback", "step_response_linearity", "tune_pi",
-           "unobservable"]
+           "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate",
+           "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController",
+           "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
+           "PlantMargins", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen", "StateFeedback",
+           "StepResponseLinearity", "Tuning", "certify_loop", "check_polarity", "checked_margins", "cold_side",
+           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "feed_forward",
+           "feedback_linearization", "gains_digest", "linear_controller", "load_controller", "loop_margins",
+           "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
+           "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]
 __all__ += ["Design", "RobustAgainst", "h2", "hinf"]  # of the package synthesis

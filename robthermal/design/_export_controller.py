@@ -85,12 +85,19 @@ def _program(M: Matrices, kind: str, name: str) -> Program:
         advance=_sums("next", M.advance, [*own, *seen, *wanted, *achieved]))
     setup = f"    {p}_state state = {{{{0}}}};\n    {p}_seen seen;\n    double achieved[{m}];"
     return Program(p, "CONTROLLER_TEST", _ABOUT.format(p=p, kind=kind, h=M.sample_time, members=_members(M)), body,
-                   list(_test_vector(M)), sum(M.sizes.values()) + m, setup, _test_call(p, M))
+                   list(vector_of(M)), sum(M.sizes.values()) + m, setup, _test_call(p, M), _columns(M))
+
+
+def _columns(M: Matrices) -> list[str]:
+    """Names of the columns of the test vector."""
+    inputs = [f"{part}[{i}]" for part, size in M.sizes.items() for i in range(size)]
+    return [*inputs, *(f"taken away[{i}]" for i in range(M.modules)), *(f"heat[{i}]" for i in range(M.modules)),
+            *(f"state.x[{i}]" for i in range(len(M.start)))]
 
 
 def _members(M: Matrices) -> str:
     """Comment on the inputs."""
-    lines = ["reference, cold: set-points and temperatures of the cold faces [K]"]
+    lines = ["reference, cold: set-points, and temperatures of the cold faces or what is regulated instead [K]"]
     if M.lumps:
         lines.append("temperatures: of the lumps " + ", ".join(M.lumps) + " [K]")
     if M.around:
@@ -120,7 +127,14 @@ def _test_call(p: str, M: Matrices) -> str:
     return "\n".join(call)
 
 
-def _test_vector(M: Matrices) -> Iterator[list[float]]:
+def vector_of(M: Matrices) -> Iterator[list[float]]:
+    """Rows of inputs and of what must come out: heats, and the memory after the step.
+
+    Parameters
+    ----------
+    M : Matrices
+        Of the controller.
+    """
     rng, memory = np.random.default_rng(0), [0.0] * len(M.start)
     for t in range(_TEST_SAMPLES):
         seen = [*rng.uniform(280.0, 300.0, sum(M.sizes.values())).tolist()]

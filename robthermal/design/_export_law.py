@@ -160,8 +160,10 @@ def _program(law: Law, name: str) -> Program:
     body = _BODY.format(p=p, m=m, modules=",\n".join("    " + doubles(row.values()) for row in _rows(law).values()))
     call = (f"        {p}_step(in, in + {m}, in + {2 * m}, in + {3 * m}, {_TEST_STEP}, out, out + {m}, out + {2 * m}, "
             f"limit);\n        for (int k = 0; k < {m}; k++)\n            out[{3 * m} + k] = limit[k];")
+    columns = [f"{what} {module}" for what in ("wanted", "hot", "cold", "previous", "current", "voltage", "achieved",
+                                               "limit") for module in law.names]
     return Program(p, "LAW_TEST", _ABOUT.format(p=p, names=comment(", ".join(law.names))), body,
-                   list(_test_vector(law)), 4 * m, f"    int limit[{m}];", call)
+                   list(_test_vector(law)), 4 * m, f"    int limit[{m}];", call, columns)
 
 
 def _test_vector(law: Law) -> Iterator[list[float]]:

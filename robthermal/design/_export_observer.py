@@ -133,7 +133,8 @@ def _program(model: ObserverModel, gain: Array, method: str, name: str) -> Progr
             f"        {p}_step(&state, in, in + {n_y});\n        for (int k = 0; k < {n}; k++)\n"
             f"            out[k] = state.x[k];")
     return Program(p, "OBSERVER_TEST", about, _body(p, model, recursion), list(_test_vector(model, recursion)),
-                   n_y + n_u, f"    {p}_state state = {{{{0}}}};", call)
+                   n_y + n_u, f"    {p}_state state = {{{{0}}}};", call,
+                   [*model.sensors, *system.exogenous_names, *system.lump_names])
 
 
 def _body(p: str, model: ObserverModel, recursion: ObserverRecursion) -> str:

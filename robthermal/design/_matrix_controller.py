@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +14,13 @@ import numpy as np
 from .._checks import positive_number
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_modules
-from ._export_controller import FORMAT
-from ._matrices import Matrices, dot
+from ._export_controller import FORMAT, vector_of
+from ._matrices import Matrices, dot, matrices
 from ._modules import Array
-from ._numbers import numbers
+from ._numbers import non_negative, numbers
+from ._pid import PID
 
+DESIGN_FORMAT = "robthermal-design/1"
 _LARGEST = 50_000_000  # bytes: the matrices of a hundred states are a hundredth of it
 
 
@@ -65,12 +69,12 @@ class MatrixController(Controller):
 
 
 def load_controller(path: str | Path) -> MatrixController:
-    """Read a controller that was exported to JSON.
+    """Read a controller that was exported to JSON, or that of a design.
 
     Parameters
     ----------
     path : str or path
-        File that `Controller.export` wrote.
+        File that `Controller.export` wrote, or the design.json of a design.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def load_controller(path: str | Path) -> MatrixController:
     Raises
     ------
     InputError
-        The file cannot be read, or is not such a file.
+        The file cannot be read, is not such a file, or its numbers are not those that were written.
 
     Examples
     --------
@@ -101,16 +105,58 @@ def load_controller(path: str | Path) -> MatrixController:
         raise
     except (ValueError, RecursionError) as error:
         raise InputError(f"is not JSON: {error}", where=where) from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InputError("is not a controller", where=where, expected=f'"format": "{FORMAT}"',
-                         remedy="Write one with controller.export(path).")
+    kinds = {FORMAT: _controller, DESIGN_FORMAT: _designed}
+    if not isinstance(content, dict) or content.get("format") not in kinds:
+        raise InputError("is not a controller", where=where, expected=f'"format": "{FORMAT}" or "{DESIGN_FORMAT}"',
+                         remedy="Write one with controller.export(path), or `robthermal design`.")
     try:
-        return _controller(content)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        found, intact = kinds[content["format"]](content)
+    except InputError as error:
+        raise InputError(error.what, where=f"{where} {error.where}", expected=error.expected) from None
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InputError(f"is not a complete controller: {type(error).__name__}: {error}", where=where) from None
+    if not intact:
+        raise InputError("its numbers are not those that were written", where=where,
+                         expected="an unchanged file", remedy="Write it again, or design with other gains.")
+    return found
 
 
-def _controller(content: dict[str, Any]) -> MatrixController:
+def gains_digest(controller: Mapping[str, Any], sample_time: float) -> str:
+    """SHA-256 of the gains of a design, as its file holds them.
+
+    Parameters
+    ----------
+    controller : mapping
+        Modules with their gains.
+    sample_time : float
+        Time between two samples [s].
+
+    Examples
+    --------
+    >>> gains_digest({"m1": {"proportional": {"value": 0.4, "unit": "W/K"}}}, 1.0)[:8]
+    'c237e26c'
+    """
+    text = json.dumps([controller, sample_time], sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _designed(content: dict[str, Any]) -> tuple[MatrixController, bool]:
+    """PI of every module from design.json, and whether its gains are what was written."""
+    modules, h = content["controller"]["modules"], content["sample_time"]["value"]
+    gains = [[module[key]["value"] for module in modules.values()] for key in ("proportional", "integral",
+                                                                              "tracking_time")]
+    table = numbers(gains, "controller")
+    if table.shape != (3, len(modules)) or not len(modules):
+        raise ValueError("no modules")
+    non_negative(table, "controller")
+    h = positive_number(h, "sample_time", "s")
+    found: Any = PID(table[0], table[1], np.zeros(len(modules)), 2 * h, table[2], h)
+    return (MatrixController(matrices(found), str(content["system"])),
+            content["controller"]["sha256"] == gains_digest(modules, content["sample_time"]["value"]))
+
+
+def _controller(content: dict[str, Any]) -> tuple[MatrixController, bool]:
+    """From an export, and whether it meets its own test vector."""
     m, lumps, around = int(content["modules"]), tuple(map(str, content["lumps"])), tuple(map(str, content["around"]))
     indices = tuple(int(i) for i in content["indices"])
     k, n = 2 * m + len(lumps) + len(around), len(content["start"])
@@ -118,5 +164,8 @@ def _controller(content: dict[str, Any]) -> MatrixController:
     found = {key: numbers(content[key], key).reshape(shape) for key, shape in shapes.items()}
     if m < 1 or len(indices) != len(lumps) or not all(0 <= i < content["n_lumps"] for i in indices):
         raise ValueError("lumps, indices and n_lumps contradict each other")
-    return MatrixController(Matrices(positive_number(content["sample_time"], "sample_time", "s"), m, lumps, indices,
-                                     int(content["n_lumps"]), around, **found), str(content["name"]))
+    M = Matrices(positive_number(content["sample_time"], "sample_time", "s"), m, lumps, indices,
+                 int(content["n_lumps"]), around, **found)
+    rows = content["test_vector"]["rows"] if "test_vector" in content else None  # files of former versions have none
+    intact = rows is None or np.allclose(np.array(list(vector_of(M))), np.array(rows, float), rtol=1e-9, atol=1e-12)
+    return MatrixController(M, str(content["name"])), intact

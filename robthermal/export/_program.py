@@ -46,6 +46,8 @@ class Program:
         Number of inputs in a row of the test.
     setup, call : str
         C lines of the test before the loop over the rows, and inside it: they fill `out` from `in`, row `t`.
+    columns : sequence of str, optional
+        What every column of a row is, inputs first.
 
     Examples
     --------
@@ -63,6 +65,7 @@ class Program:
     n_in: int
     setup: str
     call: str
+    columns: Sequence[str] = ()
 
     def text(self) -> str:
         """Source of the file.

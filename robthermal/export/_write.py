@@ -44,15 +44,20 @@ def write_export(path: str | Path, document: Callable[[], Mapping[str, Any]], pr
         File to write, whole or not at all.
     document : callable
         Makes the content of the MATLAB and JSON files: plain values and arrays; in JSON numbers that are not finite
-        become null.
+        become null. The test vector of the C source is added to it.
     program : callable
         Makes the C source.
     """
     def source() -> bytes:
         return program().text().encode("ascii")
 
-    by_suffix(path, {".c": source, ".h": source, ".mat": lambda: matlab_bytes(document()),
-                     ".json": lambda: json_bytes(plain(document()))})
+    def content() -> dict[str, Any]:
+        made = program()
+        return {**document(), "test_vector": {"inputs": made.n_in, "columns": list(made.columns),
+                                              "rows": np.array(made.vector, float)}}
+
+    by_suffix(path, {".c": source, ".h": source, ".mat": lambda: matlab_bytes(content()),
+                     ".json": lambda: json_bytes(plain(content()))})
 
 
 def plain(content: Any) -> Any:

@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...design import GainObserver
+from ...design import DESIGN_FORMAT, GainObserver, gains_digest
 from ...report import versions
 from ...thermal import Equations, Module, System
 from ._design import ControllerDesign
-
-FORMAT = "robthermal-design/1"
 
 _LAW = ("T = (x_hot + x_cold)/2 - reference_temperature, S = seebeck.value + seebeck.slope T, R and K alike; "
         "q = v - K (x_hot - x_cold); a = S x_cold/R; s = max(2 q/R, -a^2); I = -s/(a + sqrt(a^2 + s)); "
@@ -40,8 +38,9 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
     """Everything in design.json."""
     system, done = result.certification.system, result.certification
     certified = [c.key for c in done.checked if c.good]
+    gains = {name: _gains(result, i) for i, name in enumerate(result.law.names)}
     return {
-        "format": FORMAT, "system": system.name, "holds": result.holds,
+        "format": DESIGN_FORMAT, "system": system.name, "holds": result.holds,
         "certificates": [f"certificates/{key}.json" for key in certified],
         "not_certified": {c.title: c.certificate.reason for c in done.checked if not c.good},
         "units": {"temperature": "K", "current": "A", "heat": "W", "time": "s"},
@@ -51,7 +50,7 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
         "law": {"equation": _LAW,
                 "modules": {name: _module(result, i, name) for i, name in enumerate(result.law.names)}},
         "controller": {"equation": _PI, "bandwidth": {"value": result.bandwidth, "unit": "rad/s"},
-                       "modules": {name: _gains(result, i) for i, name in enumerate(result.law.names)}},
+                       "modules": gains, "sha256": gains_digest(gains, result.controller.sample_time)},
         "margins": result.margins.to_dict(), "margin_units": _MARGIN_UNITS, "margins_missed": list(result.missed),
         "observer": None if result.observer is None else _observer(system, result.observer),
         "linearity": None if result.collapse is None else {

@@ -25,6 +25,7 @@ from ._file import write_design_file
 from ._limits import BELOW_FOLD
 from ._margin_section import margin_section
 
+_ENDINGS = {"c": ("c", "h"), "mat": ("mat",), "json": ("json",)}
 _LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
 
 
@@ -106,7 +107,11 @@ def _summary(result: ControllerDesign) -> dict[str, Any]:
 
 
 def save_design(result: ControllerDesign, folder: Path) -> None:
-    """Write design.json, with every number of the controller.
+    """Write design.json, with every number of the controller, and the exports that were asked for.
+
+    Law, controller and observer become law.c, controller.c, observer.c with functions law_step, controller_init, _heat
+    and _advance, observer_step, and the same as .h to include; .mat and .json hold their numbers. All have a test
+    vector.
 
     Parameters
     ----------
@@ -116,6 +121,11 @@ def save_design(result: ControllerDesign, folder: Path) -> None:
         Existing folder to write into.
     """
     write_design_file(result, folder / "design.json")
+    parts: dict[str, Any] = {"law": result.law, "controller": result.controller, "observer": result.observer}
+    endings = [ending for one in result.request.export for ending in _ENDINGS[one]]
+    for name, part in parts.items():
+        for ending in endings if part is not None else ():
+            part.export(folder / f"{name}.{ending}", name)
 
 
 _ASSUMPTIONS = (
