@@ -36,7 +36,7 @@ def stamp_reader(
     table : Table
         Its first rows.
     places : tuple of int
-        The column.
+        Place of the time column.
     most : int
         As many rows as there can be.
     unit : str or None

@@ -70,7 +70,7 @@ def read_values(
     Parameters
     ----------
     source : Source
-        The rows.
+        File or table whose rows are read.
     channels : sequence of Channel
         Columns that are used.
     choice : Declared
