@@ -113,7 +113,8 @@ def calibrated(project: Project, system: System, train: Sequence[Record], valida
         progress(f"calibrating {len(system.fit)} parameters on {' and '.join(data)}")
         fitted: Any = [*train, *responses]
         compared: Any = [*validation, *held_out]
-        fit = calibrate(system, fitted, validation=compared or None, initial=project.initial, loss=project.loss)
+        of_records: Any = {"initial": project.initial, "loss": project.loss} if train else {}
+        fit = calibrate(system, fitted, validation=compared or None, **of_records)
     progress("comparing model and data")
     comparisons = _comparisons(project, system, fit, train, validation)
     model = fit.system if fit else system
