@@ -48,6 +48,12 @@ def _row(one: Mapping[str, Any]) -> dict[str, object]:
 
 
 def _actions(imports: Sequence[Mapping[str, Any]]) -> list[Table]:
-    rows = [{"file": one["file"], "what": action["what"], "column": action.get("column") or "",
-             "said": action.get("text", "")} for one in imports for action in one["actions"]]
+    """What was done, once for all files to which the same was done."""
+    files: dict[tuple[str, str, str], list[str]] = {}
+    for one in imports:
+        for action in one["actions"]:
+            said = action["what"], action.get("column") or "", action.get("text", "")
+            files.setdefault(said, []).append(one["file"])
+    rows = [{"what": what, "column": column, "said": text, "files": "all" if len(names) == len(imports) > 1 else
+             ", ".join(dict.fromkeys(names))} for (what, column, text), names in files.items()]
     return [Table(pd.DataFrame(rows), "What was done to them.")] if rows else []
