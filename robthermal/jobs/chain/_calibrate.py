@@ -20,6 +20,7 @@ from ..run import (
     parameter_section,
     parameter_table,
     residual_table,
+    response_sections,
 )
 from ._context import Context, StageJob
 from ._measured import Data, data_key, has_data, has_training, project_data, used_responses
@@ -88,7 +89,7 @@ def calibration_part(stage: str, done: Calibrated, data: Data, project: Project)
                               "imports": import_table([*data.train, *data.validation])}
     sections = [comparison_section(done.comparisons, done.fit)] if done.comparisons else []
     if done.fit is not None:
-        sections.append(parameter_section(done.fit, None))
+        sections += [*response_sections(done.fit), parameter_section(done.fit, None)]
         tables["calibrate"] = {"parameters": parameter_table(done.fit, None), "outcome": done.fit.outcome.code}
     first = [first_section(done.comparisons, done.misfits)] if done.misfits else []
     return part(stage, sections, first=first, data=tables)

@@ -19,6 +19,7 @@ from ._sections import comparison_section as comparison_section
 from ._sections import first_section as first_section
 from ._sections import misfit_table as misfit_table
 from ._sections import parameter_section as parameter_section
+from ._sections import response_sections as response_sections
 from ._tables import import_table as import_table
 from ._tables import parameter_table as parameter_table
 from ._tables import residual_table as residual_table
@@ -27,4 +28,4 @@ from ._write import write_job as write_job
 __all__ = ["Calibrated", "Comparison", "DataFacts", "DiagnosisFacts", "JobResult", "Misfit", "applied", "calibrated",
            "claim_reasons", "comparison_section", "data_facts", "data_reasons", "diagnosis_facts", "doubted_claims",
            "first_section", "import_table", "job_records", "misfit_table", "parameter_section", "parameter_table",
-           "residual_table", "run_job", "write_job"]
+           "residual_table", "response_sections", "run_job", "write_job"]

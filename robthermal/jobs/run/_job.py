@@ -111,8 +111,7 @@ def calibrated(project: Project, system: System, train: Sequence[Record], valida
         data = [f"{sum(r.n_samples for r in train)} samples"] if train else []
         data += [f"{sum(map(len, responses))} bins"] if responses else []
         progress(f"calibrating {len(system.fit)} parameters on {' and '.join(data)}")
-        fitted: Any = [*train, *responses]
-        compared: Any = [*validation, *held_out]
+        fitted, compared = [*train, *responses], [*validation, *held_out]
         of_records: Any = {"initial": project.initial, "loss": project.loss} if train else {}
         fit = calibrate(system, fitted, validation=compared or None, **of_records)
     progress("comparing model and data")

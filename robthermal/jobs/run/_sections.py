@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
 from ...calibration import Estimates, Fit
-from ...report import Figure, Section, Table, measured_against_model
+from ...report import Figure, Section, Table, house_style, measured_against_model
 from ._misfit import Misfit
 from ._result import Comparison
 
@@ -97,6 +97,30 @@ def _comparison_figure(c: Comparison, sensors: list[str], unit: str) -> Figure:
 def _worst(c: Comparison, sensors: list[str], count: int) -> list[str]:
     rmse = c.rmse(c.calibrated)
     return sorted(sensors, key=lambda name: -rmse[name])[:count]
+
+
+def response_sections(fit: Fit) -> Iterator[Section]:
+    """Frequency responses beside the calibrated model, fitted and only compared.
+
+    Parameters
+    ----------
+    fit : Fit
+        Calibration of the system.
+    """
+    pairs = [*(("training", one) for one in fit.responses), *(("validation", one) for one in fit.validation_responses)]
+    if not pairs:
+        return
+    rows = [{"use": use, "outputs": ", ".join(one.outputs), "inputs": ", ".join(one.inputs),
+             "bins": int(one.bins.size), "misfit": one.misfit} for use, one in pairs]
+    with house_style():
+        figures = [Figure.draw(one.plot().flat[0].figure, alt=f"Bode plot of the {use} response and of the model.",
+                               caption=f"Measured response with 95 % bands, and the calibrated model (dashed), {use}.")
+                   for use, one in pairs]
+    yield Section("Model against frequency responses", "The model is linearized at the operating point of each "
+                  "response. The misfit is the mean square of measured − model in standard deviations of the estimate: "
+                  "1 is noise alone.", figures=tuple(figures),
+                  tables=(Table(pd.DataFrame(rows), "Frequency responses beside the model.", digits=3),),
+                  anchor="responses")
 
 
 def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
