@@ -15,7 +15,7 @@ from ..certify import loop as certify_plain_loop
 from ..certify import observer as certify_observer
 from ..errors import InputError, Outcome
 from ..thermal import System
-from ..verification import Certificate
+from ..verification import Certificate, not_certified
 from ._linearization import FeedbackLinearization
 from ._lti import LinearController
 from ._modules import Array
@@ -24,6 +24,7 @@ from ._observer import GainObserver
 from ._outcomes import DesignCode
 from ._pid import PID
 from ._plant import cold_side
+from ._regulated_points import Regulate, RegulatedPoint
 from ._state_feedback import StateFeedback
 
 Interval = tuple[float, float]
@@ -69,7 +70,7 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
                  temperature: Interval | Mapping[str, Interval] | None = None,
                  ambient: Mapping[str, Interval] | None = None, heat: Mapping[str, Interval] | None = None,
                  observer: GainObserver | None = None, drift: float | None = None,
-                 parameters: Mapping[str, Interval] | None = None) -> CertifiedLoop:
+                 parameters: Mapping[str, Interval] | None = None, regulate: Regulate = None) -> CertifiedLoop:
     """Certify that a closed loop forgets its start, and stays in its box.
 
     Parameters
@@ -95,6 +96,9 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     parameters : mapping, optional
         {parameter name: (lower, upper)}, for example `Fit.ranges`: uncertain conductances of links, without observer.
         Ranges that the loop does not depend on are ignored, others refused by name, as in `rt.certify.loop`.
+    regulate : mapping of module to str, optional
+        Sensor or lump that a module regulates; default its cold face. A loop of a sensor that lags, or that the
+        controller reads beside an observer, is not certified, and the outcome says so.
 
     Returns
     -------
@@ -123,7 +127,8 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
     """
     expect(law, FeedbackLinearization, "law", "rt.design.feedback_linearization")
     limits = _limits(system, law)
-    matrices = _matrices(controller, law)
+    points = cold_side(law, regulate=regulate).points
+    matrices = _matrices(controller, law, points)
     if observer is not None:
         expect(observer, GainObserver, "observer", "rt.design.observer")
         if observer.sample_time != controller.sample_time:
@@ -140,6 +145,12 @@ def certify_loop(system: System, controller: PID | StateFeedback | LinearControl
         box = dict(temperature) if isinstance(temperature, Mapping) else dict.fromkeys(system.lumps, temperature)
         stays = certify_invariance(system, current=limits, temperature=box, ambient=ambient, heat=heat,
                                    parameters=parameters)
+    missing = _not_covered(points, observer)
+    if missing:
+        text = f"Not certified: it is not shown that the loop contracts in the box: {missing}"
+        return CertifiedLoop(not_certified("loop", system={}, region={}, evidence={}, reason=missing, made_by={},
+                                           claim="The loop contracts in the box."), stays, None,
+                             DesignCode.NOT_CERTIFIED.outcome(text, remedy=""))
     limits_and_box: dict[str, Any] = {"current": limits, "temperature": box, "sample_time": controller.sample_time,
                                       "controller": matrices}
     if observer is None:
@@ -200,11 +211,24 @@ def _limits(system: System, law: FeedbackLinearization) -> dict[str, Interval]:
             zip(law.names, law.current_low, law.current_high, strict=True)}
 
 
-def _matrices(controller: object, law: FeedbackLinearization) -> Matrices:
+def _not_covered(points: tuple[RegulatedPoint, ...], observer: GainObserver | None) -> str:
+    """What of a loop no certificate covers; empty where all is."""
+    for point in points:
+        if point.time_constant or point.delay:
+            return (f"the lag of sensor {point.name!r} is no part of the certificate. Describe its mass as a lump, "
+                    "linked to the lump it measures, and regulate that.")
+        if point.kind == "sensor" and observer is not None:
+            return (f"the controller reads sensor {point.name!r} itself, and the certificate's reads estimates. "
+                    f"Regulate the lump {point.lump!r} instead.")
+    return ""
+
+
+def _matrices(controller: object, law: FeedbackLinearization, points: tuple[RegulatedPoint, ...]) -> Matrices:
     """A, B, C, D, windup of a controller, modules in the order of the system; what never changes is no state."""
     plant = cold_side(law)
     n = len(law.system.lumps)
-    faces = np.eye(n)[law.modules.cold]
+    # what is regulated: gains of sensors count, offsets do nothing to a difference of temperatures
+    faces = np.array([point.gain * np.eye(n)[law.system.lump_names.index(point.lump)] for point in points])
     if isinstance(controller, PID):
         found = _of_pid(controller, faces)
     elif isinstance(controller, StateFeedback):

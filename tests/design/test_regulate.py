@@ -182,3 +182,25 @@ def test_a_name_with_two_meanings_is_refused(system):
     doubled = system.model_copy(update={"sensors": {**system.sensors, "stage": system.sensors["T_plate"]}})
     with pytest.raises(rt.InputError, match="'stage' is a lump, and a sensor on another lump"):
         rt.design.cold_side(rt.design.feedback_linearization(doubled), regulate={"m1": "stage"})
+
+
+def test_the_certificate_of_a_loop_knows_what_is_regulated():
+    """A lump away from the cold face is in the controller's matrices; a lag is not covered, and it is said."""
+    system = machine(gain=1.03)
+    law = rt.design.feedback_linearization(system, current_limits=(-0.05, 0.05))
+    plant = rt.design.cold_side(law, regulate={"m1": "plate"})
+    pi = rt.design.pid(plant, bandwidth=0.003, sample_time=2.0)
+    done = rt.design.certify_loop(system, pi, law, regulate={"m1": "plate"})
+    assert done.invariance.holds
+    from robthermal.design._certify_loop import _matrices
+    found = _matrices(pi, law, plant.points)
+    np.testing.assert_allclose(found["D"], [[0.0, 0.0, -pi.proportional[0]]])
+    np.testing.assert_allclose(found["B"], [[0.0, 0.0, -2.0 * pi.integral[0]]])
+    lagging = rt.design.certify_loop(system, pi, law, regulate=REGULATE)
+    assert not lagging.holds and not lagging.loop.holds and lagging.outcome.code == "not_certified"
+    assert "the lag of sensor 'T_plate'" in str(lagging)
+    quick = machine(lag=0.0)
+    watcher = rt.design.observer(quick, ["T_sink"], sample_time=2.0)
+    law = rt.design.feedback_linearization(quick, current_limits=(-0.05, 0.05))
+    beside = rt.design.certify_loop(quick, pi, law, regulate=REGULATE, observer=watcher)
+    assert not beside.holds and "Regulate the lump 'plate'" in str(beside)
