@@ -421,3 +421,41 @@ def test_map_refuses(run: Run, file: Path, tmp_path: Path, options: list[str], w
 def test_request_refuses_a_module_without_set_point() -> None:
     with pytest.raises(InputError, match="'m2' has no set-point"):
         rt.jobs.design.design_from_text(rt.systems.two_module(), setpoint=["m1=5"])
+
+
+def test_margins_over_parameter_ranges_are_reported(run: Run, file: Path, tmp_path: Path) -> None:
+    """Tuned by margins for all corners: design.json, summary.json and report; nominal and robust side by side."""
+    said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--margin", "phase=50", "--margin",
+               "modulus=0.5", "--sample-time", "2", "--parameters", "links.stage-part.conductance=1.4:1.6", "--export",
+               "json,matlab", "--out", tmp_path / "out")
+    assert said.status == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["design"]
+    numbers = json.loads((tmp_path / "out" / "design.json").read_text(encoding="utf-8"))
+    assert numbers["margins"] == summary["margins"] and numbers["holds"] and summary["margins_missed"] == []
+    worst = summary["margins"]["m1"]["worst"]
+    assert set(worst) == {"gain", "phase", "modulus", "delay", "crossover", "stable"}
+    assert 50.0 <= worst["phase"] <= summary["margins"]["m1"]["phase"] and worst["modulus"] >= 0.5
+    assert min(worst["phase"] / 50.0, worst["modulus"] / 0.5) == pytest.approx(1.0, abs=0.02)
+    assert "T_slow" in summary["tuning"] and numbers["controller"]["bandwidth"]["value"] == summary["bandwidth"]
+    assert summary["nominal"]["The box is never left"] and summary["robust"]["The box is never left"]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Margins of the loops" in page and "worst of 2 corners" in page
+    assert {path.name for path in (tmp_path / "out").glob("*.mat")} == {"law.mat", "controller.mat", "observer.mat"}
+    assert run("verify", tmp_path / "out").status == 0
+
+
+def test_a_missed_margin_fails_with_the_best_bandwidth(run: Run, file: Path, tmp_path: Path) -> None:
+    said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--margin", "phase=60", "--bandwidth",
+               "0.04", "--sample-time", "2", "--out", tmp_path / "out")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert said.status == 1 and summary["verdict"] == "FAIL" and not summary["design"]["holds"]
+    reason = next(one for one in summary["reasons"] if one["code"] == "margin_missed")
+    assert "phase margin of m1" in reason["text"] and "is the largest that keeps phase 60 deg" in reason["text"]
+
+
+def test_map_keeps_the_sign_of_heating_currents(run: Run, file: Path, tmp_path: Path) -> None:
+    said = run("map", file, "--ambient", "10", "--load", "0", "--setpoint", "10,30,2", "--temperature", "0", "85",
+               "--out", tmp_path / "out")
+    data = pd.read_csv(tmp_path / "out" / "map.csv")
+    assert said.status == 0 and data["setpoint [degC]"].tolist() == [10.0, 30.0]
+    assert data["needed [A]"][1] < -0.1 and data["direction"][1] == "symmetric"
