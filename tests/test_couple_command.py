@@ -19,7 +19,8 @@ DT = 0.01
 P1, P2 = control.tf([0.01], [1, -0.99], DT), control.tf([0.02], [1, -0.98], DT)
 FREQUENCIES = np.arange(0.5, 50.0, 0.5)  # Hz
 Done = tuple[Path, rt.jobs.couple.Coupling]
-KEYS = {"format", "name", "sample_time", "verdict", "filters", "sections", "norms", "performance", "remarks"}
+KEYS = {"format", "name", "sample_time", "verdict", "filters", "sections", "norms", "performance", "remarks", "robust",
+        "robust_without_circles", "left_out"}
 SPEC = """
 [coupling]
 name = "pair"

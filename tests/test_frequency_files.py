@@ -193,11 +193,50 @@ def test_a_wrong_file_in_couple_is_one_short_line(run: Run, pair: Path, tmp_path
     assert "one" in warned and not (tmp_path / "out").exists()
 
 
-def test_infinite_circles_are_said_with_the_way_out(run: Run, pair: Path, tmp_path: Path) -> None:
-    (tmp_path / "SPEC.toml").write_text(SPEC, encoding="utf-8")
+def spoiled(pair: Path, folder: Path, *bins: int) -> None:
+    """The two responses, with no degrees of freedom in some bins: infinite circles."""
     for name in ("one", "two"):
         content = json.loads((pair / f"{name}.json").read_text(encoding="utf-8"))
-        content["degrees_of_freedom"]["values"][0] = 0
-        (tmp_path / name).write_text(json.dumps(content), encoding="utf-8")
+        for k in bins:
+            content["degrees_of_freedom"]["values"][k] = 0
+        (folder / name).write_text(json.dumps(content), encoding="utf-8")
+
+
+def test_infinite_circles_in_the_lowest_bins_are_left_out_and_said(run: Run, pair: Path, tmp_path: Path) -> None:
+    (tmp_path / "SPEC.toml").write_text(SPEC, encoding="utf-8")
+    spoiled(pair, tmp_path, 0, 1)
+    frequencies = rt.identify.read_response(pair / "one.json").frequencies
+    said = shown(run("couple", "SPEC.toml", "--out", "out", "--json"))
+    found = json.loads((tmp_path / "out" / "coupling.json").read_text(encoding="utf-8"))
+    assert found["left_out"] == pytest.approx(frequencies[:2].tolist(), rel=1e-9)
+    assert [remark["code"] for remark in said["remarks"]] == ["bins_left_out"] == [r["code"] for r in found["remarks"]]
+    assert f"assumed below {frequencies[2]:.4g} Hz" in found["remarks"][0]["text"]
+    assert found["robust"] == found["norms"]["robust"] > found["robust_without_circles"] > 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["couple"]["left_out"] == found["left_out"] and summary["couple"]["robust"] == found["robust"]
+    assert summary["verdict"] == "PASS WITH REMARKS"
+
+
+def test_infinite_circles_between_decided_bins_are_refused(run: Run, pair: Path, tmp_path: Path) -> None:
+    (tmp_path / "SPEC.toml").write_text(SPEC, encoding="utf-8")
+    spoiled(pair, tmp_path, 7, 9)
+    frequencies = rt.identify.read_response(pair / "one.json").frequencies
     status, _, warned = run("couple", "SPEC.toml", "--out", "out")
-    assert status == 2 and "confidence circle" in warned and "circles = false" in warned
+    assert status == 2 and len(warned.splitlines()) == 1 and not (tmp_path / "out").exists()
+    assert f"cannot be decided from bins {frequencies[7]:.4g} … {frequencies[9]:.4g} Hz" in warned
+    assert "not stabilize" not in warned and f"Measure {frequencies[7]:.4g}" in warned
+
+
+def test_confidence_is_a_key_and_wider_with_more(run: Run, pair: Path, tmp_path: Path) -> None:
+    spoiled(pair, tmp_path)
+    robust = []
+    for number, confidence in enumerate((0.5, 0.95, 0.999)):
+        (tmp_path / "SPEC.toml").write_text(SPEC.replace("[design]", f"confidence = {confidence}\n[design]"),
+                                            encoding="utf-8")
+        shown(run("couple", "SPEC.toml", "--out", f"out{number}", "--json"))
+        robust.append(json.loads((tmp_path / f"out{number}" / "coupling.json").read_text(encoding="utf-8")))
+    assert robust[0]["robust"] < robust[1]["robust"] < robust[2]["robust"]
+    assert len({one["robust_without_circles"] for one in robust}) == 1
+    (tmp_path / "SPEC.toml").write_text(SPEC.replace("[design]", "confidence = 95\n[design]"), encoding="utf-8")
+    status, _, warned = run("couple", "SPEC.toml", "--out", "never")
+    assert status == 2 and "confidence" in warned

@@ -29,7 +29,7 @@ CODES = {
         -inexact +named -none -not_converged -not_predicted +nothing +predicted +selected -unexplained""",
     "fleet": "+done -failed",
     "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
-    "jobs": "-circles_left_out -frf_without_covariance",
+    "jobs": "-bins_left_out -circles_left_out -frf_without_covariance",
     "signals": "+designed -not_lower +resolved -undetermined -unresolved",
     "synthesis": "+certified -infeasible -not_certified -not_found",
     "thermal": "+agrees +closed -disagrees +found +held -none -not_held -not_reducible +reduced +rounded +unchecked",

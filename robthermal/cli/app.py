@@ -342,7 +342,8 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
         result = rt.jobs.couple_subsystems(job, stage)
         stage("writing the report")
         report = rt.jobs.write_coupling(result, out)
-    show_report(report, out, as_json, job.remarks, verdict=result.filters.verdict, filters=str(out / "coupling.json"))
+    show_report(report, out, as_json, result.remarks, verdict=result.filters.verdict,
+                filters=str(out / "coupling.json"))
 
 
 for _command in (results.report, results.verify, learn.new, learn.explain, learn.datasheet):

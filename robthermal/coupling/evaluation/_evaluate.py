@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import control
+import numpy as np
 
 from ...errors import Outcome
 from .._outcomes import CouplingCode
@@ -152,11 +153,15 @@ def _norms(problem: Problem, parts: Realization, proofs: Proofs) -> dict[str, fl
 def _robust_numbers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpace, proofs: Proofs
                     ) -> tuple[dict[str, float], float]:
     if problem.uncertainty is None:
-        return {"robust": 0.0, "small_gain": 0.0}, 0.0
+        return {"robust": 0.0, "robust_without_circles": 0.0, "small_gain": 0.0}, 0.0
     intervals = intervals_of(problem.uncertainty, problem.dt)
     delta = youla_parameter(problem, X_hat, Y_hat)
     robust, where = proofs.radius(delta, intervals)
-    return {"robust": robust, "small_gain": proofs.small_gain(delta, intervals, intervals.weights())}, where
+    bare, without = problem.uncertainty.without_confidence(), robust
+    if not np.array_equal(bare.envelope, problem.uncertainty.envelope):
+        without = Proofs(False).radius(delta, intervals_of(bare, problem.dt))[0]
+    return {"robust": robust, "robust_without_circles": without,
+            "small_gain": proofs.small_gain(delta, intervals, intervals.weights())}, where
 
 
 def _broken(asked: Mapping[str, float], reached: Mapping[str, float]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import control
@@ -15,8 +16,30 @@ from ...identify import FrequencyResponse
 Measured = Any  # control.FrequencyResponseData or identify.FrequencyResponse, 2x2, or a list of them
 
 
-def read_plants(plants: Measured, dt: float, where: str, size: int = 2) -> tuple[Array, Array, Array | None]:
-    """Frequencies [rad/s], responses (n_plants, n, n, n_f), and 95 % confidence radii of the same shape or None.
+@dataclass(frozen=True, eq=False)
+class MeasuredPlants:
+    """Measured plants on one grid, with joint confidence circles.
+
+    Parameters
+    ----------
+    omega : ndarray, shape (n_f,)
+        Frequencies of all plants [rad/s].
+    response : ndarray, shape (n_plants, n, n, n_f)
+        Measured values; 0 where the data do not determine them, and the circle is infinite.
+    radius : ndarray, shape (n_plants, n, n, n_f)
+        Radii of circles that hold the true values of all entries, frequencies and plants at once; 0 without covariance.
+    covered : ndarray of bool, shape (n_plants,)
+        Whether the plant has a covariance.
+    """
+
+    omega: Array
+    response: Array
+    radius: Array
+    covered: Array
+
+
+def read_plants(plants: Measured, dt: float, where: str, size: int = 2, confidence: float = 0.95) -> MeasuredPlants:
+    """Check measured plants, and draw the circles around them.
 
     Parameters
     ----------
@@ -28,28 +51,54 @@ def read_plants(plants: Measured, dt: float, where: str, size: int = 2) -> tuple
         Name of the argument.
     size : int
         Inputs and outputs n that they must have.
+    confidence : float
+        Probability that all circles hold the true values at once: every finite one of N circles has 1 - (1 - p)/N
+        (Bonferroni's inequality, whatever their correlation).
     """
     listed = list(plants) if isinstance(plants, Sequence) else [plants]
     if not listed:
         raise InputError("no measured plant", where=where, expected=f"at least one {size}x{size} frequency response")
-    read = [_one(plant, dt, _label(where, k, len(listed)), size) for k, plant in enumerate(listed)]
+    if isinstance(confidence, bool) or not isinstance(confidence, int | float) or not 0.0 < confidence < 1.0:
+        raise InputError(f"confidence is {confidence!r}", where="confidence", expected="a number between 0 and 1")
+    covered = [isinstance(plant, FrequencyResponse) and plant.has_covariance for plant in listed]
+    read = [_one(plant, dt, label(where, k, len(listed)), size, known)
+            for k, (plant, known) in enumerate(zip(listed, covered, strict=True))]
     omega = read[0][0]
     for k, (other, _, _) in enumerate(read):
         if len(other) != len(omega) or not np.allclose(other, omega, rtol=1e-9, atol=0.0):
-            raise InputError("its frequencies differ from those of the first plant", where=_label(where, k, len(read)),
+            raise InputError("its frequencies differ from those of the first plant", where=label(where, k, len(read)),
                              expected="the same frequencies in every plant")
-    radii = [radius for _, _, radius in read]
-    if all(radius is None for radius in radii):
-        return omega, np.stack([response for _, response, _ in read]), None
-    filled = [np.zeros((size, size, len(omega))) if radius is None else radius for radius in radii]
-    return omega, np.stack([response for _, response, _ in read]), np.stack(filled)
+    response, order = np.stack([one for _, one, _ in read]), [one for _, _, one in read]
+    radius = np.zeros(response.shape)
+    count = max(sum(_circles(plant) for plant, known in zip(listed, covered, strict=True) if known), 1)
+    for k, plant in enumerate(listed):
+        if covered[k]:
+            radius[k] = np.asarray(plant.confidence_radius(1.0 - (1.0 - confidence) / count))[:, :, order[k]]
+    known = np.isfinite(response)
+    return MeasuredPlants(omega, np.where(known, response, 0.0), np.where(known, radius, np.inf), np.array(covered))
 
 
-def _label(where: str, index: int, count: int) -> str:
+def _circles(plant: FrequencyResponse) -> int:
+    """How many entries have a circle: neither infinite nor known to be exact."""
+    radius = plant.confidence_radius(0.5)
+    return int(np.sum(np.isfinite(radius) & (radius > 0)))
+
+
+def label(where: str, index: int, count: int) -> str:
+    """Name of one of several plants.
+
+    Parameters
+    ----------
+    where : str
+        Name of the argument.
+    index, count : int
+        Number of the plant, and how many there are.
+    """
     return where if count == 1 else f"{where}[{index}]"
 
 
-def _one(plant: Measured, dt: float, where: str, size: int) -> tuple[Array, Array, Array | None]:
+def _one(plant: Measured, dt: float, where: str, size: int, covered: bool) -> tuple[Array, Array, Array]:
+    """Frequencies [rad/s] in increasing order, values there, and the order."""
     if isinstance(plant, FrequencyResponse):
         omega, response = 2 * np.pi * plant.frequencies, plant.response
         if dt and np.isfinite(plant.sample_time) and not np.isclose(plant.sample_time, dt, rtol=1e-6):
@@ -64,8 +113,8 @@ def _one(plant: Measured, dt: float, where: str, size: int) -> tuple[Array, Arra
         raise InputError(f"{response.shape[0]}x{response.shape[1]} response", where=where, expected=f"{size}x{size}")
     order = np.argsort(omega)
     omega, response = omega[order], response[:, :, order]
-    _check_grid(omega, response, dt, where)
-    return omega, response, _radius(plant, order)
+    _check_grid(omega, np.where(np.isnan(response), 0.0, response) if covered else response, dt, where)
+    return omega, response, order
 
 
 def _check_grid(omega: Array, response: Array, dt: float, where: str) -> None:
@@ -82,10 +131,3 @@ def _check_grid(omega: Array, response: Array, dt: float, where: str) -> None:
         raise InputError(f"frequency {omega[-1]:.6g} rad/s above the Nyquist frequency {np.pi / dt:.6g} rad/s",
                          where=where, expected="frequencies up to pi/dt",
                          remedy="python-control frequencies are rad/s; CSV files have Hz.")
-
-
-def _radius(plant: Measured, order: Array) -> Array | None:
-    if not isinstance(plant, FrequencyResponse) or not plant.has_covariance:
-        return None
-    radius = np.asarray(plant.confidence_radius(0.95))[:, :, order]
-    return radius if np.any(radius > 0) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,11 @@ from ..._arrays import Array
 from ...errors import InputError
 from ..systems import natural
 from ._coprime import CoprimeFactors, coprime
-from ._frf import Measured, read_plants
+from ._frf import Measured, MeasuredPlants, label, read_plants
 from ._loop import Loop
+from ._winding import MeasuredLoop, expect_joined, undecided
 
 _RESONANT = 1 / np.sqrt(2)  # damping ratio below which a mode has a peak
-_TURN = 0.9 * np.pi  # phase step between two frequencies beyond which turns cannot be counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,13 @@ class Uncertainty:
     factors : CoprimeFactors
         Of the model and the controllers.
     radius : ndarray, shape (n_plants, 2, 2, n_f), optional
-        What Delta_p can move by when the measured plant moves within its 95 % circles, each entry and frequency by
-        itself; infinite where a circle holds plants that K0 does not stabilize. None without covariance.
+        What Delta_p can move by when the measured plant moves within its circles, which hold the true values of all
+        entries, frequencies and plants at once with probability `confidence`. None without covariance.
+    confidence : float, optional
+        Probability that all true values are in their circles; None without covariance.
+    left_out : ndarray, shape (n_out,)
+        Frequencies below the first of `omega` that were measured but not used: an infinite circle, or plants in it that
+        make det(I + P K0) zero [rad/s]. The model error assumed there is that at the first frequency.
 
     Examples
     --------
@@ -59,6 +64,8 @@ class Uncertainty:
     envelope: Array
     factors: CoprimeFactors
     radius: Array | None = None
+    confidence: float | None = None
+    left_out: Array = field(default_factory=lambda: np.zeros(0))
 
     def at(self, omega: ArrayLike) -> Array:
         """Envelope as the proofs use it: the larger of the two neighbors.
@@ -80,7 +87,7 @@ class Uncertainty:
         return np.maximum(np.maximum(self.envelope[:, :, below], self.envelope[:, :, here]), self.envelope[:, :, above])
 
     def with_confidence(self) -> Uncertainty:
-        """The same with the 95 % confidence circles of the measurements inside the envelope.
+        """The same with the confidence circles of the measurements inside the envelope.
 
         Give the result to `synthesize` or `evaluate` as `uncertainty`; without this call the circles are not used.
 
@@ -88,22 +95,19 @@ class Uncertainty:
         -------
         Uncertainty
             Unchanged when the measurements carry no covariance.
-
-        Raises
-        ------
-        InputError
-            Where a circle is infinite, or so large that some plant in it is not stabilized.
         """
         if self.radius is None:
             return self
-        bad = ~np.all(np.isfinite(self.radius), axis=(1, 2))
-        if np.any(bad):
-            plant, index = np.argwhere(bad)[0]
-            raise InputError(f"the confidence circle of plant {plant + 1} at {self.omega[index]:.6g} rad/s is unknown "
-                             "or too large for the controllers", where="with_confidence",
-                             expected="a plant that K0 stabilizes wherever it is in its circle",
-                             remedy="Measure longer, or leave that frequency out.")
         return replace(self, envelope=np.max(np.abs(self.samples) + self.radius, axis=0))
+
+    def without_confidence(self) -> Uncertainty:
+        """The same with the measured values alone in the envelope.
+
+        Returns
+        -------
+        Uncertainty
+        """
+        return replace(self, envelope=np.max(np.abs(self.samples), axis=0))
 
     def plot(self) -> Any:
         """Magnitude of every sample and the envelope over frequency [Hz].
@@ -127,7 +131,8 @@ class Uncertainty:
         return axes
 
 
-def dual_youla(P_frf: Measured, P0: Any, K0: Any) -> Uncertainty:
+def dual_youla(P_frf: Measured, P0: Any, K0: Any, *, confidence: float = 0.95,
+               measured_in_closed_loop: bool = False) -> Uncertainty:
     """Delta_p = (Dk + P_frf Nk)⁻¹ (P_frf - P0) Dp of measured plants, Evers (6.21) corrected.
 
     Parameters
@@ -136,17 +141,22 @@ def dual_youla(P_frf: Measured, P0: Any, K0: Any) -> Uncertainty:
         Measured plants: python-control FRD [rad/s] or the result of rt.identify [Hz], on one frequency grid.
     P0, K0 : 2x2 StateSpace or TransferFunction, or pairs
         Model and controllers, diagonal.
+    confidence : float
+        Probability that all true values are in the confidence circles at once, for responses with covariance.
+    measured_in_closed_loop : bool
+        Whether the plants were measured while K0 controlled them and stayed bounded: then K0 stabilizes them, and no
+        encirclement is counted.
 
     Returns
     -------
     Uncertainty
-        Samples and envelope.
+        Samples and envelope at the frequencies that are decided; see the documentation, "Coupling".
 
     Raises
     ------
     InputError
         For an unstable nominal loop, a grid too coarse for a resonance of P0 or not covering it, a measured plant
-        that K0 does not stabilize, NaN or wrong shapes.
+        that K0 does not stabilize, or of which its confidence set does not tell, NaN or wrong shapes.
 
     Examples
     --------
@@ -156,10 +166,11 @@ def dual_youla(P_frf: Measured, P0: Any, K0: Any) -> Uncertainty:
     >>> rt.coupling.dual_youla.__name__
     'dual_youla'
     """
-    return from_factors(P_frf, coprime(P0, K0), "P_frf")
+    return from_factors(P_frf, coprime(P0, K0), "P_frf", confidence, measured_in_closed_loop)
 
 
-def from_factors(plants: Measured, factors: CoprimeFactors, where: str) -> Uncertainty:
+def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confidence: float = 0.95,
+                 measured_in_closed_loop: bool = False) -> Uncertainty:
     """The same with factors at hand, of any number of loops.
 
     Parameters
@@ -170,42 +181,100 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str) -> Uncer
         Of model and controllers.
     where : str
         Name of the argument, for messages.
+    confidence : float
+        As `dual_youla`.
+    measured_in_closed_loop : bool
+        As `dual_youla`.
     """
-    size = len(factors.loops)
-    omega, measured, radius = read_plants(plants, factors.loops[0].P.dt, where, size)
-    for number, loop in enumerate(factors.loops, 1):
-        _expect_resolved(omega, loop, number, where)
+    loops, size = factors.loops, len(factors.loops)
+    measured = read_plants(plants, loops[0].P.dt, where, size, confidence)
+    diag = _diagonals(factors, measured.omega, where)
+    P, radius = (np.moveaxis(part, -1, 1) for part in (measured.response, measured.radius))  # (n_plants, n_f, 2, 2)
+    left = np.linalg.inv(diag["Dk"] + P @ diag["Nk"])
+    samples = left @ (P - diag["P0"]) @ diag["Dp"]
+    loop = _loop_change(left, radius, diag)
+    first = _first_decided(np.any(np.isnan(loop), axis=(0, 2, 3)), measured, where)
+    omega, out = measured.omega[first:], measured.omega[:first]
+    for number, one in enumerate(loops, 1):
+        _expect_resolved(omega, one, number, where)
+    if not measured_in_closed_loop:
+        if first:
+            expect_joined(loops, out, omega[0], where)
+        kept = {name: part[first:] for name, part in diag.items()}
+        for k, covered in enumerate(measured.covered):
+            ratios, swings = _ratios(P[k, first:], loop[k, first:], kept)
+            MeasuredLoop(omega, ratios, swings, covered, label(where, k, len(P))).expect_stable()
+    samples, radius, loop = samples[:, first:], radius[:, first:], loop[:, first:]
+    circles = None
+    if measured.covered.any():
+        bound = _circles(left[:, first:], radius, loop, {name: part[first:] for name, part in diag.items()}, samples)
+        circles = np.moveaxis(bound, 1, -1)
+    samples = np.moveaxis(samples, 1, -1)
+    return Uncertainty(omega, samples, np.max(np.abs(samples), axis=0), factors, circles,
+                       confidence if circles is not None else None, out)
+
+
+def _diagonals(factors: CoprimeFactors, omega: Array, where: str) -> dict[str, Array]:
+    """Factors at the frequencies as diagonal matrices (n_f, n, n)."""
     f = factors.at(omega)
     if not np.all(np.isfinite(f["P0"])):
         at_pole = omega[~np.all(np.isfinite(f["P0"]), axis=0)][0]
         raise InputError(f"frequency {at_pole:.6g} rad/s is a pole of the model", where=where,
                          expected="frequencies at which P0 is finite", remedy="Leave that frequency out.")
-    diag = {name: np.moveaxis(value[:, None, :] * np.eye(size)[:, :, None], -1, 0) for name, value in f.items()}
-    P = np.moveaxis(measured, -1, 1)  # (n_plants, n_f, 2, 2)
-    for index in range(len(P)):
-        _expect_stabilized(P[index], diag, where if len(P) == 1 else f"{where}[{index}]")
-    left = np.linalg.inv(diag["Dk"] + P @ diag["Nk"])
-    samples = left @ (P - diag["P0"]) @ diag["Dp"]
-    circles = None
-    if radius is not None:
-        circles = np.moveaxis(_circles(left, np.moveaxis(radius, -1, 1), diag, samples), 1, -1)
-    samples = np.moveaxis(samples, 1, -1)
-    return Uncertainty(omega, samples, np.max(np.abs(samples), axis=0), factors, circles)
+    unit = np.eye(len(factors.loops))[:, :, None]
+    return {name: np.moveaxis(value[:, None, :] * unit, -1, 0) for name, value in f.items()}
 
 
-def _circles(left: Array, radius: Array, diag: dict[str, Array], samples: Array) -> Array:
+def _loop_change(left: Array, radius: Array, diag: dict[str, Array]) -> Array:
+    """Bound |L| r |Nk| of L dP Nk, L = (Dk + P Nk)⁻¹, for every plant in the circles; NaN where a bin is undecided.
+
+    det(I + (P + dP) K0) = det(I + P K0) det(I + L dP Nk), which is not zero if the bound's spectral radius is below 1.
+    """
+    known = np.all(np.isfinite(radius), axis=(2, 3))
+    bound = np.abs(left) @ np.where(known[:, :, None, None], radius, 0.0) @ np.abs(diag["Nk"])
+    known &= np.max(np.abs(np.linalg.eigvals(bound)), axis=2) < 1
+    return np.where(known[:, :, None, None], bound, np.nan)
+
+
+def _first_decided(undecided_bins: Array, measured: MeasuredPlants, where: str) -> int:
+    """Place of the first decided bin; undecided ones above it are refused."""
+    decided = np.flatnonzero(~undecided_bins)
+    if len(decided) < 2:
+        raise undecided(measured.omega, where, "their confidence circles are infinite or hold plants that make "
+                        "det(I + P K0) zero")
+    rest = undecided_bins.copy()
+    rest[:decided[0]] = False
+    if rest.any():
+        raise undecided(measured.omega[rest], where, f"{int(rest.sum())} of them have a confidence circle that is "
+                        "infinite, or holds plants that make det(I + P K0) zero, above a decided bin")
+    return int(decided[0])
+
+
+def _ratios(P: Array, loop: Array, diag: dict[str, Array]) -> tuple[Array, Array]:
+    """det(I + P K0)/det(I + P0 K0) and how far its phase may turn, (n_series, n_f): loop by loop if P is diagonal.
+
+    Every eigenvalue of E = L dP Nk is at most the spectral radius of the bound M = `loop`, so each turns det(I + E) by
+    its arcsine at most; and |log det(I + E)| <= -log det(I - M), by the series of both.
+    """
+    measured, model = diag["Dk"] + P @ diag["Nk"], diag["Dk"] + diag["P0"] @ diag["Nk"]
+    apart = ~np.eye(P.shape[-1], dtype=bool)
+    if not np.any(P[:, apart]) and not np.any(loop[:, apart]):
+        own = (np.diagonal(part, axis1=1, axis2=2).T for part in (measured, model, loop))
+        top, bottom, bound = own
+        return top / bottom, np.arcsin(bound.real)
+    rho = np.max(np.abs(np.linalg.eigvals(loop)), axis=1)
+    swing = np.minimum(P.shape[-1] * np.arcsin(rho), -np.log(np.linalg.det(np.eye(P.shape[-1]) - loop)))
+    return (np.linalg.det(measured) / np.linalg.det(model))[None], swing[None]
+
+
+def _circles(left: Array, radius: Array, loop: Array, diag: dict[str, Array], samples: Array) -> Array:
     """Bound of the change of Delta_p for every |dP| <= radius, not to first order only.
 
     The change is (I + L dP Nk)⁻¹ L dP (Dp - Nk Delta) with L = (Dk + P Nk)⁻¹, exactly; entry by entry the inverse is
-    at most (I - |L| radius |Nk|)⁻¹ where that Neumann series converges.
+    at most (I - |L| radius |Nk|)⁻¹, whose Neumann series converges where the bin is decided.
     """
-    known = np.all(np.isfinite(radius), axis=(2, 3))
-    size = np.abs(left) @ np.where(known[:, :, None, None], radius, 0.0)
-    loop = size @ np.abs(diag["Nk"])
-    known &= np.max(np.abs(np.linalg.eigvals(loop)), axis=2) < 1
-    loop[~known] = 0.0
-    found = np.linalg.solve(np.eye(len(loop[0, 0])) - loop, size @ np.abs(diag["Dp"] - diag["Nk"] @ samples))
-    return np.where(known[:, :, None, None], found, np.inf)
+    size = np.abs(left) @ radius
+    return np.linalg.solve(np.eye(len(loop[0, 0])) - loop, size @ np.abs(diag["Dp"] - diag["Nk"] @ samples))
 
 
 def _expect_resolved(omega: Array, loop: Loop, number: int, where: str) -> None:
@@ -226,21 +295,3 @@ def _expect_resolved(omega: Array, loop: Loop, number: int, where: str) -> None:
             raise InputError(f"spacing of {spacing:.4g} rad/s at the resonance of P{number} at {size:.6g} rad/s",
                              where=where, expected=f"at most its half-power width, {width:.4g} rad/s",
                              remedy="Measure with a finer grid there (a longer record).")
-
-
-def _expect_stabilized(P: Array, diag: dict[str, Array], where: str) -> None:
-    """Refuse a measured plant whose loop with K0 winds otherwise round the origin than that of the model."""
-    ratio = np.linalg.det(diag["Dk"] + P @ diag["Nk"]) / np.linalg.det(diag["Dk"] + diag["P0"] @ diag["Nk"])
-    closed = np.concatenate([ratio, ratio[::-1].conj()])  # negative frequencies, joined by straight lines at the ends
-    steps = np.angle(np.roll(closed, -1) / closed)
-    inner = np.abs(np.angle(ratio[1:] / ratio[:-1]))
-    turns = round(float(np.sum(steps)) / (2 * np.pi))
-    if turns:
-        raise InputError(f"the controllers do not stabilize this measured plant: det(I + P_frf K0) encircles the "
-                         f"origin {abs(turns)} more time{'s' * (abs(turns) > 1)} than det(I + P0 K0)", where=where,
-                         expected="a plant that K0 stabilizes (it was measured in closed loop)",
-                         remedy="Check sign, units (rad/s, Hz) and the order of inputs and outputs.")
-    if np.max(inner, initial=0.0) > _TURN:
-        raise InputError("the phase of det(I + P_frf K0) jumps by more than 160 degrees between two frequencies",
-                         where=where, expected="a grid on which encirclements can be counted",
-                         remedy="Measure with a finer grid, or with less noise.")

@@ -38,6 +38,9 @@ def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> di
             "filters": {key: _matrices(getattr(filters, key)) for key in _SYSTEMS},
             "sections": _sections(filters),
             "norms": {key: plain(value) for key, value in filters.norms.items()},
+            "robust": plain(filters.norms["robust"]),
+            "robust_without_circles": plain(filters.norms["robust_without_circles"]),
+            "left_out": _left_out(filters),
             "performance": {key: plain(getattr(filters.performance, key)) for key in _PERFORMANCE},
             "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
 
@@ -57,6 +60,12 @@ def save_filters(filters: Filters, path: str | Path, name: str, remarks: Sequenc
         What the verdict leaves out.
     """
     write(path, json_bytes(document(filters, name, remarks)))
+
+
+def _left_out(filters: Filters) -> list[float]:
+    """Measured frequencies that are not in the envelope [Hz]."""
+    uncertainty = filters.problem.uncertainty
+    return [] if uncertainty is None else (uncertainty.left_out / (2 * np.pi)).tolist()
 
 
 def _sections(filters: Filters) -> dict[str, Any]:

@@ -35,6 +35,7 @@ class Norm:
 
 _ROWS = (
     Norm("robust", "robust number ρ(|Δk| R)", "robust", "robust number", "robust", 1.003),
+    Norm("robust_without_circles", "robust number of the measured values without their circles"),
     Norm("small_gain", "small gain σ(Δk) μ(Δp), Evers (6.22)"),
     Norm("X", "‖X‖∞", "", "norm of X", "norm_X"),
     Norm("Y", "‖Y‖∞", "", "norm of Y", "norm_Y"),

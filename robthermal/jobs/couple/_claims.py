@@ -50,10 +50,15 @@ def coupling_assumptions(result: Coupling) -> Iterator[str]:
     if result.job.measured:
         yield ("Between two measured frequencies the larger of the two envelope values holds, below the first and "
                "above the last the end value; the measured plants have as many unstable poles as the model.")
-        yield from (remark.text for remark in result.job.remarks)
-        if result.job.circles and any(plant.has_covariance for plant in result.job.measured):
-            yield ("The envelope includes the 95 % circle of every measured value: the plants are in it with that "
-                   "probability at each frequency, not at all together.")
+        yield from (remark.text for remark in result.remarks)
+        uncertainty = result.filters.problem.uncertainty
+        if uncertainty is not None and uncertainty.confidence is not None and result.job.circles:
+            yield (f"The envelope includes the confidence circles of the measured values. All true values are in their "
+                   f"circles at once with a probability of {100 * uncertainty.confidence:g} % at least (Bonferroni's "
+                   "inequality over every plant, entry and frequency), for estimates without bias.")
+        if result.job.measured_in_closed_loop:
+            yield ("The controllers stabilize the measured plants: they were measured while these controllers ran "
+                   "(measured_in_closed_loop = true). No encirclement was counted.")
     yield ARITHMETIC
 
 

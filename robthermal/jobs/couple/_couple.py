@@ -6,11 +6,13 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from ... import coupling
 from ...coupling import NORMS, Filters, Simulation, Spectra, Uncertainty, WorstCase
-from ...errors import InputError
-from ...identify import FrequencyResponse
+from ...errors import InputError, Outcome
 from ...verification import verify
+from .._outcomes import JobsCode
 from ..claims import Checked
 from ._file import CouplingJob
 
@@ -52,6 +54,19 @@ class Coupling:
     def found(self) -> bool:
         """Whether there is a coupling to speak of: an infeasible design is X = Y = 0, the loops as they were."""
         return self.filters.holds or self.filters.norms["X"] > 0 or self.filters.norms["Y"] > 0
+
+    @property
+    def remarks(self) -> tuple[Outcome, ...]:
+        """What the claims about the measured plants leave out; empty if nothing."""
+        uncertainty = self.filters.problem.uncertainty
+        if uncertainty is None or not len(uncertainty.left_out):
+            return self.job.remarks
+        out, first = uncertainty.left_out / (2 * np.pi), uncertainty.omega[0] / (2 * np.pi)
+        listed = f"{out[0]:.4g} Hz" if len(out) == 1 else f"{len(out)} bins, {out[0]:.4g} to {out[-1]:.4g} Hz"
+        text = (f"Left out of the envelope: {listed}, where the confidence circle of a response is infinite or holds "
+                f"plants that make det(I + P K0) zero. The model error assumed below {first:.4g} Hz is that at "
+                f"{first:.4g} Hz.")
+        return (*self.job.remarks, JobsCode.BINS_LEFT_OUT.outcome(text))
 
     @property
     def holds(self) -> bool:
@@ -110,18 +125,17 @@ def _filters(job: CouplingJob) -> Filters:
                          remedy=error.remedy) from None
 
 
-def _uncertainty(job: CouplingJob) -> Uncertainty | list[FrequencyResponse] | None:
+def _uncertainty(job: CouplingJob) -> Uncertainty | None:
     """The measured plants, with what their noise may hide unless the file says otherwise."""
-    if not job.circles or not any(plant.has_covariance for plant in job.measured):
-        return list(job.measured) or None
+    if not job.measured:
+        return None
     try:
-        return coupling.dual_youla(list(job.measured), job.plants, job.controllers).with_confidence()
+        found = coupling.dual_youla(list(job.measured), job.plants, job.controllers, confidence=job.confidence,
+                                    measured_in_closed_loop=job.measured_in_closed_loop)
     except InputError as error:
-        if error.where != "with_confidence":
-            raise InputError(error.what, where=error.where.replace("P_frf", "uncertainty"), expected=error.expected,
-                             remedy=error.remedy) from None
-        remedy = f"{error.remedy} circles = false leaves the circles out, and the report says so."
-        raise InputError(error.what, where="uncertainty", expected=error.expected, remedy=remedy) from None
+        raise InputError(error.what, where=error.where.replace("P_frf", "uncertainty"), expected=error.expected,
+                         remedy=error.remedy) from None
+    return found.with_confidence() if job.circles else found
 
 
 def _place(where: str, job: CouplingJob) -> str:

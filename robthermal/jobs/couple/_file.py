@@ -55,6 +55,8 @@ class UncertaintyTable(Table):
     frf_2: Files | None = None
     frf: Files | None = None
     circles: Annotated[bool, Field(strict=True)] = True
+    confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
+    measured_in_closed_loop: Annotated[bool, Field(strict=True)] = False
 
 
 class DesignTable(Table):
@@ -111,7 +113,11 @@ class CouplingJob:
     exports : tuple of str
         Endings of further files with the filters: "mat", "c", "h".
     circles : bool
-        Whether the 95 % circles of measured plants with covariance enter the envelope.
+        Whether the confidence circles of measured plants with covariance enter the envelope.
+    confidence : float
+        Probability that all true values are in their circles at once.
+    measured_in_closed_loop : bool
+        Whether the plants were measured while these controllers ran: then no encirclement is counted.
     """
 
     name: str
@@ -126,6 +132,8 @@ class CouplingJob:
     files: tuple[Path, ...]
     exports: tuple[str, ...] = ()
     circles: bool = True
+    confidence: float = 0.95
+    measured_in_closed_loop: bool = False
 
     @property
     def remarks(self) -> tuple[Outcome, ...]:
@@ -204,7 +212,12 @@ def _job(data: _File, path: Path) -> CouplingJob:
         (plants[0], plants[1]), (controllers[0], controllers[1]), _disturbances(halves, dt, path), measured,
         tuple(", ".join(file.name for file in group) for group in groups), manual,
         dict(_options(data.design, manual, dt, path)), files, _exports(data.coupling.export, dt, path),
-        data.uncertainty is None or data.uncertainty.circles)
+        **_options_of(data.uncertainty))
+
+
+def _options_of(table: UncertaintyTable | None) -> dict[str, Any]:
+    keys = ("circles", "confidence", "measured_in_closed_loop")
+    return {} if table is None else {key: getattr(table, key) for key in keys}
 
 
 def _exports(endings: Sequence[str], dt: float, path: Path) -> tuple[str, ...]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ...coupling import NORMS, Filters, Norm
-from ...report import Report, Section, Table
+from ...export import plain
+from ...report import Reason, Report, Section, Table
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
@@ -72,7 +74,20 @@ def coupling_report(result: Coupling) -> Report:
     job = result.job
     return Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
                   claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
-                  provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now())
+                  provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now(),
+                  gate=tuple(_gate(result)), data={"couple": _summary(result)})
+
+
+def _gate(result: Coupling) -> Iterator[Reason]:
+    for remark in result.remarks:
+        yield Reason("remark", remark.code, "couple", "measured plants", remark.text)
+
+
+def _summary(result: Coupling) -> dict[str, Any]:
+    norms, uncertainty = result.filters.norms, result.filters.problem.uncertainty
+    left_out = [] if uncertainty is None else (uncertainty.left_out / (2 * np.pi)).tolist()
+    return {"robust": plain(norms["robust"]), "robust_without_circles": plain(norms["robust_without_circles"]),
+            "left_out": left_out, "confidence": None if uncertainty is None else uncertainty.confidence}
 
 
 def save_coupling(result: Coupling, folder: Path) -> None:
@@ -86,7 +101,7 @@ def save_coupling(result: Coupling, folder: Path) -> None:
         Existing folder to write into.
     """
     job = result.job
-    result.filters.save(folder / "coupling.json", job.name, remarks=job.remarks)
+    result.filters.save(folder / "coupling.json", job.name, remarks=result.remarks)
     for ending in job.exports:
         result.filters.export(folder / f"coupling.{ending}", job.name)
 
