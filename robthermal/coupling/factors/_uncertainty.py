@@ -182,9 +182,9 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confiden
     where : str
         Name of the argument, for messages.
     confidence : float
-        As `dual_youla`.
+        Joint probability of the circles, as in `dual_youla`.
     measured_in_closed_loop : bool
-        As `dual_youla`.
+        Whether K0 ran during the measurement, as in `dual_youla`.
     """
     loops, size = factors.loops, len(factors.loops)
     measured = read_plants(plants, loops[0].P.dt, where, size, confidence)

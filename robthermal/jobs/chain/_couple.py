@@ -79,6 +79,8 @@ def tables_of(project: Project) -> dict[str, Any]:
             found[key] = {**found.get(key, {}), **values}
     if "coupling" in found:
         found["coupling"].setdefault("name", project.name)
+    if "uncertainty" in found:
+        found["uncertainty"].setdefault("confidence", project.boxes.confidence)
     return found
 
 
