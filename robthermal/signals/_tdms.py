@@ -45,7 +45,7 @@ class TdmsSource:
         self.origin = None if started is None else str(started)  # a date, as ISO text
         self.headers = self._made_time + tuple(names)
 
-    def everything(self) -> tuple[dict[str, Array], dict[str, str]]:
+    def everything(self) -> tuple[dict[str, Any], dict[str, str]]:
         """All numeric channels, time made from the waveform increment where there is none; and what the others are."""
         try:
             with self._library.TdmsFile.open(self.path) as file:
@@ -53,7 +53,8 @@ class TdmsSource:
         except _DAMAGED as error:
             raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from error
         columns = {name: np.asarray(column, np.float64) for name, column in raw.items() if column.dtype.kind in "fiu"}
-        left_out = {name: "text or dates" for name in raw if name not in columns}
+        columns |= {name: column.astype("datetime64[ns]") for name, column in raw.items() if column.dtype.kind == "M"}
+        left_out = {name: "text" for name in raw if name not in columns}
         if self._made_time and columns:
             lengths = [len(column) for column in columns.values()]
             n = max(set(lengths), key=lengths.count)

@@ -145,8 +145,9 @@ def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions,
         if stop <= start:
             continue
         if code != _DOUBTED:
+            how = "and back" if stop < len(values) or stop - start == 1 else "and stays"
             raise InputError(
-                f"{code:g} jumps there and back, like a fault code ({int(hit.sum())} such cells)",
+                f"{code:g} jumps there {how}, like a fault code ({int(hit.sum())} such cells)",
                 where=table.place(int(index[start]), header),
                 expected="measured values",
                 remedy=f"Write missing = [{code:g}] to take it as missing.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import timedelta
 from decimal import Decimal
 from typing import Any
 
@@ -86,30 +87,33 @@ def plain_column(column: pd.Series[Any]) -> Any:
         return column.dt.total_seconds().to_numpy(float)
     if pd.api.types.is_bool_dtype(column.dtype):
         return column.astype(str).to_numpy(object)
+    if pd.api.types.is_complex_dtype(column.dtype):
+        raise InputError(f"column {str(column.name)!r} has complex numbers", where="DataFrame", expected="real numbers")
     if pd.api.types.is_numeric_dtype(column.dtype):
         return column.to_numpy(dtype=float, na_value=np.nan)
+    return _of_objects(column)
+
+
+def _of_objects(column: pd.Series[Any]) -> Any:
+    """Cells of several kinds: dates, spans of time, numbers, else texts."""
+    gone = column.isna().to_numpy(bool)
     cells = column.to_numpy(object)
-    dates = [
-        isinstance(cell, pd.Timestamp) or hasattr(cell, "isoformat") and hasattr(cell, "hour") and hasattr(cell, "year")
-        for cell in cells
-        if cell is not None and cell == cell
-    ]
-    if dates and all(dates):
-        return pd.DatetimeIndex(pd.to_datetime(pd.Series(cells)))
-    if all(
-        cell is None
-        or cell != cell
-        or isinstance(cell, int | float | Decimal | np.number)
-        and not isinstance(cell, bool)
-        for cell in cells
-    ):
-        return np.array([np.nan if cell is None or cell != cell else float(cell) for cell in cells], float)
-    return np.array([np.nan if cell is None or cell != cell or cell is pd.NA else str(cell) for cell in cells], object)
+    there = cells[~gone]
+    if len(there) and all(isinstance(cell, timedelta) for cell in there):  # elapsed times of a workbook
+        return pd.to_timedelta(pd.Series(np.where(gone, None, cells))).dt.total_seconds().to_numpy(float)
+    if len(there) and all(hasattr(c, "isoformat") and hasattr(c, "hour") and hasattr(c, "year") for c in there):
+        return pd.DatetimeIndex(pd.to_datetime(pd.Series(np.where(gone, None, cells))))
+    numbers = all(isinstance(c, int | float | Decimal | np.number) and not isinstance(c, bool) for c in there)
+    found = np.full(len(cells), np.nan, float if numbers else object)
+    found[~gone] = [float(cell) if numbers else str(cell) for cell in there]
+    return found
 
 
 def _flat(value: Any, name: str, where: str) -> Any:
     if isinstance(value, pd.Series | pd.DatetimeIndex | pd.TimedeltaIndex):
         return value.to_numpy() if isinstance(value, pd.Series) else value
+    if np.ma.isMaskedArray(value):  # what is masked was not measured
+        value = np.ma.filled(np.ma.asarray(value).astype(float), np.nan)
     array = np.asarray(value)
     if array.ndim == 2 and 1 in array.shape:
         array = array.reshape(-1)
