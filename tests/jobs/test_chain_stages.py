@@ -172,7 +172,8 @@ def designed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The starter project with a table [design], run once."""
     folder = tmp_path_factory.mktemp("designed")
     project = rt.jobs.new_project(folder / "bench")
-    project.write_text(project.read_text() + '\n[design]\nregulate = { m1 = "T_stage" }\nsetpoint = { m1 = 12.0 }\n')
+    project.write_text(project.read_text() + '\n[design]\nregulate = { m1 = "T_stage" }\nsetpoint = { m1 = 12.0 }\n'
+                       'export = ["c", "json"]\n')
     rt.jobs.run_project(rt.jobs.read_project(project), folder / "out")
     return folder
 
@@ -181,6 +182,9 @@ def test_a_design_is_of_the_certified_system(designed: Path) -> None:
     summary = json.loads((designed / "out" / "summary.json").read_text())
     numbers = json.loads((designed / "out" / "design" / "design.json").read_text())
     assert summary["stages"]["design"]["status"] == "done" and numbers["holds"]
+    assert {"law.c", "controller.c", "observer.c", "law.json"} <= {path.name for path in (designed / "out" / "design"
+                                                                                         ).iterdir()}
+    assert {"gain", "phase", "modulus", "delay", "worst"} <= set(summary["design"]["margins"]["m1"])
     assert numbers["setpoint"]["value"]["m1"] == pytest.approx(285.15)
     calibrated = json.loads((designed / "out" / "calibrated.json").read_text())["parameters"]
     assert numbers["law"]["modules"]["m1"]["conductance"]["value"] == pytest.approx(
