@@ -42,7 +42,7 @@ SURFACE = {
         feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins loop_poles
         observer pid place_sensors reachable regulated_points simulate_loop state_feedback step_response_linearity
         tune_pi unobservable
-        Design RobustAgainst h2 hinf
+        Design FrfDesign RobustAgainst frf_pid h2 hinf
     """,
     "diagnosis": """
         Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck
@@ -87,7 +87,7 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design RobustAgainst SynthesisCode h2 hinf
+        Design FrfDesign RobustAgainst SynthesisCode frf_pid h2 hinf
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

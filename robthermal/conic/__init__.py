@@ -4,6 +4,8 @@ What comes back is a candidate. The solver's status and objective are for the re
 and the certificate's checker proves it.
 """
 
+from ._cones import ConeBounds as ConeBounds
+from ._cones import least_cost as least_cost
 from ._definite import Candidate as Candidate
 from ._definite import Form as Form
 from ._definite import largest_margin as largest_margin
@@ -15,5 +17,5 @@ from ._solver import Point as Point
 from ._sparse import group_sparse as group_sparse
 from ._stacked import strictly as strictly
 
-__all__ = ["Candidate", "Form", "Inequality", "NormBounds", "Point", "group_sparse", "inside",
-           "largest_margin", "smallest_bound", "strictly"]
+__all__ = ["Candidate", "ConeBounds", "Form", "Inequality", "NormBounds", "Point", "group_sparse", "inside",
+           "largest_margin", "least_cost", "smallest_bound", "strictly"]

@@ -66,8 +66,8 @@ class Design:
         Time of the whole synthesis with its proofs [s].
     iterations : int
         Levels or steps that were tried.
-    plant : GeneralizedPlant
-        Parts of the plant the controller was made for.
+    plant : GeneralizedPlant or None
+        Parts of the plant the controller was made for; None where there is only a response.
     """
 
     controller: control.StateSpace
@@ -81,7 +81,7 @@ class Design:
     solver: str
     solve_time: float
     iterations: int
-    plant: GeneralizedPlant = field(repr=False)
+    plant: GeneralizedPlant | None = field(repr=False)
 
     @property
     def holds(self) -> bool:
@@ -94,6 +94,8 @@ class Design:
 
         Empty where the loop is not stable.
         """
+        if self.plant is None:
+            return {}
         return margins(self.plant, read_plant(self.controller), self.controller.output_labels)
 
     def __str__(self) -> str:

@@ -12,6 +12,8 @@ class SynthesisCode(OutcomeCode):
     """Codes of the outcomes of `robthermal.synthesis`."""
 
     CERTIFIED = (True, "Certified for the numbers of the controller as returned.")
+    AT_THE_BINS = (True, "Every plant of the confidence circles keeps the margin at the bins of the response; nothing "
+                   "is claimed between them.")
     INFEASIBLE = (False, "No controller reaches what was asked for; the text says what is reached.",
                   "Ask for less, or add controls or sensors.")
     NOT_CERTIFIED = (False, "A controller was computed, but what it reaches is not proven.",
