@@ -89,6 +89,15 @@ def test_every_key_of_the_documentation_is_read(folder: Path) -> None:
     assert project.diagnose and not project.session_gain
 
 
+def test_a_file_that_is_named_twice_is_read_in_one_way(folder: Path) -> None:
+    """What is said where it is named last must not silently hold for the other place."""
+    text = PROJECT + '[identify.stage]\nrecords = [{ file = "run.csv", columns = { m1 = "I" } }]\n'
+    with pytest.raises(rt.InputError, match=r"\[identify.stage\]: 'run.csv' is read in two ways"):
+        read(folder, text)
+    both = text.replace('["run.csv"]', '[{ file = "run.csv", columns = { m1 = "I" } }]')
+    assert [path.name for path in read(folder, both).train] == ["run.csv"]
+
+
 def test_every_key_is_documented() -> None:
     page = PAGE.read_text(encoding="utf-8")
     tables = rt.jobs.request._schema._File.model_fields

@@ -304,7 +304,11 @@ def _record_file(entry: str | RecordEntry, folder: Path, project: Path, data: _F
     tables: tuple[ReadTable, ...] = ((data.record, data.columns, str(project)),
                                      (own.record, own.columns, f"{project} [{table}] {own.file}"))
     declared(*tables)  # refuses unknown keys before any record is read
-    reading[file] = tuple(table for table in tables if table[0] or table[1])
+    kept = tuple(one for one in tables if one[0] or one[1])
+    if [one[:2] for one in reading.get(file, kept)] != [one[:2] for one in kept]:
+        raise InputError(f"{own.file!r} is read in two ways", where=f"{project} [{table}]",
+                         remedy="Give it the same `record` and `columns` wherever it is named.")
+    reading[file] = kept
     return file
 
 
