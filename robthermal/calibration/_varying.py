@@ -9,6 +9,7 @@ from typing import Any
 import control
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from .._arrays import Floats
@@ -112,7 +113,7 @@ class VaryingModel:
         return pd.DataFrame(rows, index=pd.Index(self.names, name="parameter"),
                             columns=["value", "slope", "std", "p_value"])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot every parameter against temperature with two standard deviations; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate, establish, not_certified
@@ -51,11 +52,15 @@ class Gains:
         both = pd.concat([self.ambient.add_suffix(" [K/K]"), self.heat.add_suffix(" [K/W]")], axis=1)
         return f"{self.outcome.text}\n{both.round(3).to_string()}" if len(both) else self.outcome.text
 
-    def plot(self) -> Any:
-        """Show the gains from heat loads as an image; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Show the gains from heat loads as an image; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         image = ax.imshow(self.heat.to_numpy())
         ax.set_xticks(range(self.heat.shape[1]), self.heat.columns, rotation=90)
         ax.set_yticks(range(self.heat.shape[0]), self.heat.index)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from .._celsius import ZERO_CELSIUS
 from .._fleet import fleet
@@ -57,7 +58,7 @@ class LimitMap:
     def __str__(self) -> str:
         return f"{self.outcome.text}\n{self.data.round(3).to_string(index=False)}"
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot needed and usable current over the load, a panel per set-point; returns the array of axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

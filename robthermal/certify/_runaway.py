@@ -53,9 +53,15 @@ class Runaway:
     def __str__(self) -> str:
         return self.table().round(3).to_string()
 
-    def plot(self) -> Any:
-        """Plot the load curve with its fold; returns the matplotlib axes."""
-        ax = self.curve.plot()
+    def plot(self, ax: Any = None) -> Any:
+        """Plot the load curve with its fold; returns the matplotlib axes.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = self.curve.plot(ax)
         for i, (name, current) in enumerate(self.current.items()):
             label = f"{name}: fold at {current:.3g} A, {self.load[name]:.3g} W"
             ax.plot(current, self.load[name], "o", color=f"C{i}", label=label)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
+from .._drawing import axes_for
 from ..errors import InputError
 from ..thermal import Equations, System
 from ._sections import system_section
@@ -58,17 +59,17 @@ class ThesisBounds:
     def __str__(self) -> str:
         return self.table().round(3).to_string(index=False)
 
-    def plot(self, limits: Mapping[str, float] | None = None) -> Any:
+    def plot(self, limits: Mapping[str, float] | None = None, ax: Any = None) -> Any:
         """Plot the bounds over the cold face's temperature, with other limits as lines; returns the matplotlib axes.
 
         Parameters
         ----------
         limits : mapping, optional
             Label to current [A], for example I* and certified limits.
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
         """
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
-
-        _, ax = plt.subplots(layout="constrained")
+        ax = axes_for(ax)
         name = next(iter(self.lower))
         order = np.argsort(self.cold.ravel())
         cold = self.cold.ravel()[order] - ZERO_CELSIUS

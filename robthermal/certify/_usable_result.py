@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from .._drawing import axes_for
 from ..errors import Outcome
 from ..verification import Certificate
 from ._sections import Interval
@@ -102,10 +103,7 @@ class UsableCurrent:
         ax : matplotlib axes, optional
             Axes to draw into; default new ones.
         """
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
-
-        if ax is None:
-            _, ax = plt.subplots(figsize=(6.4, 2.4), layout="constrained")
+        ax = axes_for(ax, figsize=(6.4, 2.4))
         widest = 2.5 * self.current if self.current > 0 else min([b.current for b in self.limits.values()
                                                                   if 0 < b.current < np.inf], default=1.0)
         names = [name for name in BOUNDS if name in self.limits]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._celsius import ZERO_CELSIUS
+from .._drawing import axes_for
 from ..errors import InputError
 from ..signals import Record
 from ._modules import Array
@@ -46,11 +47,15 @@ class Estimate:
                              expected="one of " + ", ".join(self.model.system.lumps))
         return self.lumps[:, self.model.system.lump_names.index(lump)]
 
-    def plot(self) -> Any:
-        """Plot all estimates [°C]; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot all estimates [°C]; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         ax.plot(self.time, self.lumps - ZERO_CELSIUS, label=self.model.system.lump_names)
         ax.set(xlabel="time [s]", ylabel="temperature [°C]", title="estimate from " + ", ".join(self.model.sensors))
         ax.legend(fontsize="small", ncols=2)

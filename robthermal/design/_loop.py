@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
 from .._checks import positive_number
@@ -74,7 +74,7 @@ class ClosedLoop:
     def __str__(self) -> str:
         return self.outcome.text
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot what is regulated with its set-points [°C], other cold faces thin, and currents [A]; two axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

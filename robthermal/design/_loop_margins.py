@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ..errors import InputError, Outcome
 from ._controller import Controller
@@ -152,7 +153,7 @@ class LoopMargins:
     def __str__(self) -> str:
         return f"{self.table().round(4).to_string(index=False)}\n{self.outcome.text}"
 
-    def plot_bode(self, loop: str) -> Any:
+    def plot_bode(self, loop: str) -> NDArray[Any]:
         """Plot gain and phase of a loop with its margins, all corner plants behind; two matplotlib axes.
 
         Parameters
@@ -162,17 +163,19 @@ class LoopMargins:
         """
         return plot_bode(self.frequency, *self._curves(loop), self.nominal.margins[loop])
 
-    def plot_nyquist(self, loop: str) -> Any:
+    def plot_nyquist(self, loop: str, ax: Any = None) -> Any:
         """Plot a loop in the complex plane with the circle of its modulus margin, all corners behind; one axes.
 
         Parameters
         ----------
         loop : str
             Name of the module.
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
         """
-        return plot_nyquist(*self._curves(loop), self.worst(loop).modulus)
+        return plot_nyquist(*self._curves(loop), self.worst(loop).modulus, ax)
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot gain and phase of the first loop; returns two matplotlib axes."""
         return self.plot_bode(self.loops[0])
 

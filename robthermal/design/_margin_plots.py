@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .._drawing import axes_for
 from ._margins import Margins
 from ._modules import Array
 
 _BEHIND: dict[str, Any] = {"color": "0.75", "linewidth": 0.7, "zorder": 1}
 
 
-def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarray], found: Margins) -> Any:
+def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarray], found: Margins) -> NDArray[Any]:
     """Gain and phase, corner plants in gray behind; two matplotlib axes.
 
     Parameters
@@ -53,7 +55,7 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
     return axes
 
 
-def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: float) -> Any:
+def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: float, ax: Any = None) -> Any:
     """Loop transfers in the complex plane near -1, with the circle none of them enters; one matplotlib axes.
 
     Parameters
@@ -64,10 +66,10 @@ def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: fl
         Loop transfers of the corner plants.
     modulus : float
         Smallest modulus margin, the radius of the circle.
+    ax : matplotlib axes, optional
+        Axes to draw into; default new ones.
     """
-    from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
-
-    _, ax = plt.subplots(layout="constrained")
+    ax = axes_for(ax)
     for curve in corners:
         ax.plot(curve.real, curve.imag, **_BEHIND)
     ax.plot(nominal.real, nominal.imag, zorder=2)

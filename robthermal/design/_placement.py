@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import pandas as pd
 
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate
@@ -57,11 +58,15 @@ class Placement:
     def __str__(self) -> str:
         return f"{self.to_frame().to_string(index=False)}\n{self.outcome.text}"
 
-    def plot(self) -> Any:
-        """Plot the slowest decay against the number of sensors; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot the slowest decay against the number of sensors; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         sizes = list(self.best)
         ax.plot(sizes, [radius for _, radius in self.best.values()], "o-")
         for size, (names, radius) in self.best.items():

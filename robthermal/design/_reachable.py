@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..thermal import Equations, steady_state
 from ._linearization import FeedbackLinearization
@@ -74,11 +75,15 @@ class Reachable:
                              where="argument setpoint", expected=_ranges(self.passive, self.limit),
                              remedy="Choose set-points within it, lower the load, or cool the hot side better.")
 
-    def plot(self) -> Any:
-        """Plot range and set-point of every module [°C]; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot range and set-point of every module [°C]; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         for i, name in enumerate(self.setpoint):
             ax.plot([i, i], np.array([self.passive[name], self.limit[name]]) - ZERO_CELSIUS, lw=8, alpha=0.4)
             ax.plot(i, self.setpoint[name] - ZERO_CELSIUS, "k_", ms=24)

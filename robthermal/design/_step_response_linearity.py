@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError, Outcome
 from ..thermal import System, steady_state
@@ -60,7 +61,7 @@ class StepResponseLinearity:
     def __str__(self) -> str:
         return f"spread {self.before:.4f} without the feedback law, {self.after:.4f} with it. {self.outcome}"
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot both families of normalized responses, like Evers figures 5.14-5.15; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import Outcome
 from ..thermal import System
@@ -122,7 +123,7 @@ class Diagnosis:
         lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
         return "\n".join([*lines, str(self.outcome)])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Residuals of the first training record [K], or response, before and after; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

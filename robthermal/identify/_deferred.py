@@ -37,3 +37,8 @@ def narrow(values: Any, part: slice) -> Any:
 def part_of(values: Any, bins: slice) -> Array:
     """The bins of a slice, computed if they are deferred."""
     return np.asarray(values(bins) if callable(values) else np.asarray(values)[..., bins])
+
+
+def shifted(joint: Callable[[Array], tuple[Array, Array]], by: int, index: Any) -> tuple[Array, Array]:
+    """Weights and rows of the bins `by` further: those of a part, from those of the whole."""
+    return joint(np.asarray(index) + by)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from typing import Any
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError, Outcome
 
 from . import _response_files, _response_plots, _response_text
-from ._deferred import Deferred, fixed, narrow, part_of
+from ._deferred import Deferred, fixed, narrow, part_of, shifted
 from ._regions import correlated_blocks, independent_blocks, radius_of
 from ._response_shapes import PER_BIN, check_shapes
 
@@ -290,12 +290,17 @@ class FrequencyResponse:
         return FrequencyResponse(**{
             **arguments,
             **{name: narrow(arguments[name], part) for name in per_bin},
-            "joint": None if joint is None else lambda index: joint(np.asarray(index) + part.start),
+            "joint": None if joint is None else partial(shifted, joint, part.start),
         })
 
     def _arguments(self) -> dict[str, Any]:
         """What the constructor was given."""
         return {field.name.removeprefix("_"): getattr(self, field.name) for field in fields(self)}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickling: what was to be computed when asked for is computed now."""
+        names = ("noise_covariance", "transient", "coherence", *(() if self._covariance is None else ("covariance",)))
+        return {**self.__dict__, **{f"_{name}": getattr(self, name) for name in names}}
 
     def replace(self, **changes: Any) -> FrequencyResponse:
         """The same estimate with other notes, names, operating point or any other argument of the constructor.
@@ -366,7 +371,7 @@ class FrequencyResponse:
         """
         return cls(**_response_files.load(path))
 
-    def plot(self, kind: str = "bode", p: float = 0.95) -> Any:
+    def plot(self, kind: str = "bode", p: float = 0.95) -> NDArray[Any]:
         """Draw the estimate.
 
         Parameters

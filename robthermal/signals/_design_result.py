@@ -181,7 +181,7 @@ class DesignCheck:
             rows.append(f"and {len(self.poles) - _SHOWN} faster ones")
         return "\n".join([*rows, str(self.outcome)])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Axes with the error of every pole above, the expected deviation of G below.
 
         Returns

@@ -87,7 +87,7 @@ class Excitation:
             rows.append(f"{i:>5}{f.size:>8}{f.min():>14.4g}{f.max():>14.4g}{levels}{crest:>8.2f}")
         return "\n".join([*rows, str(self.outcome)])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Axes with one period of the first realization, one row per input.
 
         Returns

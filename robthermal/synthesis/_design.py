@@ -11,6 +11,7 @@ from typing import Any
 import control
 import numpy as np
 
+from .._drawing import axes_for
 from ..errors import Outcome
 from ..linear import Plant, close, read_plant, responder
 from ..verification import Certificate
@@ -109,21 +110,24 @@ class Design:
                   f"delay {one['delay']:.3g} s" for name, one in self.margins.items()]
         return "\n".join([*lines, f"  {self.robust_against}"])
 
-    def plot(self) -> Any:
+    def plot(self, ax: Any = None) -> Any:
         """Draw the largest singular value of the closed loop over frequency, with the proven bound.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
 
         Returns
         -------
         matplotlib.axes.Axes
         """
-        import matplotlib.pyplot as plt
-
         loop = read_plant(self.closed_loop)
         poles = abs(np.log(loop.poles.astype(complex)) / loop.dt) if loop.dt else abs(loop.poles)
         poles = poles[(poles > 0) & np.isfinite(poles)]
         low, high = (poles.min() / 100, poles.max() * 100) if len(poles) else (1e-2, 1e2)
         omega = np.geomspace(low, min(high, loop.end), 600)
-        _, ax = plt.subplots(layout="constrained")
+        ax = axes_for(ax)
         ax.loglog(omega, [np.linalg.norm(value, 2) for value in responder(loop)(omega)], label="closed loop")
         if np.isfinite(self.value):
             ax.axhline(self.value, color="0.5", linestyle="--", label="proven bound")

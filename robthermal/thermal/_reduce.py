@@ -9,6 +9,7 @@ import control
 import numpy as np
 from scipy.linalg import eig, solve_continuous_lyapunov, svd
 
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ._outcomes import ThermalCode
 from ._terms import Array
@@ -43,11 +44,15 @@ class Reduction:
     hankel: Array
     outcome: Outcome
 
-    def plot(self) -> Any:
-        """Plot the singular values and the chosen order; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot the singular values and the chosen order; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         ax.semilogy(range(1, len(self.hankel) + 1), np.maximum(self.hankel, 1e-300), "o")
         ax.axvline(self.order + 0.5, linestyle="--", label=f"order {self.order}")
         ax.set(xlabel="state", ylabel="contribution", title="model reduction")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .._celsius import ADD_ZERO, LOWEST_KELVIN
+from .._drawing import axes_for
 from ..errors import InputError
 from ._equations import Equations
 from ._module_term import ModuleTerm
@@ -47,11 +48,15 @@ class LoadCurve:
     temperatures: Array
     slowest: Array
 
-    def plot(self) -> Any:
-        """Plot load against current, stable part solid; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot load against current, stable part solid; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         stable = self.slowest < 0
         for name, current, load in zip(self.setpoint, self.current.T, self.load.T, strict=True):
             line = ax.plot(current, np.where(stable, load, np.nan), label=f"{name}, stable")[0]

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from .._celsius import ZERO_CELSIUS
+from .._drawing import axes_for
 from ..errors import InputError
 from ..signals import Record
 from ._drive import Initial, held_inputs, held_slopes, start_lumps, start_slope, start_state
@@ -88,11 +89,15 @@ class Trajectory:
         raise InputError(f"no lump or sensor {name!r}", where="trajectory",
                          expected="one of " + ", ".join((*self.system.lumps, *self.system.sensors)))
 
-    def plot(self) -> Any:
-        """Plot all lump temperatures [°C] against time; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # half a second to import, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Plot all lump temperatures [°C] against time; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         ax.plot(self.time, self.lumps - ZERO_CELSIUS, label=self.system.lump_names)
         ax.set(xlabel="time [s]", ylabel="temperature [°C]", title=self.system.name)
         ax.legend(fontsize="small", ncols=2)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from .._celsius import LOWEST_KELVIN, ZERO_CELSIUS
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ._continuation import Curve, follow
 from ._equations import Equations
@@ -73,11 +74,15 @@ class SteadyState:
     def __str__(self) -> str:
         return f"{self.outcome.text}\n{self.to_frame().to_string()}" if self.equilibria else self.outcome.text
 
-    def plot(self) -> Any:
-        """Bar chart of the lump temperatures [°C] of every equilibrium; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bar chart of the lump temperatures [°C] of every equilibrium; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         width = 0.8 / max(len(self.equilibria), 1)
         for i, e in enumerate(self.equilibria):
             where = np.arange(len(e.temperatures)) + i * width

@@ -7,6 +7,7 @@ from typing import Any
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...errors import InputError
@@ -77,7 +78,7 @@ class Simulation:
         traces = (self.ma_before, self.ma_after, self.msd_before, self.msd_after)
         return Performance(*[3 * float(np.sqrt(np.mean(trace**2))) for trace in traces])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """e12 and, with a window, its moving average and moving standard deviation [nm] over time [s].
 
         Returns

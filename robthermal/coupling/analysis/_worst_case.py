@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..._arrays import Array
+from ..._drawing import axes_for
 from ...errors import InputError
 from ..evaluation import Filters
 from ..problem import Problem
@@ -61,16 +62,19 @@ class WorstCase:
         lines += [f"{name:<10}" + "".join(f"{column[k]:>12.4g}" for column in columns) for k, name in enumerate(names)]
         return "\n".join(lines)
 
-    def plot(self) -> Any:
+    def plot(self, ax: Any = None) -> Any:
         """Spectra over frequency [Hz]: every plant and the bound, without and with coupling.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
 
         Returns
         -------
         matplotlib axes
         """
-        import matplotlib.pyplot as plt
-
-        _, ax = plt.subplots()
+        ax = axes_for(ax)
         hertz = self.omega / (2 * np.pi)
         for spectra, bound, color, name in ((self.before, self.bound_before, "0.6", "without coupling"),
                                             (self.after, self.bound_after, "C0", "with coupling")):

@@ -9,6 +9,7 @@ from typing import Any
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...errors import Outcome
@@ -247,7 +248,7 @@ class Filters:
         """
         export(self, path, name)
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Improvement factors, e12 before and after, and the robust number over frequency [Hz].
 
         Returns

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ..problem import Problem, youla_parameter
@@ -63,7 +64,7 @@ class Spectra:
     small_gain: Array
     proven: float
 
-    def plot(self, panels: Sequence[str] = ("sensitivity", "improvement", "e12", "power", "robust")) -> Any:
+    def plot(self, panels: Sequence[str] = ("sensitivity", "improvement", "e12", "power", "robust")) -> NDArray[Any]:
         """Panels over frequency [Hz], one below the other.
 
         Parameters

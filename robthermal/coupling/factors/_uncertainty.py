@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array
 from ...errors import InputError
@@ -109,7 +109,7 @@ class Uncertainty:
         """
         return replace(self, envelope=np.max(np.abs(self.samples), axis=0))
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Magnitude of every sample and the envelope over frequency [Hz].
 
         Returns

@@ -10,6 +10,7 @@ import numpy as np
 from robthermal.errors import Outcome
 from robthermal.verification import Certificate
 
+from ..._drawing import axes_for
 from ._blocks import Complex, Real
 
 MET = 1e-3  # relative gap at which lower and upper bound are called equal
@@ -55,36 +56,32 @@ class MuBound:
     omega: Real = field(default_factory=lambda: np.zeros(0))
     curve: tuple[Real, ...] = ()
 
-    def plot(self, axes: Any = None) -> Any:
+    def plot(self, ax: Any = None) -> Any:
         """Draw lower and upper bound.
 
         Parameters
         ----------
-        axes : matplotlib axes, optional
-            Where to draw; a new figure if omitted.
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
 
         Returns
         -------
         matplotlib axes
             Over frequency [rad/s] with the proven bound for `mu_bound`, else over the number of the matrix.
         """
-        # Imported here: matplotlib is slow to load, and most programs draw nothing.
-        from matplotlib import pyplot
-
-        if axes is None:
-            axes = pyplot.subplots(layout="constrained")[1]
+        ax = axes_for(ax)
         lower, upper = self.curve or (np.atleast_1d(self.lower), np.atleast_1d(self.upper))
         x = self.omega if len(self.omega) else np.arange(len(upper))
-        axes.plot(x, upper, label="upper bound")
-        axes.plot(x, lower, "--", label="lower bound")
+        ax.plot(x, upper, label="upper bound")
+        ax.plot(x, lower, "--", label="lower bound")
         if self.certificate is not None:
             if self.certificate.holds:
-                axes.axhline(float(self.upper), color="k", lw=0.8, label="holds at every frequency")
-            axes.set_xscale("symlog", linthresh=float(min(x[x > 0], default=1.0)))
-        axes.set_xlabel("frequency [rad/s]" if len(self.omega) else "matrix")
-        axes.set_ylabel("structured singular value")
-        axes.legend(fontsize="small")
-        return axes
+                ax.axhline(float(self.upper), color="k", lw=0.8, label="holds at every frequency")
+            ax.set_xscale("symlog", linthresh=float(min(x[x > 0], default=1.0)))
+        ax.set_xlabel("frequency [rad/s]" if len(self.omega) else "matrix")
+        ax.set_ylabel("structured singular value")
+        ax.legend(fontsize="small")
+        return ax
 
     def __str__(self) -> str:
         lower, upper = float(np.max(self.lower)), float(np.max(self.upper))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._drawing import axes_for
 from ...errors import InputError, Outcome
 from ...fitting import Data, Measured, declared_noise, quantum, smallest_noise
 from ...thermal import System
@@ -59,11 +60,15 @@ class NoiseEstimate:
                   for name in self.quantized]
         return "\n".join([*lines, str(self.outcome)])
 
-    def plot(self) -> Any:
-        """Bars of both noise levels; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of both noise levels; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         place = np.arange(len(self.noise))
         ax.bar(place - 0.2, list(self.noise.values()), 0.4, label="used")
         ax.bar(place + 0.2, list(self.rough.values()), 0.4, label="third differences")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
+from ..._drawing import axes_for
 from ...errors import Outcome
 from .._outcomes import DiagnosisCode
 from ..fit import Refit
@@ -51,11 +52,15 @@ class Adequacy:
         lines += [f"{name:<20} extra heat p {p:.2g}" for name, p in self.lumps.items()]
         return "\n".join([*lines, str(self.outcome)])
 
-    def plot(self) -> Any:
-        """Bars of -log10 p; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of -log10 p; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         both = {**self.sensors, **self.lumps}
         ax.barh(list(both), [-np.log10(max(p, 1e-300)) for p in both.values()])
         ax.axvline(-np.log10(SMALLEST_P), color="black", linewidth=0.7)

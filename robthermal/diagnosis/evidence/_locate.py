@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._drawing import axes_for
 from ..fit import Refit
 from ._adequacy import adequacy, spline_tests
 
@@ -46,11 +47,15 @@ class Location:
         lines += [f"{name:<16} whiteness p {p:.2g}" for name, p in self.sensors.items()]
         return "\n".join([*lines, *self.conditions])
 
-    def plot(self) -> Any:
-        """Bars of the F statistics; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of the F statistics; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         ax.bar(list(self.strength), list(self.strength.values()))
         ax.set(ylabel="F statistic of an extra heat [-]", yscale="log")
         return ax

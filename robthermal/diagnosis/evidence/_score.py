@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
+from ..._drawing import axes_for
 from ..effects import Candidate, candidates
 from ..fit import Refit
 from ._frequency_tails import inflation, tail
@@ -123,12 +124,16 @@ class Scores:
     def __str__(self) -> str:
         return self.table().head(10).to_string(float_format=lambda x: f"{x:.3g}")
 
-    def plot(self) -> Any:
-        """Bars of the ten best statistics; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of the ten best statistics; returns the matplotlib axes.
 
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
         best = np.argsort(self.statistic)[-10:]
-        _, ax = plt.subplots(layout="constrained")
+        ax = axes_for(ax)
         colors = ["C0" if self.possible[i] else "0.7" for i in best]
         ax.barh([self.candidates[i].label for i in best], np.maximum(self.statistic[best], 1e-3), color=colors)
         ax.set(xscale="log", xlabel="F statistic after the nominal parameters [-]")

@@ -63,7 +63,7 @@ class UnknownHeat:
                          f"{np.median(std):.2g} W")
         return "\n".join([*lines, str(self.outcome)])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Mean and 95 % band [W] against time, one axis per record; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

@@ -233,7 +233,7 @@ class Refit:
         lines.append(f"whitened variance {self.variance:.4g} (1: nothing is missing), rms {self.rms:.4g} {self.unit}")
         return "\n".join([*lines, str(self.levels), *self.contradictions, str(self.outcome)])
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Residuals of every record against time [K], of every response against frequency; returns the axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 

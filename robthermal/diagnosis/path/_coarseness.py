@@ -15,19 +15,48 @@ G is the conductance within a lump, twice that to all its neighbors. A lump with
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...thermal import System
+from ...thermal import Equations, System
 from ...thermal.effects import Response
-
-if TYPE_CHECKING:
-    from ._linearized_record import LinearizedRecord
 
 Array = NDArray[np.float64]
 _SHARE = 0.25  # of a difference, of a heat, of a capacity: half a lump away is 0.5
+
+
+class SimulatedRecord(Protocol):
+    """What is asked of a linearized record: the simulation it stands beside."""
+
+    @property
+    def system(self) -> System:
+        """The system with the initial temperatures of the record."""
+
+    @property
+    def equations(self) -> Equations:
+        """Its equations."""
+
+    @property
+    def h(self) -> float:
+        """Sample time [s]."""
+
+    @property
+    def x(self) -> Array:
+        """Lump temperatures (n, n_lumps) [K]."""
+
+    @property
+    def end(self) -> Array:
+        """Lump temperatures at the end of every sample (n, n_lumps) [K]."""
+
+    @property
+    def u(self) -> Array:
+        """Held inputs, in the order of `System.exogenous_names`."""
+
+    @property
+    def readings(self) -> Array:
+        """Simulated readings of all sensors."""
 
 
 def coarse_names(base: System) -> list[str]:
@@ -50,12 +79,12 @@ def coarse_names(base: System) -> list[str]:
     return out
 
 
-def coarse_responses(path: LinearizedRecord, base: System) -> Iterator[Response]:
+def coarse_responses(path: SimulatedRecord, base: System) -> Iterator[Response]:
     """Every way in which the network may be too coarse along a record, b = 1, in the order of `coarse_names`.
 
     Parameters
     ----------
-    path : LinearizedRecord
+    path : SimulatedRecord
         Model beside a record; it may have more lumps than the network.
     base : System
         Network without added effects.

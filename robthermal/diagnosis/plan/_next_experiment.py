@@ -67,7 +67,7 @@ class NextExperiment:
     def __str__(self) -> str:
         return self.advice
 
-    def plot(self) -> Any:
+    def plot(self) -> NDArray[Any]:
         """Plot the inputs to apply and the readings that the best candidate predicts; returns the matplotlib axes."""
         axes = self.record.select(inputs=self.inputs or None).plot()
         axes[0].figure.suptitle("Next experiment")

@@ -45,10 +45,16 @@ class Decision:
         names += [c.label for entry in (self.best, *self.contenders) for c in entry.aliases]
         return f"{' or '.join(names)}, ΔBIC {self.best.delta_bic:.1f}"
 
-    def plot(self) -> Any:
-        """Bars of ΔBIC of best and contenders; returns the matplotlib axes."""
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of ΔBIC of best and contenders; returns the matplotlib axes.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
         entries = () if self.best is None else (self.best, *self.contenders)
-        return ShortList(self.before, entries, {}).plot()
+        return ShortList(self.before, entries, {}).plot(ax)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._drawing import axes_for
 from ...errors import Outcome
 from .._outcomes import DiagnosisCode
 from ..effects import Candidate
@@ -101,11 +102,15 @@ class JointSelection:
                 + f" (most alike: cosine {self.likeness:.3f})")
         return "\n".join([*lines, str(self.outcome)])
 
-    def plot(self) -> Any:
-        """Sizes along the path, each over its largest; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Sizes along the path, each over its largest; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         for i in np.flatnonzero(np.any(self.sizes != 0.0, axis=0)):
             ax.plot(self.penalties, self.sizes[:, i] / np.abs(self.sizes[:, i]).max(), label=self.candidates[i].label)
         ax.set(xscale="log", xlabel="penalty λ [-]", ylabel="size over its largest [-]")

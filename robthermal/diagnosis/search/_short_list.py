@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._drawing import axes_for
 from ...errors import Diverged, InputError
 from ..effects import Candidate
 from ..evidence import BIC_GAP, Scores, promised
@@ -89,11 +90,15 @@ class ShortList:
         lines += [f"{name}({', '.join(where)}): {why}" for (name, where), why in self.failed.items()]
         return "\n".join(lines)
 
-    def plot(self) -> Any:
-        """Bars of ΔBIC; returns the matplotlib axes."""
-        from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+    def plot(self, ax: Any = None) -> Any:
+        """Bars of ΔBIC; returns the matplotlib axes.
 
-        _, ax = plt.subplots(layout="constrained")
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+        """
+        ax = axes_for(ax)
         ax.barh([entry.candidate.label for entry in self.entries], [entry.delta_bic for entry in self.entries])
         ax.axvline(BIC_GAP, color="black", linewidth=0.7)
         ax.invert_yaxis()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copyreg
+from dataclasses import fields, replace
 from importlib import import_module
 from pkgutil import iter_modules
+from typing import Any
 
 from ...errors import InputError
 from ._effect import Effect, check_effect
@@ -100,3 +103,27 @@ def forget_effect(name: str) -> None:
     if name not in _OWN:
         raise InputError(f"no effect {name!r} is registered", where="argument name")
     del _OWN[name]
+
+
+def _of_catalog(name: str, form: int, changes: dict[str, Any]) -> Effect:
+    if name not in effects():
+        raise InputError(f"no effect {name!r} is registered", where="pickled effect",
+                         remedy="Call rt.diagnosis.register_effect with it first.")
+    found = tuple(effects()[name].all_forms)[form]
+    return replace(found, **changes) if changes else found
+
+
+def _reduced(effect: Effect) -> tuple[Any, ...]:
+    """Pickled by name, with what differs: an effect holds functions. One in no catalog is pickled if its functions can.
+    """
+    known = effects().get(effect.name)
+    for place, form in enumerate(() if known is None else known.all_forms):
+        changes = {field.name: getattr(effect, field.name) for field in fields(Effect)
+                   if getattr(effect, field.name) is not getattr(form, field.name)}
+        if not any(map(callable, changes.values())):
+            return _of_catalog, (effect.name, place, changes)
+    plain: Any = object.__reduce_ex__(effect, 2)
+    return tuple(plain)
+
+
+copyreg.pickle(Effect, _reduced)

@@ -1,0 +1,99 @@
+"""Every public result can be pickled, copied and, where it draws itself, drawn into axes of the caller."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import pickle
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from pydantic import BaseModel
+
+import robthermal as rt
+from results import instances, public_classes
+
+# Made by no short example; each of the same kind as others that are here, or made of nothing but what is.
+ELSEWHERE = {"calibration.Estimates", "diagnosis.Measurement", "diagnosis.Response", "diagnosis.Decision",
+             "diagnosis.JointCheck", "design.CertifiedLoop", "design.Polarity", "coupling.Joint", "coupling.Norm",
+             "report.Printed"}
+CLASSES = public_classes()
+DRAWN = [(one, name) for one in CLASSES for name in dir(one) if name == "plot" or name.startswith("plot_")]
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two objects have the same content."""
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc")
+    if isinstance(one, pd.DataFrame):
+        return one.equals(other)
+    if isinstance(one, control.StateSpace):
+        return one.dt == other.dt and one.input_labels == other.input_labels and all(
+            np.array_equal(getattr(one, key), getattr(other, key)) for key in "ABCD")
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if is_dataclass(one):
+        return type(one) is type(other) and all(
+            same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one)
+            if not field.name.startswith("_"))
+    if isinstance(one, BaseModel | str | float | int | type(None)):
+        return bool(one == other or one != one and other != other)
+    return type(one) is type(other)
+
+
+def test_nearly_every_class_is_made() -> None:
+    made = instances()
+    missing = {name for one, name in CLASSES.items() if one not in made and not issubclass(one, BaseModel)}
+    assert missing == ELSEWHERE
+    assert len(made) > 100
+
+
+@pytest.mark.parametrize("kind", [one for one in CLASSES if not issubclass(one, BaseModel)], ids=CLASSES.get)
+def test_results_are_pickled_and_copied(kind: type) -> None:
+    found = instances().get(kind, [])[:2]
+    assert found or CLASSES[kind] in ELSEWHERE
+    for one in found:
+        if isinstance(one, rt.diagnosis.Effect) and one.name not in rt.thermal.effects():
+            with pytest.raises((pickle.PicklingError, AttributeError)):  # of a user, with functions of the moment
+                pickle.dumps(one)
+            continue
+        assert same(pickle.loads(pickle.dumps(one)), one)
+        assert same(copy.deepcopy(one), one) and same(copy.copy(one), one)
+
+
+def test_results_are_frozen() -> None:
+    open_ = [CLASSES[one] for one in CLASSES if is_dataclass(one) and not one.__dataclass_params__.frozen]  # type: ignore[attr-defined]
+    assert open_ == []
+
+
+def test_content_that_differs_is_seen() -> None:
+    record = next(one for one in instances()[rt.Record] if one.outputs.size)
+    assert not same(record, record.with_outputs(record.outputs + 1.0))
+
+
+@pytest.mark.parametrize(("kind", "method"), DRAWN, ids=lambda value: CLASSES.get(value, value))
+def test_what_draws_into_one_axes_takes_it(kind: type, method: str) -> None:
+    """Return annotations tell: an array of axes makes its own figure, anything else is drawn into `ax`."""
+    told = inspect.signature(getattr(kind, method))
+    if str(told.return_annotation).startswith("NDArray"):
+        assert "ax" not in told.parameters
+        return
+    assert told.parameters["ax"].default is None
+    found = instances().get(kind, [])[:1]
+    assert found or CLASSES[kind] in ELSEWHERE
+    needed = [one for one in told.parameters.values() if one.default is one.empty and one.name != "self"]
+    for plot in [getattr(one, method) for one in found if not needed]:
+        figure, (first, second) = plt.subplots(1, 2)
+        assert plot(ax=second) is second
+        assert second.has_data() and not first.has_data()
+        assert plt.get_fignums() == [figure.number]
+        assert plot() is not second
+        with pytest.raises(rt.InputError, match="argument ax.*one matplotlib axes"):
+            plot(ax=np.array([first, second]))
