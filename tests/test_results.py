@@ -97,3 +97,28 @@ def test_what_draws_into_one_axes_takes_it(kind: type, method: str) -> None:
         assert plot() is not second
         with pytest.raises(rt.InputError, match="argument ax.*one matplotlib axes"):
             plot(ax=np.array([first, second]))
+
+
+@pytest.mark.parametrize("kind", [rt.System, rt.Record, rt.calibration.Fit, rt.identify.FrequencyResponse,
+                                  rt.Certificate, rt.diagnosis.Diagnosis])
+def test_notebooks_show_a_short_table(kind: type) -> None:
+    shown = instances()[kind][0]._repr_html_()
+    assert shown.count("<") == shown.count(">") and len(shown) < 20_000
+    assert (shown.startswith("<table><caption>") and "<td>" in shown) != (kind is rt.Certificate)
+
+
+def test_names_of_the_user_are_escaped() -> None:
+    name = "<script>alert(1)</script>"
+    system = rt.System(name=name, ambients={"room": {"temperature": 300.0}}, lumps={"bar": {"capacity": 1.0}},
+                       links=[{"between": ("bar", "room"), "conductance": 1.0}])
+    record = rt.Record(sample_time=1.0, inputs=np.zeros(3), outputs=np.zeros(3), input_names=["q"], output_names=["T"],
+                       name=name)
+    for one in (system, record):
+        assert "<script" not in one._repr_html_() and "&lt;script&gt;" in one._repr_html_()
+
+
+def test_a_certificate_that_does_not_hold_says_so_in_a_notebook() -> None:
+    system = rt.systems.two_module()
+    currents = {"m1": (0.0, 60.0), "m2": (0.0, 60.0)}
+    refused = rt.certify.contraction(system, current=currents, temperature=(278.15, 358.15))
+    assert not refused.holds and "does not hold" in refused._repr_html_()

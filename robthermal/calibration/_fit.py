@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .._arrays import Complex, Floats
+from .._html import short_table
 from ..export import plain
 from ..fitting import rmse_by_sensor
 from ..signals import Record
@@ -132,6 +133,14 @@ class Fit(Estimates):
             "responses": [one.to_dict() for one in self.responses],
             "validation_responses": [one.to_dict() for one in self.validation_responses],
         }
+
+    def _repr_html_(self) -> str:
+        units, deviations = self.system.sensor_units, self.std
+        rows = [(name, f"{value:.6g} ± {deviations[name]:.2g}") for name, value in self.parameters.items()]
+        for kind, scores in (("fitted", self.train), ("validation", self.validation)):
+            rows += [(f"RMSE, {kind} {one.record}", ", ".join(f"{name} {e:.3g} {units.get(name, 'K')}"
+                                                              for name, e in one.rmse.items())) for one in scores]
+        return short_table("Calibration: parameter, value ± standard deviation", rows, str(self.outcome))
 
     def __str__(self) -> str:
         lines, units = self._lines(), self.system.sensor_units

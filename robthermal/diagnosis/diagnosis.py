@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._html import short_table
 from ..errors import Outcome
 from ..thermal import System
 from ._file import write_json
@@ -122,6 +123,15 @@ class Diagnosis:
                          f"[{gap.unit}]")
         lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
         return "\n".join([*lines, str(self.outcome)])
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[str, str]] = [("verdict", self.verdict)]
+        for found in self.effects:
+            values = (f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
+            rows.append((found.label, ", ".join(values)))
+        rows += [(f"rms, {name}", f"{gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise [{gap.unit}]")
+                 for name, gap in self.gap.items()]
+        return short_table("Diagnosis", rows, str(self.outcome))
 
     def plot(self) -> NDArray[Any]:
         """Residuals of the first training record [K], or response, before and after; returns the matplotlib axes."""

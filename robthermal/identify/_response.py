@@ -392,3 +392,6 @@ class FrequencyResponse:
 
     def __str__(self) -> str:
         return _response_text.table(self)
+
+    def _repr_html_(self) -> str:
+        return _response_text.html(self)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from robthermal._html import short_table
 from robthermal.errors import Outcome
 
 from ._outcomes import IdentifyCode
@@ -40,6 +41,14 @@ def remarks(result: FrequencyResponse) -> tuple[Outcome, ...]:
     if not result.has_covariance:
         found.append(IdentifyCode.FRF_WITHOUT_COVARIANCE.outcome())
     return tuple(found)
+
+
+def html(result: FrequencyResponse) -> str:
+    """Short table for notebooks."""
+    f = result.frequencies
+    rows = [("method", result.method), ("bins", f"{len(result)}, {f[0]:.4g} to {f[-1]:.4g} Hz"),
+            ("inputs", ", ".join(result.input_names)), ("outputs", ", ".join(result.output_names))]
+    return short_table("Frequency response", rows, str(result.outcome))
 
 
 def table(result: FrequencyResponse) -> str:

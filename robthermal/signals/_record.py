@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._html import short_table
 from ..errors import InputError
 from ._checks import Array, channel_matrix, channel_names, channel_units, distinct, finite_number, positive_number
 from ._export import frame, summary, write
@@ -278,6 +279,15 @@ class Record:
 
     def __str__(self) -> str:
         return summary(self)
+
+    def _repr_html_(self) -> str:
+        rows = [("samples", f"{self.n_samples} of {self.sample_time:.10g} s")]
+        for kind, names in (("input", self.input_names), ("output", self.output_names)):
+            for name in names:
+                known = self[name][np.isfinite(self[name])]
+                said = f"{known.min():.6g} to {known.max():.6g} {self.units.get(name, '')}" if known.size else "no value"
+                rows.append((f"{kind} {name}", said.rstrip()))
+        return short_table(f"Record {self.name}".rstrip(), rows, " ".join(self.notes))
 
     def __repr__(self) -> str:
         title = f"{self.name!r}, " if self.name else ""

@@ -12,6 +12,7 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from .._html import short_table
 from ..errors import InputError
 from ._equations import Equations
 from ._network import check_network
@@ -82,6 +83,14 @@ class System(Part):
         return f"<System {self.name!r}: {', '.join(f'{n} {table}' for table, n in counts.items() if n)}>"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        tables = ("lumps", "links", "modules", "leads", "ambients", "inputs", "sensors")
+        parts = {name: getattr(self, name) for name in tables}
+        names = {name: ["-".join(one.between) for one in found] if name == "links" else list(map(str, found))
+                 for name, found in parts.items()}
+        rows = [(f"{len(found)} {name}", ", ".join(found)) for name, found in names.items() if found]
+        return short_table(f"System {self.name}", rows)
 
     @property
     def lump_names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ import stat
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,10 @@ class Certificate:
         if not self.holds:
             return f"{self.kind} certificate, does not hold: {self.reason}\n{self.claim}"
         return f"{self.kind} certificate, claims (not verified here; rt.verify does): {self.claim}"
+
+    def _repr_html_(self) -> str:
+        """For notebooks; like `str`, a claim is shown as a claim: only `rt.verify` proves it."""
+        return f"<p>{escape(str(self))}</p>".replace("\n", "<br>")
 
     def _document(self) -> dict[str, Any]:
         return {"format": self.format, "kind": self.kind, "claim": self.claim, "holds": self.holds,
