@@ -284,9 +284,9 @@ class Record:
         rows = [("samples", f"{self.n_samples} of {self.sample_time:.10g} s")]
         for kind, names in (("input", self.input_names), ("output", self.output_names)):
             for name in names:
-                known = self[name][np.isfinite(self[name])]
-                said = f"{known.min():.6g} to {known.max():.6g} {self.units.get(name, '')}" if known.size else "no value"
-                rows.append((f"{kind} {name}", said.rstrip()))
+                known, unit = self[name][np.isfinite(self[name])], self.units.get(name, "")
+                said = f"{known.min():.6g} to {known.max():.6g} {unit}".rstrip() if known.size else "no value"
+                rows.append((f"{kind} {name}", said))
         return short_table(f"Record {self.name}".rstrip(), rows, " ".join(self.notes))
 
     def __repr__(self) -> str:
