@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import control
@@ -58,8 +59,9 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
         Numbers of measurements y and of controls u.
     gamma : float, optional
         Norm that is enough [output unit per input unit]; the controller is then made for it, not for the optimum.
-    method : {"auto", "riccati"}
-        Both are the Riccati equations.
+    method : {"auto", "riccati", "reference"}
+        Riccati equations; "reference": the optimum by the matrix inequalities of Gahinet and Apkarian in cvxpy, slow
+        and for comparison, the controller for a little more by the same equations.
     tolerance : float
         Allowed excess of the proven value over the optimum, relative [-].
     region : mapping, optional
@@ -87,7 +89,7 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     References
     ----------
     Glover and Doyle, Systems & Control Letters 11 (1988); Zhou, Doyle and Glover, Robust and Optimal Control (1996),
-    theorem 17.1.
+    theorem 17.1; Gahinet and Apkarian, Int. J. Robust Nonlinear Control 4 (1994).
 
     Examples
     --------
@@ -98,19 +100,33 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     (True, True, True)
     """
     start = time.perf_counter()
-    choice("method", method, ("auto", "riccati"))
+    choice("method", method, ("auto", "riccati", "reference"))
     tolerance = positive_number(tolerance, "tolerance")
     asked = None if gamma is None else positive_number(gamma, "gamma")
     plant = sampled(read_generalized(P, n_meas, n_ctrl), sample_time)
     poles = read_poles(region, plant.dt)
     if max_gain is not None:
         max_gain = positive_number(max_gain, "max_gain")
+    if method == "reference":
+        return _reference(P, plant, tolerance, start)
     best, lower = best_of(plant, tolerance, asked, poles, max_gain)
     found = _finished(plant, best, order, poles)
     if found is None:
         return _design(P, plant, None, [], _nothing(best, max_gain), lower, start, best)
     K, certificates = found
     return _design(P, plant, K, certificates, _judge(certificates, asked, lower, poles), lower, start, best)
+
+
+def _reference(P: Any, plant: GeneralizedPlant, tolerance: float, start: float) -> Design:
+    """The optimum of the cvxpy program, and a controller for a little more."""
+    formulations = import_module("._formulations", __package__)  # cvxpy is slow to import
+    level: float = formulations.hinf_level(to_continuous(plant)[0] if plant.dt else plant)
+    best, _ = best_of(plant, tolerance, level * (1 + 0.6 * tolerance), {}, None)
+    found = _finished(plant, best, None, {})
+    if found is None:
+        return _design(P, plant, None, [], _nothing(best, None), level, start, best)
+    made = _design(P, plant, *found, _judge(found[1], None, level, {}), level, start, best)
+    return replace(made, method="matrix inequalities (Gahinet and Apkarian), cvxpy")
 
 
 def _nothing(best: Reached | None, max_gain: float | None) -> Outcome:

@@ -1,0 +1,97 @@
+"""The programs as the papers write them, in cvxpy: slow, readable, and what the fast methods are compared with.
+
+Nothing here is evidence; what comes out is a number or gains. Continuous time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cvxpy
+import numpy as np
+from scipy.linalg import null_space
+
+from .._arrays import Array
+from ..errors import InputError
+from ._frf_program import Bins
+from ._plant import GeneralizedPlant, balanced
+
+cp: Any = cvxpy  # its types name only part of what it exports
+_SETTINGS = {"chordal_decomposition_enable": False, "max_iter": 400}  # with it Clarabel 0.11 may abort
+
+
+def hinf_level(plant: GeneralizedPlant) -> float:
+    """Smallest H-infinity norm of any controller: Gahinet and Apkarian (1994), theorem 4.3, with D22 = 0.
+
+    Minimize γ over R, S = R', S' with [R 1; 1 S] >= 0 and, N_R, N_S bases of the kernels of [B2' D12'], [C2 D21]:
+    diag(N_R, 1)' [AR + RA', RC1', B1; ., -γ, D11; ., ., -γ] diag(N_R, 1) <= 0 and its dual.
+    """
+    p = balanced(plant)
+    n, m, q = len(p.A), p.B1.shape[1], len(p.C1)
+    R, S, level = cp.Variable((n, n), symmetric=True), cp.Variable((n, n), symmetric=True), cp.Variable()
+    controls = cp.bmat([[p.A @ R + R @ p.A.T, R @ p.C1.T, p.B1], [p.C1 @ R, -level * np.eye(q), p.D11],
+                        [p.B1.T, p.D11.T, -level * np.eye(m)]])
+    measured = cp.bmat([[p.A.T @ S + S @ p.A, S @ p.B1, p.C1.T], [p.B1.T @ S, -level * np.eye(m), p.D11.T],
+                        [p.C1, p.D11, -level * np.eye(q)]])
+    outer_R = _outer(np.hstack([p.B2.T, p.D12.T]), m)
+    outer_S = _outer(np.hstack([p.C2, p.D21]), q)
+    eye = np.eye(n)
+    return _minimum(level, [_negative(outer_R.T @ controls @ outer_R), _negative(outer_S.T @ measured @ outer_S),
+                            cp.bmat([[R, eye], [eye, S]]) >> 0])
+
+
+def h2_level(plant: GeneralizedPlant) -> float:
+    """Smallest H2 norm of any strictly proper controller, D11 = 0, D22 = 0: Scherer, Gahinet and Chilali (1997), (38).
+
+    Minimize tr Q over X, Y, A^, B^, C^ with the inequalities of the linearizing change of variables.
+    """
+    p = balanced(plant)
+    n, m, q = len(p.A), p.B1.shape[1], len(p.C1)
+    X, Y, Q = (cp.Variable((size, size), symmetric=True) for size in (n, n, q))
+    A_hat, B_hat, C_hat = cp.Variable((n, n)), cp.Variable((n, len(p.C2))), cp.Variable((p.B2.shape[1], n))
+    states = p.A @ X + p.B2 @ C_hat
+    estimates = Y @ p.A + B_hat @ p.C2
+    driven = Y @ p.B1 + B_hat @ p.D21
+    lyapunov = cp.bmat([[states + states.T, A_hat.T + p.A, p.B1], [A_hat + p.A.T, estimates + estimates.T, driven],
+                        [p.B1.T, driven.T, -np.eye(m)]])
+    eye, seen = np.eye(n), p.C1 @ X + p.D12 @ C_hat
+    bound = cp.bmat([[X, eye, seen.T], [eye, Y, p.C1.T], [seen, p.C1, Q]])
+    return float(np.sqrt(_minimum(cp.trace(Q), [_negative(lyapunov), (bound + bound.T) / 2 >> 0])))
+
+
+def margin_step(bins: Bins, at: Array, objective: Array, margin: float) -> Array:
+    """Gains of largest objective around the last ones: Karimi and Galdos (2010), the constraints of one bin a line."""
+    x = cp.Variable(len(at))
+    phi = 1 + bins.center * (bins.basis @ at)
+    constraints = []
+    for k, c in enumerate(phi):
+        row = bins.center[k] * bins.basis[k] * (c.conjugate() / abs(c))
+        C = cp.norm(cp.hstack([bins.basis[k].real @ x, bins.basis[k].imag @ x]))
+        constraints.append((c.conjugate() / abs(c)).real + row.real @ x >= max(margin, bins.S[k]) + bins.radius[k] * C)
+    cp.Problem(cp.Maximize(objective @ x), constraints).solve(solver=cp.CLARABEL)
+    return np.asarray(x.value, float)
+
+
+def _outer(rows: Array, more: int) -> Array:
+    kernel = null_space(rows)
+    found = np.zeros((kernel.shape[0] + more, kernel.shape[1] + more))
+    found[:kernel.shape[0], :kernel.shape[1]] = kernel
+    found[kernel.shape[0]:, kernel.shape[1]:] = np.eye(more)
+    return found
+
+
+def _negative(matrix: Any) -> Any:
+    return (matrix + matrix.T) / 2 << 0
+
+
+def _minimum(objective: Any, constraints: list[Any]) -> float:
+    problem = cp.Problem(cp.Minimize(objective), constraints)
+    try:
+        problem.solve(solver=cp.CLARABEL, **_SETTINGS)
+    except cp.SolverError as error:
+        raise InputError(f"the reference program was not solved: {error}", where="argument method",
+                         expected="a small, well-scaled plant", remedy='Use method="auto".') from None
+    if problem.value is None or not np.isfinite(problem.value):
+        raise InputError(f"the reference program was not solved: {problem.status}", where="argument method",
+                         expected="a small, well-scaled plant", remedy='Use method="auto".')
+    return float(problem.value)
