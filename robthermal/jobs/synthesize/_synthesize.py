@@ -1,0 +1,85 @@
+"""Run the synthesis that a plant file asks for, and check its certificates again."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ..._checks import quoted
+from ...design import Design, frf_pid, h2, hinf
+from ...errors import InputError
+from ...verification import verify
+from ..claims import Checked
+from ._file import SynthesisJob
+
+METHODS = ("hinf", "h2", "frf-pid")
+_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "frf-pid": frf_pid}
+_TITLES = {"hinf": "H-infinity norm", "h2": "H2 norm", "region": "Region of the eigenvalues",
+           "stability": "Stability", "peak": "Peak gain"}
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """A design with its certificates checked again.
+
+    Parameters
+    ----------
+    job : SynthesisJob
+        What was asked for.
+    method : str
+        One of `METHODS`.
+    design : Design
+        What was found.
+    checked : tuple of Checked
+        Certificates with their independent checks.
+    """
+
+    job: SynthesisJob
+    method: str
+    design: Design
+    checked: tuple[Checked, ...]
+
+
+def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
+    """Design the controller that a plant file asks for.
+
+    Parameters
+    ----------
+    job : SynthesisJob
+        Plant or response and arguments, as `read_plant_file` returns them.
+    method : str
+        "hinf", "h2" or "frf-pid".
+
+    Returns
+    -------
+    Synthesis
+
+    Raises
+    ------
+    InputError
+        Unknown method or arguments, [frf] for a method that needs a plant; what the synthesis refuses.
+    """
+    if method not in _VERBS:
+        raise InputError(f"method = {quoted(method)}", where="--method", expected=f"one of {list(METHODS)}")
+    verb = _VERBS[method]
+    allowed = [name for name, one in inspect.signature(verb).parameters.items() if one.kind is one.KEYWORD_ONLY]
+    unknown = [name for name in job.arguments if name not in allowed]
+    if unknown:
+        raise InputError(f"unknown key {quoted(unknown[0])}", where=f"{job.files[0]} [design]",
+                         expected=f"arguments of {method}: {', '.join(allowed)}")
+    design = verb(*_first(job, method), **job.arguments)
+    checked = tuple(Checked(f"{k + 1}_{measure}", _TITLES.get(measure, measure), one,
+                            verify(one) if one.holds else None, True)
+                    for k, one in enumerate(design.certificates) for measure in [str(one.region.get("measure", one.kind))])
+    return Synthesis(job, method, design, checked)
+
+
+def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:
+    if method == "frf-pid":
+        return (job.plant if job.response is None else job.response,)
+    if job.plant is None:
+        raise InputError(f"method {method} needs a plant", where=f"{job.files[0]}", expected="a table [plant]",
+                         remedy="A measured response is designed for with --method frf-pid.")
+    return job.plant, job.n_meas, job.n_ctrl

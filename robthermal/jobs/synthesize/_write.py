@@ -1,0 +1,84 @@
+"""Report and files of a synthesis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from ...export import plain
+from ...report import Claim, Report, Section, Table
+from ..claims import ARITHMETIC
+from ..evidence import write_certification
+from ..folder import output_folder
+from ..now import now
+from ..provenance import provenance
+from ._synthesize import Synthesis
+
+_ASSUMED = ("Plant and controller are linear and do not vary with time; no actuator saturates.",
+            "Certificates speak of the floating-point numbers of plant and controller in their files.")
+
+
+def write_synthesis(result: Synthesis, out: str | Path) -> Report:
+    """Write a synthesis into a folder, which appears only when complete.
+
+    Parameters
+    ----------
+    result : Synthesis
+        Synthesis, as `synthesize_plant` returns it.
+    out : str or Path
+        Output folder: design.json, controller.c and .h of a sampled controller, report.html, junit.xml, summary.json,
+        ``certificates/*.json``.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or holds something else.
+    """
+    design = result.design
+    data = {"synthesis": {"method": result.method, "value": plain(design.value), "lower": plain(design.lower),
+                          "margins": plain(design.margins), "code": design.outcome.code}}
+    report = Report(title=f"Controller by {result.method}", subtitle=result.job.files[0].name, label="",
+                    claims=tuple(_claims(result)), sections=tuple(_sections(result)),
+                    provenance=provenance(result.job.files), assumptions=(*_ASSUMED, ARITHMETIC), generated=now(),
+                    data=data)
+    with output_folder(out) as folder:
+        report = write_certification(result.checked, report, folder)
+        for name in ("design.json", *(("controller.c", "controller.h") if design.controller.dt else ())):
+            design.export(folder / name)
+    return report
+
+
+def _claims(result: Synthesis) -> Iterator[Claim]:
+    design = result.design
+    if not design.holds:
+        yield Claim("What was asked for", "The controller reaches what was asked for.", False, None,
+                    box="the plant of the file", margin="none", how="See the sections below.",
+                    reason=design.outcome.text)
+    elif not result.checked:  # at the bins of a response: a test, not a proof
+        yield Claim("Margin at the bins", design.robust_against.text, True, None, box="the bins of the response",
+                    margin=f"sensitivity at most {design.value:.4g}", how=design.method, tested=True)
+    for one in result.checked:
+        reason = "" if one.good or one.verdict is None else one.verdict.reason
+        yield Claim(one.title, one.certificate.claim, one.certificate.holds, one.good, "the plant of the file",
+                    f"bound {one.certificate.region.get('bound', 'as stated')}" if one.good else "none",
+                    "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic.", reason,
+                    one.file, one.certificate.kind, one.verdict.seconds if one.verdict else 0.0)
+
+
+def _sections(result: Synthesis) -> Iterator[Section]:
+    design = result.design
+    K = design.controller
+    sizes = f"{K.nstates} states, {K.ninputs} inputs, {K.noutputs} outputs"
+    text = (f"{design.method}, {design.solver}; {design.solve_time:.3g} s.\n\nController: {sizes}, "
+            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\nProven: {design.value:.6g}. Best that is possible, "
+            f"estimated: {design.lower:.6g}.\n\n{design.outcome.text}\n\n{design.robust_against.text}")
+    rows = pd.DataFrame([{"loop": name, **{key: f"{value:.4g}" for key, value in one.items()}}
+                         for name, one in design.margins.items()])
+    tables = (Table("Margins, in floats: gain [-], phase [deg], delay [s]", rows),) if len(rows) else ()
+    yield Section("Controller", text, tables=tables)
