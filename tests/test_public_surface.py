@@ -63,6 +63,7 @@ SURFACE = {
         diagnose_records explain explainable map_system new_project read_coupling read_project read_sheets
         rebuild_report run_job run_project verify_files write_certify write_coupling write_design write_diagnosis
         write_job write_map write_modules
+        read_plant_file synthesize_plant write_synthesis
     """,
     "project": """
         Boxes Certification Checked Comparison ControllerDesign Coupling CouplingJob DesignRequest Diagnosed

@@ -274,7 +274,9 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            sample_time: Annotated[float, typer.Option(help="[s].")] = 1.0,
            sensors: Annotated[str | None, typer.Option(
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
-           method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+           method: Annotated[str, typer.Option(
+               help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, frf-pid: a synthesis for "
+               "PLANT.toml (docs/command_line.md), without the other options.")] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
                metavar="FILE.json|NAME=LO:HI")] = None,
@@ -286,6 +288,16 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
 
     Example: robthermal design setup.toml --setpoint m1=5 --setpoint m2=5 --bandwidth 0.02 --out design
     """
+    if method in rt.jobs.synthesize.METHODS:
+        job = rt.jobs.read_plant_file(system)
+        rt.jobs.folder.check_free(out)
+        with progress() as stage:
+            stage(f"designing by {method}")
+            synthesis = rt.jobs.synthesize_plant(job, method)
+            stage("writing the report")
+            report = rt.jobs.write_synthesis(synthesis, out)
+        show_report(report, out, as_json, controller=str(out / "design.json"))
+        return
     found = rt.read_system(system)
     wanted = rt.jobs.design.design_from_text(
         found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,

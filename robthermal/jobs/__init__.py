@@ -30,6 +30,9 @@ from .run import run_job as run_job
 from .run import write_job as write_job
 from .starter import demo_project as demo_project
 from .starter import new_project as new_project
+from .synthesize import read_plant_file as read_plant_file
+from .synthesize import synthesize_plant as synthesize_plant
+from .synthesize import write_synthesis as write_synthesis
 from .verify import verify_files as verify_files
 
 __all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "compare_modules", "couple_subsystems",
@@ -37,3 +40,4 @@ __all__ = ["Boxes", "DesignRequest", "MapRequest", "certify_system", "compare_mo
            "read_coupling", "read_project", "read_sheets", "rebuild_report", "run_job", "run_project", "verify_files",
            "write_certify", "write_coupling", "write_design", "write_diagnosis", "write_job", "write_map",
            "write_modules"]
+__all__ += ["read_plant_file", "synthesize_plant", "write_synthesis"]

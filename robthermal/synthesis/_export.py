@@ -12,7 +12,7 @@ import numpy as np
 from .._arrays import Array
 from .._write import write
 from ..errors import InputError
-from ..export import Program, comment, identifier, json_bytes, number, plain, write_export
+from ..export import Program, by_suffix, comment, identifier, json_bytes, matlab_bytes, number, plain, write_export
 from ..linear import Plant, read_plant
 from ..verification import Certificate
 
@@ -47,7 +47,11 @@ def export_design(controller: control.StateSpace, facts: Mapping[str, Any], cert
     """Write one file, or a folder with all of them; `facts`: what design.json says beside the controller."""
     content = document(controller, name) | dict(facts)
     if Path(path).suffix:
-        write_export(path, lambda: content, lambda: program(controller, name))
+        if controller.dt:
+            write_export(path, lambda: content, lambda: program(controller, name))
+        else:  # no test vector: there is no program
+            by_suffix(path, {".json": lambda: json_bytes(plain(content)), ".mat": lambda: matlab_bytes(content)},
+                      "C source needs a sampled controller: design it with sample_time=.")
         return
     folder = Path(path)
     try:
@@ -73,10 +77,6 @@ def document(K: control.StateSpace, name: str) -> dict[str, Any]:
 def program(controller: control.StateSpace, name: str) -> Program:
     """C source of a sampled controller, the doubles of the certificate."""
     K = read_plant(controller)
-    if not K.dt:
-        raise InputError("C source of a continuous controller", where="argument path",
-                         expected="a sampled controller, or the ending .json or .mat",
-                         remedy="Design it with sample_time=.")
     p, n, (n_u, n_y) = identifier(name, "controller"), len(K.A), K.D.shape
     given = [*(f"s->x[{k}]" for k in range(n)), *(f"y[{k}]" for k in range(n_y))]
     body = _BODY.format(p=p, states=max(n, 1), n_y=n_y, n_u=n_u, output=_sums("u", np.hstack([K.C, K.D]), given),

@@ -10,7 +10,7 @@ from typing import Any
 from ..._checks import quoted
 from ...design import Design, frf_pid, h2, hinf
 from ...errors import InputError
-from ...verification import verify
+from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
@@ -70,10 +70,13 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
         raise InputError(f"unknown key {quoted(unknown[0])}", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")
     design = verb(*_first(job, method), **job.arguments)
-    checked = tuple(Checked(f"{k + 1}_{measure}", _TITLES.get(measure, measure), one,
-                            verify(one) if one.holds else None, True)
-                    for k, one in enumerate(design.certificates) for measure in [str(one.region.get("measure", one.kind))])
-    return Synthesis(job, method, design, checked)
+    return Synthesis(job, method, design, tuple(_check(k, one) for k, one in enumerate(design.certificates)))
+
+
+def _check(k: int, certificate: Certificate) -> Checked:
+    measure = str(certificate.region.get("measure", certificate.kind))
+    verdict = verify(certificate) if certificate.holds else None
+    return Checked(f"{k + 1}_{measure}", _TITLES.get(measure, measure), certificate, verdict, True)
 
 
 def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:

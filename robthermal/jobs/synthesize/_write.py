@@ -76,9 +76,9 @@ def _sections(result: Synthesis) -> Iterator[Section]:
     K = design.controller
     sizes = f"{K.nstates} states, {K.ninputs} inputs, {K.noutputs} outputs"
     text = (f"{design.method}, {design.solver}; {design.solve_time:.3g} s.\n\nController: {sizes}, "
-            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\nProven: {design.value:.6g}. Best that is possible, "
+            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\nProven: {design.value:.6g}. Best possible, "
             f"estimated: {design.lower:.6g}.\n\n{design.outcome.text}\n\n{design.robust_against.text}")
     rows = pd.DataFrame([{"loop": name, **{key: f"{value:.4g}" for key, value in one.items()}}
                          for name, one in design.margins.items()])
-    tables = (Table("Margins, in floats: gain [-], phase [deg], delay [s]", rows),) if len(rows) else ()
+    tables = (Table(rows, "Margins, in floats: gain [-], phase [deg], delay [s]."),) if len(rows) else ()
     yield Section("Controller", text, tables=tables)

@@ -1,0 +1,77 @@
+"""`robthermal design PLANT.toml --method ...`: what is written, exit statuses, refusals."""
+
+from __future__ import annotations
+
+import json
+
+import control
+import numpy as np
+import pytest
+
+import robthermal as rt
+
+PLANT = """
+[plant]
+A = [[0.0, 10.0, 2.0], [-1.0, 1.0, 0.0], [0.0, 2.0, -5.0]]
+B = [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+C = [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+D = [[0.0, 0.0], [0.0, 1.0], [2.0, 0.0]]
+n_meas = 1
+n_ctrl = 1
+"""
+
+
+def design_by(run, folder, content, method):
+    (folder / "plant.toml").write_text(content)
+    return run("design", str(folder / "plant.toml"), "--method", method, "--out", str(folder / "out"))
+
+
+@pytest.mark.parametrize(("method", "bound"), [("hinf", 9.508085 * 1.005), ("h2", 1e9)])
+def test_plant_of_matrices(run, tmp_path, method, bound):
+    done = design_by(run, tmp_path, PLANT, method)
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert design["format"] == "robthermal-design/1" and 0 < design["value"] < bound and design["outcome"]["ok"]
+    saved = rt.Certificate.load(tmp_path / "out" / "certificates" / f"1_{method}.json")
+    assert rt.verify(saved).valid and saved.region["bound"] == design["value"]
+    assert {"report.html", "junit.xml", "summary.json"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert run("verify", str(tmp_path / "out" / "certificates" / f"1_{method}.json")).status == 0
+
+
+def test_sampled_plant_from_a_file_has_c_source(run, tmp_path):
+    matrices = {"A": [[0.9]], "B": [[1, 0, 1]], "C": [[1], [0], [1]], "D": [[0, 0, 0], [0, 0, 1], [0, 1, 0]]}
+    (tmp_path / "plant.json").write_text(json.dumps(matrices))
+    done = design_by(run, tmp_path, '[plant]\nfile = "plant.json"\nn_meas = 1\nn_ctrl = 1\ndt = 0.5\n', "h2")
+    assert done.status == 0 and (tmp_path / "out" / "controller.c").exists()
+
+
+def test_gamma_that_is_not_reached_is_an_honest_no(run, tmp_path):
+    done = design_by(run, tmp_path, PLANT + "[design]\ngamma = 9.0\n", "hinf")
+    assert done.status == 1 and "best achievable is about 9.5" in done.out + done.err
+    assert not list((tmp_path / "out" / "certificates").glob("*"))
+
+
+def test_pid_of_a_measured_response(run, tmp_path):
+    f = np.geomspace(1e-4, 0.1, 120)
+    lag = control.tf([2.0], np.polymul([60, 1], [8, 1]))
+    G = rt.identify.FrequencyResponse(
+        frequencies=f, response=np.array([complex(lag(2j * np.pi * x)) for x in f])[None, None],
+        noise_covariance=np.full((1, 1, 120), 1e-4), gram=np.ones((1, 1, 120)), degrees_of_freedom=np.full(120, 50),
+        input_names=["q"], output_names=["T"], sample_time=1.0, n_samples=1000, method="made for a test")
+    G.save(tmp_path / "frf.json")
+    done = design_by(run, tmp_path, '[frf]\nfile = "frf.json"\n[design]\nmodulus_margin = 0.6\n', "frf-pid")
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert design["outcome"]["code"] == "at_the_bins" and design["value"] <= 1 / 0.6
+
+
+@pytest.mark.parametrize(("content", "method", "words"), [
+    (PLANT.replace("n_ctrl = 1", "n_ctrl = 5"), "hinf", "n_ctrl = 5"),
+    (PLANT.replace("D = ", "E = "), "hinf", "'plant.E'"), (PLANT + "[design]\nspeed = 3\n", "h2", "'speed'"),
+    (PLANT.replace("[2.0, 0.0]]", "[2.0]]"), "hinf", "fit together"), ("[design]\n", "hinf", "or neither"),
+    (PLANT.replace("[0.0, 1.0], [1.0, 0.0]]", "[0.0, 0.0], [1.0, 0.0]]"), "hinf", "not stabilisable"),
+    ('[frf]\nfile = "none.json"\n', "frf-pid", "none.json")])
+def test_bad_files_name_what_is_wrong(run, tmp_path, content, method, words):
+    done = design_by(run, tmp_path, content, method)
+    assert done.status == 2 and words in " ".join((done.out + done.err).split()), done.out + done.err
+    assert not (tmp_path / "out").exists()
