@@ -36,6 +36,30 @@ class FrfDesign(Design):
 
     Parameters
     ----------
+    controller : control.StateSpace
+        C from error to control, u = C (r - y); its numbers are the gains.
+    value : float
+        Bound of the sensitivity: proven with a model, else evaluated over circles and bins; infinity where not kept.
+    lower : float
+        Always 1: no loop with integral action has a sensitivity that stays below it.
+    closed_loop : control.StateSpace or control.FRD
+        Sensitivity in floats; at the bins where there is no model.
+    certificates : list of Certificate
+        Proofs, about the numbers of plant and controller; `rt.verify` checks each again.
+    robust_against : RobustAgainst
+        What set of plants the claim covers.
+    outcome : Outcome
+        How it ended; its text is the remedy.
+    method : str
+        Equations or program that gave the controller.
+    solver : str
+        What solved them, and in which precision.
+    solve_time : float
+        Time of the whole synthesis with its proofs [s].
+    iterations : int
+        Levels or steps that were tried.
+    plant : GeneralizedPlant or None
+        Parts of the plant the controller was made for; None where there is only a response.
     gains : mapping
         Gains by name: Kp [control unit per measurement unit], Ki [the same per second], Kd [the same times seconds].
     modulus_margin : mapping

@@ -84,6 +84,15 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     ------
     InputError
         A file that cannot be read, unknown or missing keys, both or neither of [plant] and [frf].
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> _ = Path("plant.toml").write_text("[plant]\\nA = [[1.0]]\\nB = [[1.0, 0.0, 1.0]]\\nC = [[1.0], [0.0], [1.0]]\\n"
+    ...     "D = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]\\nn_meas = 1\\nn_ctrl = 1\\n")
+    >>> rt.jobs.read_plant_file("plant.toml").plant.nstates
+    1
     """
     place = Path(path)
     found = read_toml(place, _File, _REMEDY)

@@ -60,6 +60,15 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     ------
     InputError
         Unknown method or arguments, [frf] for a method that needs a plant; what the synthesis refuses.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> _ = Path("plant.toml").write_text("[plant]\\nA = [[1.0]]\\nB = [[1.0, 0.0, 1.0]]\\nC = [[1.0], [0.0], [1.0]]\\n"
+    ...     "D = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]\\nn_meas = 1\\nn_ctrl = 1\\n")
+    >>> rt.jobs.synthesize_plant(rt.jobs.read_plant_file("plant.toml"), "hinf").design.holds
+    True
     """
     if method not in _VERBS:
         raise InputError(f"method = {quoted(method)}", where="--method", expected=f"one of {list(METHODS)}")

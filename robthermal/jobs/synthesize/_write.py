@@ -39,6 +39,16 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
     ------
     InputError
         If the folder cannot be written, or holds something else.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> _ = Path("plant.toml").write_text("[plant]\\nA = [[1.0]]\\nB = [[1.0, 0.0, 1.0]]\\nC = [[1.0], [0.0], [1.0]]\\n"
+    ...     "D = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]\\nn_meas = 1\\nn_ctrl = 1\\n")
+    >>> done = rt.jobs.synthesize_plant(rt.jobs.read_plant_file("plant.toml"), "h2")
+    >>> rt.jobs.write_synthesis(done, "controller").verdict
+    'PASS'
     """
     design = result.design
     data = {"synthesis": {"method": result.method, "value": plain(design.value), "lower": plain(design.lower),
