@@ -130,7 +130,7 @@ class TestNamed:
         found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
         assert {"format", "verdict", "effects", "alternatives", "located", "gap", "not_testable",
                 "next_experiment"} <= set(found)
-        assert (found["format"], found["verdict"]) == ("robthermal-diagnosis/1", "named")
+        assert (found["format"], found["verdict"]) == ("robthermal-diagnosis/2", "named")
         assert [(e["effect"], e["where"]) for e in found["effects"]] == [("missing_ambient_link", ["block", "room"])]
         size = found["effects"][0]["parameters"]["conductance"]
         assert abs(size["value"] - 0.12) < 4 * size["std"] and size["unit"] == "W/K"

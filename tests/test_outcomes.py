@@ -26,7 +26,8 @@ CODES = {
         -moving -none -not_certified -not_contracting -not_found -not_held -not_tuned -ran_away
         +reachable -reversed +settled +tuned -undecided -unreachable -unstable""",
     "diagnosis": """+adequate -ambiguous +consistent +converged +declared -doubtful +estimated +found -inadequate
-        -inexact +named -none -not_converged -not_predicted +nothing +predicted +selected -unexplained""",
+        -inexact +named +named_with_remainder -none -not_converged -not_predicted +nothing +predicted +selected
+        -unexplained""",
     "fleet": "+done -failed",
     "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
     "jobs": "-bins_left_out -circles_left_out -frf_without_covariance",

@@ -45,10 +45,10 @@ SURFACE = {
         Design FrfDesign RobustAgainst frf_pid h2 hinf
     """,
     "diagnosis": """
-        Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Found Gap HoldOut JointCheck
-        JointSelection
-        LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Response
-        Scores ShortList UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
+        Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
+        JointCheck JointSelection Left
+        LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder
+        Response Scores ShortList Stability UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
         forget_effect hold_out locate next_experiment noise_floor refit refit_short_list register_effect score
         select_jointly unknown_heat
     """,

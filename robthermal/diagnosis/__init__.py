@@ -15,10 +15,14 @@ from .effects import effects as effects
 from .effects import forget_effect as forget_effect
 from .effects import register_effect as register_effect
 from .evidence import Adequacy as Adequacy
+from .evidence import Evidence as Evidence
 from .evidence import Gap as Gap
 from .evidence import HoldOut as HoldOut
+from .evidence import Left as Left
 from .evidence import Location as Location
+from .evidence import Remainder as Remainder
 from .evidence import Scores as Scores
+from .evidence import Stability as Stability
 from .evidence import UnknownHeat as UnknownHeat
 from .evidence import ValidationResiduals as ValidationResiduals
 from .evidence import adequacy as adequacy
@@ -43,9 +47,10 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet", "Entry", "Found",
-           "Gap", "HoldOut", "JointCheck", "JointSelection", "LinearizedRecord", "Location", "Measurement",
-           "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refit", "Response", "Scores", "ShortList",
-           "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
-           "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list",
-           "register_effect", "score", "select_jointly", "unknown_heat"]
+__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet", "Entry",
+           "Evidence", "Found", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left", "LinearizedRecord",
+           "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refit",
+           "Remainder", "Response", "Scores", "ShortList", "Stability", "UnknownHeat", "ValidationResiduals",
+           "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
+           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score",
+           "select_jointly", "unknown_heat"]

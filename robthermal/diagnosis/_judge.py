@@ -11,13 +11,14 @@ import numpy as np
 from ..errors import Outcome
 from ._outcomes import DiagnosisCode
 from .data import Measured
-from .evidence import Adequacy, HoldOut, adequacy, hold_out
+from .evidence import Adequacy, Evidence, HoldOut, adequacy, hold_out
 from .fit import Refit, Whitened
 from .search import Accepted, SearchState, ShortList, ruled_out, with_wider_noise
 
-Verdict = Literal["named", "ambiguous", "consistent", "unexplained"]
+Verdict = Literal["named", "named_with_remainder", "ambiguous", "consistent", "unexplained"]
 Name = tuple[str, tuple[str, ...]]
 Progress = Callable[[str], None]
+_FAR = 5.0  # whitened variance that no noise within the limits explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +59,14 @@ class Judged:
         Tests of what is left in the training data.
     hold_out : HoldOut or None
         Prediction of the validation data; None without any.
-    verdict : {"named", "ambiguous", "consistent", "unexplained"}
+    verdict : {"named", "named_with_remainder", "ambiguous", "consistent", "unexplained"}
         Answer of the diagnosis.
     outcome : Outcome
         Code as the verdict, and its reasons.
+    plain : Refit, optional
+        Where the fit of the state allows for a network that is too coarse: the same effects with the network as it is.
+    evidence : tuple of Evidence
+        For every effect, where the model is not exact.
     """
 
     state: SearchState
@@ -69,6 +74,8 @@ class Judged:
     hold_out: HoldOut | None
     verdict: Verdict
     outcome: Outcome
+    plain: Refit | None = None
+    evidence: tuple[Evidence, ...] = ()
 
     def __str__(self) -> str:
         return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else
@@ -109,6 +116,8 @@ def reconsider_noise(judged: Judged, validation: Validation) -> Judged:
     state, unexplained = judged.state, judged.verdict == "unexplained"
     if not unexplained and not (state.rounds and state.fit.levels.exhausted):
         return judged
+    if state.nominal.variance > _FAR:
+        return judged
     wider = with_wider_noise(state.nominal, state.names, unexplained)
     if wider is None:
         return judged
@@ -132,7 +141,7 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
     if held is not None and not held.outcome.ok:
         faults.append(held.outcome.text)
     if state.rounds:
-        if not _independent_of_step(state.fit):
+        if not independent_of_step(state.fit):
             faults.append("An effect moves when the integration is refined: it may be the solver's own error.")
         if not state.fit.outcome.ok:
             faults.append(state.fit.outcome.text)
@@ -155,8 +164,14 @@ def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcom
     return "named", DiagnosisCode.NAMED.outcome(f"One set of effects explains the records.{excluded}")
 
 
-def _independent_of_step(fit: Refit) -> bool:
-    """Whether the sizes stay within a standard deviation when the simulation is ten times finer."""
+def independent_of_step(fit: Refit) -> bool:
+    """Whether the sizes stay within a standard deviation when the simulation is ten times finer.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with effects.
+    """
     structure = replace(fit.structure, tolerance=fit.structure.tolerance / 10.0)
     finer = Whitened(structure, fit.whiteners).residual(fit.v)
     scale = np.linalg.norm(fit.J, axis=0)

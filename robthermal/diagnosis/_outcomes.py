@@ -28,6 +28,8 @@ class DiagnosisCode(OutcomeCode):
     INEXACT = (False, "The convex program was not solved.",
                "Do not rely on this selection where `kkt` is large.")
     NAMED = (True, "One set of effects explains the records.")
+    NAMED_WITH_REMAINDER = (True, "One set of effects is reproducibly better than every other; what is left beyond the "
+                            "noise is stated, and has no name.")
     NONE = (False, "The records are as likely without any extra heat into the lump.",
             "Look at another lump: rt.diagnosis.locate ranks them.")
     NOTHING = (True, "No candidate stands out of the noise.")

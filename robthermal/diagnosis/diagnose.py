@@ -9,25 +9,18 @@ from threadpoolctl import threadpool_limits
 
 from ..fitting import Choice
 from ..thermal import System
+from ._graded import evidence_of, graded
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
+from ._searching import searched
 from .data import Measured, as_measured, noise_floor
 from .diagnosis import Diagnosis, Found
 from .effects import candidates
-from .evidence import Gap, expected_rms, locate, refuse_seen, unknown_heat, validation_data
-from .fit import Refit, SessionGain, refit
+from .evidence import Evidence, Gap, expected_rms, locate, refuse_seen, remainder, sandwich, unknown_heat
+from .fit import Refit, SessionGain, exact, refit
 from .plan import NextExperiment, next_experiment, rivals, trial_conditions
-from .search import (
-    Accepted,
-    SearchState,
-    accept,
-    begin,
-    compare,
-    quantities_of,
-    refit_candidates,
-    revise,
-    shortlist,
-    validate,
-)
+from .search import Accepted, SearchState, quantities_of
+
+_NOISE_ONLY = 1.5  # whitened variance
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -99,52 +92,10 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("refitting the nominal system")
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
-    progress("trying every effect of the catalog at every place")
-    state = revised_search(accepted_effects(begin(nominal, names), progress), progress)
-    if state.rounds and validation is not None and not state.misfit_left:
-        progress("testing on the validation data whether any effect is contradicted")
-        state = validate(state, validation_data(state.fit, validation, operating_point))
-    judged = judge(state, checked, progress)
+    judged = judge(searched(nominal, names, checked, progress), checked, progress)
+    judged = graded(reconsider_noise(judged, checked), checked, progress)
     progress("locating the misfit and planning the next experiment")
-    return concluded(reconsider_noise(judged, checked))
-
-
-def accepted_effects(state: SearchState, progress: Progress) -> SearchState:
-    """Add effects one by one while any is beyond doubt.
-
-    Parameters
-    ----------
-    state : SearchState
-        State from `begin`.
-    progress : callable
-        Called with a sentence before every stage.
-    """
-    while not state.complete:
-        if state.rounds:
-            progress(f"trying every effect again beside {len(state.rounds)} accepted")
-        state = shortlist(state)
-        if not state.complete:
-            progress("refitting the best candidates")
-            state = accept(refit_candidates(state))
-    return state
-
-
-def revised_search(state: SearchState, progress: Progress) -> SearchState:
-    """Revise the effects that were added before others were known, and compare with all selected at once.
-
-    Parameters
-    ----------
-    state : SearchState
-        Complete state of the search.
-    progress : callable
-        Called with a sentence before every stage.
-    """
-    if len(state.rounds) > 1 and not state.misfit_left:
-        progress(f"choosing each of {len(state.rounds)} effects again beside the others")
-    state = revise(state)
-    if len(state.rounds) > 1 and not state.misfit_left:
-        progress("selecting all effects at once, to compare")
-    return compare(state)
+    return concluded(judged)
 
 
 def concluded(judged: Judged) -> Diagnosis:
@@ -155,24 +106,43 @@ def concluded(judged: Judged) -> Diagnosis:
     judged : Judged
         State of the search with its tests and verdict.
     """
-    state, fit, nominal = judged.state, judged.state.fit, judged.state.nominal
-    found = tuple(_found(fit, i, round_) for i, round_ in enumerate(state.rounds))
-    named = judged.verdict in ("named", "ambiguous")
+    state, nominal = judged.state, judged.state.nominal
+    named = judged.verdict in ("named", "named_with_remainder", "ambiguous")
+    unexplained = judged.verdict == "unexplained" and bool(nominal.records)
+    fit = judged.plain or (exact(state.fit) if unexplained else state.fit)
+    found = _all_found(judged, named)
     gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit), fit.unit)}
     if judged.hold_out is not None:
         gap["validation"] = judged.hold_out.gap
     where = locate(nominal)
-    unexplained = judged.verdict == "unexplained" and bool(nominal.records)
-    return Diagnosis(
+    rest = remainder(fit, gap) if unexplained or judged.plain is not None else None
+    diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),
         system=fit.system if named else nominal.system, gap=gap, located=where,
         not_testable=_hidden(state) | state.scores.not_testable,
-        next_experiment=_plan(state.rounds) if named else None,
-        outcome=replace(judged.outcome, text=" ".join([judged.outcome.text, *fit.contradictions])),
+        next_experiment=_plan(state.rounds) if named else None, outcome=judged.outcome,
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
-        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None)
+        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest)
+    said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions]
+    return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
+
+
+def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:
+    """Accepted effects; named ones with the evidence for each."""
+    state, evidence = judged.state, judged.evidence
+    if named and not evidence:
+        evidence = evidence_of(state.rounds, state.fit, state.nominal)
+    return tuple(_found(state.fit, i, round_, evidence[i] if named else None, judged.plain is not None)
+                 for i, round_ in enumerate(state.rounds))
+
+
+def _resolves(state: SearchState) -> str:
+    """What would resolve the remainder."""
+    if state.fit.structure.n_coarse and state.fit.variance < _NOISE_ONLY:
+        return "A finer network would resolve it: split that lump."
+    return "A sensor in that lump, an input that drives it alone, or a finer network there would resolve it."
 
 
 def _hidden(state: SearchState) -> dict[Name, str]:
@@ -182,11 +152,26 @@ def _hidden(state: SearchState) -> dict[Name, str]:
             if c.key not in tested and (why := state.nominal.structure.hides(c))}
 
 
-def _found(fit: Refit, place: int, round_: Accepted) -> Found:
-    best = round_.best
+def _found(fit: Refit, place: int, round_: Accepted, evidence: Evidence | None, rest: bool) -> Found:
+    best, values = round_.best, quantities_of(fit, place)
+    if rest:
+        values = _with_remainder(fit, place, values)
     units = {q.name: q.unit for q in best.candidate.effect.quantities}
-    values = {name: (value, std, units[name]) for name, (value, std) in quantities_of(fit, place).items()}
-    return Found(best.candidate.effect.name, best.candidate.where, values, best.p_value, best.delta_bic)
+    return Found(best.candidate.effect.name, best.candidate.where,
+                 {name: (value, std, units[name]) for name, (value, std) in values.items()}, best.p_value,
+                 best.delta_bic, evidence)
+
+
+def _with_remainder(fit: Refit, place: int, values: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Values with standard deviations that include the remainder."""
+    structure = fit.structure
+    free = structure.effects[place].effect.free
+    at = structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])
+    out = dict(values)
+    for quantity, std in zip(free, sandwich(fit, range(at, at + len(free))), strict=True):
+        value = values[quantity.name][0]
+        out[quantity.name] = value, float(std * value if quantity.lower > 0 else std)
+    return out
 
 
 def _plan(rounds: tuple[Accepted, ...]) -> NextExperiment | None:

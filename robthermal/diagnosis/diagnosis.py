@@ -16,7 +16,7 @@ from ._file import write_json
 from ._judge import Name, Verdict
 from .data import NoiseEstimate
 from .effects import Candidate
-from .evidence import Adequacy, Gap, HoldOut, Location, Scores, UnknownHeat
+from .evidence import Adequacy, Evidence, Gap, HoldOut, Location, Remainder, Scores, UnknownHeat
 from .fit import Refit
 from .plan import NextExperiment
 from .search import Accepted, JointCheck, ruled_out
@@ -38,6 +38,8 @@ class Found:
         Family-wise p-value of its score.
     delta_bic : float
         Against the model without it; above 10 is very strong.
+    evidence : Evidence, optional
+        Share of the gap, blocks and segments; None for a provisional effect.
     """
 
     effect: str
@@ -45,6 +47,7 @@ class Found:
     values: dict[str, tuple[float, float, str]]
     p_value: float
     delta_bic: float
+    evidence: Evidence | None = None
 
     @property
     def label(self) -> str:
@@ -58,8 +61,9 @@ class Diagnosis:
 
     Parameters
     ----------
-    verdict : {"named", "ambiguous", "consistent", "unexplained"}
-        One set of effects explains the records; several do; nothing is missing; nothing known explains them.
+    verdict : {"named", "named_with_remainder", "ambiguous", "consistent", "unexplained"}
+        One set of effects explains the records down to the noise; one set is reproducibly better than every other, and
+        something is left beyond the noise; several sets are; nothing is missing; nothing known explains them.
     effects : tuple of Found
         In order of acceptance; empty unless named or ambiguous.
     alternatives : tuple of tuple
@@ -84,6 +88,8 @@ class Diagnosis:
         Two effects or more compared with a selection of all at once; None with fewer.
     unknown_heat : UnknownHeat or None
         If nothing known explains the records: the heat into the most suspect lump that would; None otherwise.
+    remainder : Remainder or None
+        What is left beyond the noise; None if nothing is.
     """
 
     verdict: Verdict
@@ -105,6 +111,7 @@ class Diagnosis:
     hold_out: HoldOut | None
     joint: JointCheck | None = None
     unknown_heat: UnknownHeat | None = None
+    remainder: Remainder | None = None
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
@@ -154,7 +161,7 @@ class Diagnosis:
         """
         plan = self.next_experiment
         return {
-            "format": "robthermal-diagnosis/1",
+            "format": "robthermal-diagnosis/2",
             "verdict": self.verdict,
             "effects": [_plain(found) for found in self.effects],
             "alternatives": [[{"effect": effect, "where": list(where)} for effect, where in others]
@@ -170,6 +177,7 @@ class Diagnosis:
                 **({} if plan.measurement is None else {"measure": vars(plan.measurement)}),
                 "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
             "provisional": [_plain(found) for found in self.provisional],
+            "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "outcome": vars(self.outcome),
             **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
         }
@@ -186,6 +194,10 @@ class Diagnosis:
 
 
 def _plain(found: Found) -> dict[str, Any]:
+    one = found.evidence
+    graded = {} if one is None else {"share": one.share, "reproducible": one.reproducible,
+                                     "stability": vars(one.stability)}
     return {"effect": found.effect, "where": list(found.where), "p_value": found.p_value, "delta_bic": found.delta_bic,
+            **graded,
             "parameters": {name: {"value": value, "std": std, "unit": unit}
                            for name, (value, std, unit) in found.values.items()}}

@@ -69,7 +69,10 @@ def test_a_lag_is_the_closed_form():
 def test_a_null_is_as_coarse_as_asked_for_and_says_nothing():
     one = made(Case("bar", "nothing", "nothing", 0))
     assert one.truth == [] and 1.4 < one.discrete < 11.0
-    assert rt.diagnosis.refit(one.system, one.train).variance == pytest.approx(one.discrete, rel=0.05)
+    fit = rt.diagnosis.refit(one.system, one.train)
+    noise = next(iter(one.system.sensors.values())).noise
+    assert fit.rms / noise == pytest.approx(one.discrete**0.5, rel=0.05)
+    assert one.coarse == pytest.approx((fit.rms**2 - noise**2) ** 0.5, rel=0.1)
 
 
 def test_seeds_and_keys():

@@ -61,7 +61,7 @@ def test_hidden_mass_is_named_saved_and_its_system_loads(plant: rt.System, hide:
     assert values["time_constant"][0] == pytest.approx(tau, rel=0.1)
     found.save(tmp_path / "diagnosis.json")
     saved = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
-    assert saved["format"] == "robthermal-diagnosis/1" and saved["verdict"] == "named"
+    assert saved["format"] == "robthermal-diagnosis/2" and saved["verdict"] == "named"
     assert saved["effects"][0]["parameters"]["capacity"]["unit"] == "J/K"
     assert set(saved["gap"]) == {"train", "validation"}
     rt.thermal.write_system(found.system, tmp_path / "augmented.toml")

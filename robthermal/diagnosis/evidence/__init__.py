@@ -2,6 +2,13 @@
 
 from ._adequacy import Adequacy as Adequacy
 from ._adequacy import adequacy as adequacy
+from ._blocks import NEEDED as NEEDED
+from ._blocks import SURE as SURE
+from ._blocks import Evidence as Evidence
+from ._blocks import Stability as Stability
+from ._blocks import reproducible as reproducible
+from ._blocks import sandwich as sandwich
+from ._blocks import stability as stability
 from ._hold_out import Gap as Gap
 from ._hold_out import HoldOut as HoldOut
 from ._hold_out import ValidationResiduals as ValidationResiduals
@@ -12,6 +19,10 @@ from ._hold_out import refuse_seen as refuse_seen
 from ._hold_out import validation_data as validation_data
 from ._locate import Location as Location
 from ._locate import locate as locate
+from ._remainder import Left as Left
+from ._remainder import Remainder as Remainder
+from ._remainder import left as left
+from ._remainder import remainder as remainder
 from ._score import ALPHA as ALPHA
 from ._score import BIC_GAP as BIC_GAP
 from ._score import Scores as Scores
@@ -23,7 +34,8 @@ from ._score import score_candidates as score_candidates
 from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
-__all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Gap", "HoldOut", "Location", "Scores", "UnknownHeat",
-           "ValidationResiduals", "adequacy", "expected_rms", "explains", "hold_out", "locate",
-           "negative_log_predictive_density", "promised", "promising", "refuse_seen", "score", "score_candidates",
-           "unknown_heat", "validation_data"]
+__all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED", "Remainder",
+           "SURE", "Scores", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "expected_rms", "explains",
+           "hold_out", "left", "locate", "negative_log_predictive_density", "promised", "promising", "refuse_seen",
+           "remainder", "reproducible", "sandwich", "score", "score_candidates", "stability", "unknown_heat",
+           "validation_data"]

@@ -15,7 +15,7 @@ from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
 from ..fit import Point, Refit, Structure, Whitened, descend, filters
-from ..path import Linearized, White, gathered, linearized_records
+from ..path import Linearized, LinearizedRecord, White, gathered, linearized_records
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -370,14 +370,21 @@ def expected_rms(fit: Refit, data: Sequence[RecordData] | None = None) -> float:
     total, count = 0.0, 0
     every = [name for path in linearized_records(paths) for name in path.one.sensors]
     for path in linearized_records(paths):
-        noise, disturbance = fit.levels.of(path, fit.floor)
-        slow = fit.levels.slow(path, fit.floor)
         own = counted(fit.system, path.one.sensors, every)
-        spread = float(noise[own] @ noise[own]) + (0.0 if slow is None else float(slow.std[own] @ slow.std[own]))
-        A, P = path.steps[0], np.zeros(path.M.shape[1:])
-        Q = gathered(path, disturbance)
-        for k in range(len(A)):
-            total += float(np.trace(path.C[k][own] @ P @ path.C[k][own].T)) + spread
-            P = A[k] @ P @ A[k].T + Q[k]
+        total += len(path.one.readings) * float(expected_squares(fit, path)[own].sum())
         count += len(path.one.readings) * int(own.sum())
     return float(np.sqrt(total / count)) if count else 1.0
+
+
+def expected_squares(fit: Refit, path: LinearizedRecord) -> Array:
+    """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²]."""
+    noise, disturbance = fit.levels.of(path, fit.floor)
+    slow = fit.levels.slow(path, fit.floor)
+    A, P = path.steps[0], np.zeros(path.M.shape[1:])
+    total = np.zeros(noise.size)
+    if disturbance.any():
+        Q = gathered(path, disturbance)
+        for k in range(len(A)):
+            total += np.einsum("si,ij,sj->s", path.C[k], P, path.C[k])
+            P = A[k] @ P @ A[k].T + Q[k]
+    return np.asarray(total / len(A) + noise**2 + (0.0 if slow is None else slow.std**2), np.float64)

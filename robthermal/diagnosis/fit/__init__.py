@@ -10,6 +10,7 @@ from ._refit import Refit as Refit
 from ._refitting import ENOUGH as ENOUGH
 from ._refitting import LIMIT as LIMIT
 from ._refitting import coarsened as coarsened
+from ._refitting import exact as exact
 from ._refitting import extended as extended
 from ._refitting import filters as filters
 from ._refitting import fitted as fitted
@@ -20,5 +21,5 @@ from ._structure import Structure as Structure
 from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain", "Structure", "WIDE",
-           "Whitened", "coarsened", "descend", "extended", "filters", "fitted", "refit", "relinearized",
+           "Whitened", "coarsened", "descend", "exact", "extended", "filters", "fitted", "refit", "relinearized",
            "with_slow_part"]

@@ -125,6 +125,16 @@ def coarsened(fit: Refit) -> Refit:
     return fitted(finer, np.concatenate([fit.v[:n], np.zeros(finer.n_coarse), own]), fit.floor, NoiseScaling(1.0, {}))
 
 
+def exact(fit: Refit) -> Refit:
+    """The same structure refitted with the network taken to be right, and noise no larger than declared."""
+    structure = replace(fit.structure, coarse=())
+    n = structure.n_common
+    v = np.concatenate([fit.v[:n], fit.v[fit.structure.n_common:]])
+    start = fitted(structure, v, fit.floor, NoiseScaling(1.0, {})) if fit.structure.coarse else fit
+    noise = {name: min(factor, 1.0) for name, factor in fit.levels.noise.items()}
+    return replace(start, levels=replace(fit.levels, disturbance=min(fit.levels.disturbance, 1.0), noise=noise))
+
+
 def relinearized(fit: Refit) -> Refit:
     """The same with linearizations of its own structure; `extended` keeps those of the structure it came from."""
     return replace(fit, paths=fit.structure.paths(fit.v))

@@ -8,6 +8,7 @@ from ._linearized import Unknowns as Unknowns
 from ._linearized import White as White
 from ._linearized_record import N_SPLINES as N_SPLINES
 from ._linearized_record import LinearizedRecord as LinearizedRecord
+from ._linearized_record import heat_splines as heat_splines
 from ._linearized_record import linearized_record as linearized_record
 from ._linearized_response import LinearizedResponse as LinearizedResponse
 from ._linearized_response import linearized_response as linearized_response
@@ -18,5 +19,5 @@ from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
 __all__ = ["Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise", "Unknowns", "White",
-           "Whitener", "coarse_names", "gathered", "linearize", "linearized_record", "linearized_records",
-           "linearized_response", "settled_cost", "whitener"]
+           "Whitener", "coarse_names", "gathered", "heat_splines", "linearize", "linearized_record",
+           "linearized_records", "linearized_response", "settled_cost", "whitener"]

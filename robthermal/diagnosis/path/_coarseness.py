@@ -15,48 +15,15 @@ G is the conductance within a lump, twice that to all its neighbors. A lump with
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...thermal import Equations, System
-from ...thermal.effects import Response
+from ...thermal import System
+from ...thermal.effects import RecordContext, Response
 
 Array = NDArray[np.float64]
 _SHARE = 0.25  # of a difference, of a heat, of a capacity: half a lump away is 0.5
-
-
-class SimulatedRecord(Protocol):
-    """What is asked of a linearized record: the simulation it stands beside."""
-
-    @property
-    def system(self) -> System:
-        """The system with the initial temperatures of the record."""
-
-    @property
-    def equations(self) -> Equations:
-        """Its equations."""
-
-    @property
-    def h(self) -> float:
-        """Sample time [s]."""
-
-    @property
-    def x(self) -> Array:
-        """Lump temperatures (n, n_lumps) [K]."""
-
-    @property
-    def end(self) -> Array:
-        """Lump temperatures at the end of every sample (n, n_lumps) [K]."""
-
-    @property
-    def u(self) -> Array:
-        """Held inputs, in the order of `System.exogenous_names`."""
-
-    @property
-    def readings(self) -> Array:
-        """Simulated readings of all sensors."""
 
 
 def coarse_names(base: System) -> list[str]:
@@ -70,8 +37,7 @@ def coarse_names(base: System) -> list[str]:
     near, far = _conductances(base)
     out = [f"capacity between {a} and {b}" for a, b in _pairs(near)]
     out += [f"place of heater {name} toward {b}" for name, one in base.inputs.items() for b in near[one.lump]]
-    for name, sensor in base.sensors.items():
-        a = sensor.lump
+    for name, a in _read(base).items():
         if near[a]:
             out += [f"place of sensor {name} toward {b}" for b in [*near[a], *far[a]]]
             out += [f"place of sensor {name} near heater {q}" for q, one in base.inputs.items() if one.lump == a]
@@ -79,12 +45,12 @@ def coarse_names(base: System) -> list[str]:
     return out
 
 
-def coarse_responses(path: SimulatedRecord, base: System) -> Iterator[Response]:
+def coarse_responses(path: RecordContext, base: System) -> Iterator[Response]:
     """Every way in which the network may be too coarse along a record, b = 1, in the order of `coarse_names`.
 
     Parameters
     ----------
-    path : SimulatedRecord
+    path : RecordContext
         Model beside a record; it may have more lumps than the network.
     base : System
         Network without added effects.
@@ -110,8 +76,7 @@ def coarse_responses(path: SimulatedRecord, base: System) -> Iterator[Response]:
     for name, one in base.inputs.items():
         for b in near[one.lump]:
             yield heat(b, one.lump, _SHARE * one.gain * u[name])
-    for name, sensor in base.sensors.items():
-        a = sensor.lump
+    for name, a in _read(base).items():
         if not near[a]:
             continue
         inside, own = 2.0 * sum(near[a].values()), T[:, at[a]]
@@ -123,6 +88,11 @@ def coarse_responses(path: SimulatedRecord, base: System) -> Iterator[Response]:
             if one.lump == a:
                 yield reading(name, _before(one.gain * u[q]) / inside)
         yield reading(name, -C[at[a]] * _SHARE / inside * _before(rate[:, at[a]]))
+
+
+def _read(base: System) -> dict[str, str]:
+    """The lump of every thermometer."""
+    return {name: base.sensors[name].lump for name in base.thermometers}
 
 
 def _before(held: Array) -> Array:

@@ -14,8 +14,10 @@ from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
 from ._resolve_alternatives import ruled_out as ruled_out
 from ._revise import needed as needed
 from ._revise import revised as revised
+from ._revise import without as without
 from ._short_list import Entry as Entry
 from ._short_list import ShortList as ShortList
+from ._short_list import beside as beside
 from ._short_list import leaves_large_misfit as leaves_large_misfit
 from ._short_list import quantities_of as quantities_of
 from ._short_list import refit_short_list as refit_short_list
@@ -30,7 +32,7 @@ from ._state import SearchState as SearchState
 from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState", "ShortList",
-           "accept", "begin", "checked_jointly", "compare", "decide", "leaves_large_misfit", "needed",
+           "accept", "begin", "beside", "checked_jointly", "compare", "decide", "leaves_large_misfit", "needed",
            "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise",
            "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_wider_noise",
-           "without_contradicted"]
+           "without", "without_contradicted"]

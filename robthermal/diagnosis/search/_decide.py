@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..evidence import ALPHA, BIC_GAP
+from ..evidence import ALPHA, BIC_GAP, SURE, reproducible
 from ..fit import Refit, fitted
 from ._short_list import Entry, ShortList, refiltered
 
@@ -118,7 +118,7 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
     near = [entry for entry in entries if best.delta_bic - entry.delta_bic < _CONTENDERS]
     again = sorted(refiltered(before, renewed, near), key=lambda entry: -entry.delta_bic)
     winner = again[0]
-    others = tuple(entry for entry in again[1:] if winner.delta_bic - entry.delta_bic < BIC_GAP)
+    others = tuple(entry for entry in again[1:] if _as_good(entry, winner))
     if winner.fit.structure is best.fit.structure:
         winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.aliases)
     else:
@@ -127,3 +127,10 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
                                                    if e.fit.structure is winner.fit.structure), winner.p_value,
                        winner.aliases)
     return Accepted(before, best=winner, contenders=others)
+
+
+def _as_good(entry: Entry, winner: Entry) -> bool:
+    """Whether the records cannot exclude an entry; where the model is not exact the scatter over blocks decides too."""
+    if winner.delta_bic - entry.delta_bic < BIC_GAP:
+        return True
+    return bool(winner.fit.structure.coarse) and reproducible(winner.fit, entry.fit) < SURE

@@ -159,6 +159,32 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
     return ShortList(fit, tuple(_reconsidered(fit, map(finished, competitive(entries)), tried)), failed)
 
 
+def beside(short: ShortList, found: Entry) -> ShortList:
+    """The list with a candidate found before, refitted from there.
+
+    Parameters
+    ----------
+    short : ShortList
+        Candidates refitted on the same nominal system, with a network that may be too coarse.
+    found : Entry
+        Candidate as it was found with the network taken to be right.
+    """
+    try:
+        keys = [candidate.key for candidate in found.fit.structure.effects]
+        place = keys.index(found.candidate.key)
+        structure = short.before.structure.with_effect(found.fit.structure.effects[place])
+        v = structure.carried(found.fit.structure, found.fit.v, [found.fit.structure.quantities(found.fit.v)[place]])
+        new = extended(short.before, structure, v, _LAST)
+    except (Diverged, InputError):
+        return short
+    own = Entry(found.candidate, new, delta_bic(short.before, new), found.p_value, found.aliases)
+    others = [entry for entry in short.entries if entry.candidate.key != own.candidate.key
+              or entry.delta_bic > own.delta_bic]
+    if len(others) == len(short.entries) and any(entry.candidate.key == own.candidate.key for entry in others):
+        return short
+    return replace(short, entries=tuple(sorted([own, *others], key=lambda entry: -entry.delta_bic)))
+
+
 def _reconsidered(before: Refit, entries: Iterable[Entry], tried: Key | None) -> list[Entry]:
     """By ΔBIC; the best and what comes near it from other times, too, unless all of them leave a large misfit."""
     ordered = sorted(entries, key=lambda entry: -entry.delta_bic)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..data import DataSet
-from ..evidence import Scores, explains, promising, score
+from ..evidence import Scores, explains, promised, promising, score
 from ..fit import Refit, coarsened
 from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
@@ -18,6 +18,7 @@ from ._state import SearchState
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
+_LITTLE = 0.04  # of the sum of squares: to first order a finer network is described no better than that
 _LEAST = 0.3  # share of a large misfit that the last effect allowed must promise: it has to explain all of it
 
 
@@ -48,7 +49,7 @@ def shortlist(state: SearchState) -> SearchState:
         return replace(state, complete=True)
     scores = score(state.fit, state.names) if state.rounds else state.scores
     state = replace(state, current=scores)
-    if not promising(state.fit, scores):
+    if not promising(state.fit, scores) or _too_little(state.fit, scores):
         return replace(state, complete=True)
     if len(state.rounds) == MOST_EFFECTS - 1 and too_much_left(state.fit, scores):
         return replace(state, complete=True, misfit_left=True)
@@ -133,6 +134,12 @@ def validate(state: SearchState, data: Sequence[DataSet]) -> SearchState:
             break
         rounds, fit = revised(fewer, state.nominal, state.names) if fewer else (fewer, less)
     return replace(state, rounds=rounds, fit=fit)
+
+
+def _too_little(fit: Refit, scores: Scores) -> bool:
+    """Whether, beside a network that may be too coarse, no candidate explains more than that may have left."""
+    least = min((promised(fit, scores, i) for i in scores.order), default=fit.rss)
+    return bool(fit.structure.coarse) and least > (1.0 - _LITTLE) * fit.rss
 
 
 def too_much_left(fit: Refit, scores: Scores) -> bool:

@@ -10,6 +10,8 @@ from ._diagnose import Diagnosed
 
 _SENTENCE = {
     "named": "One set of effects explains the records: {names}.",
+    "named_with_remainder": "One set of effects is reproducibly better than every other: {names}. What is left beyond "
+                            "the noise is stated, and has no name.",
     "ambiguous": "Effects explain the records, but other ones do as well: {names}.",
     "consistent": "The system as it is explains the records; nothing is missing that they could show.",
     "unexplained": "None of the known effects explains the records.",

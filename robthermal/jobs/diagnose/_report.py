@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...diagnosis import Diagnosis, effects
+from ...diagnosis import Diagnosis, Found, effects
 from ...fitting import rmse
 from ...report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
 from ...signals import Record
@@ -18,6 +18,7 @@ from ..evidence import write_report
 from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance, subtitle
+from ._answer import answer_sentence
 from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._ranking import NOT_NEEDED, ranking
@@ -75,7 +76,7 @@ def diagnosis_report(result: Diagnosed) -> Report:
     """
     found = result.diagnosis
     return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
-                  claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)),
+                  claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
                   generated=now(), answer=found.verdict.upper())
 
@@ -105,6 +106,19 @@ def _write_experiment(found: Diagnosis, path: Path) -> None:
         inputs.save(path, temperature_unit=system.temperature_unit if ambients else "K", temperatures=ambients or None)
 
 
+def _first(result: Diagnosed) -> Section:
+    """One sentence, and the gap before and after beside it; what no fit has seen if there is any."""
+    found = result.diagnosis
+    return Section("What the records say", answer_sentence(found), anchor="answer",
+                   figures=[_figure(one, found) for one in _shown_first(result)])
+
+
+def _shown_first(result: Diagnosed) -> list[Residuals]:
+    """The record on the first screen: one that no fit has seen, if there is any."""
+    validation = [one for one in result.residuals if one.kind == "validation"]
+    return (validation or list(result.residuals))[:1]
+
+
 def _sections(result: Diagnosed) -> Iterator[Section]:
     found = result.diagnosis
     yield _effect_section(found)
@@ -130,18 +144,24 @@ def _candidate_tables(ranked: pd.DataFrame) -> tuple[Table, ...]:
 def _effect_section(found: Diagnosis) -> Section:
     listed = found.effects or found.provisional
     rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std, "unit": unit,
-             "ΔBIC": effect.delta_bic, "p": effect.p_value}
+             "ΔBIC": effect.delta_bic, "p": effect.p_value, **_evidence(effect)}
             for effect in listed for name, (value, std, unit) in effect.values.items()]
-    text = found.outcome.text
+    text = "augmented.toml holds these effects." if found.effects else "augmented.toml holds the system refitted."
     if found.provisional:
-        text += ("\n\nThe effects below help, but do not explain everything: they are not names, and augmented.toml "
-                 "does not hold them.")
+        text += " The effects below help, but do not explain everything: they are not names."
     tables = [Table(pd.DataFrame(rows), "Effects, in order of acceptance.")] if rows else []
     others = [{"accepted": effect.label, "cannot be excluded": f"{name}({', '.join(where)})"}
               for effect, names in zip(found.effects, found.alternatives, strict=True) for name, where in names]
     if others:
         tables.append(Table(pd.DataFrame(others), "What these records cannot tell from it."))
     return Section("What was found", text, tables=tables, anchor="effects")
+
+
+def _evidence(effect: Found) -> dict[str, float]:
+    """Columns that say how far a name can be relied on."""
+    one = effect.evidence
+    return {} if one is None else {"share of the gap": one.share, "better in blocks": one.reproducible,
+                                   "spread over segments": one.stability.spread}
 
 
 def _gap_section(result: Diagnosed) -> Section:
@@ -156,7 +176,7 @@ def _gap_section(result: Diagnosed) -> Section:
             "records have gains of their own, those, from the whole record).")
     if found.provisional:
         text += " The effects are provisional, not names."
-    figures = [_figure(one, found) for one in result.residuals]
+    figures = [_figure(one, found) for one in result.residuals if one not in _shown_first(result)]
     figures += [_spectrum(one) for one in result.residuals] + [_response(one) for one in result.responses]
     return Section("Residual before and after", text, figures=tuple(figures),
                    tables=(Table(pd.DataFrame(rows), "Residuals, root mean square; all sensors, then each."),),

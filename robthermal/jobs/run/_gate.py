@@ -117,7 +117,7 @@ def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Rea
 
 def _diagnosis(found: DiagnosisFacts, off: bool) -> Iterator[Reason]:
     codes = {"unexplained": GateCode.DIAGNOSIS_UNEXPLAINED, "ambiguous": GateCode.DIAGNOSIS_AMBIGUOUS,
-             "named": GateCode.DIAGNOSIS_NAMED}
+             "named": GateCode.DIAGNOSIS_NAMED, "named_with_remainder": GateCode.DIAGNOSIS_NAMED}
     if found.verdict not in codes:
         return
     code = codes[found.verdict]

@@ -15,6 +15,7 @@ from .machines import MACHINES, ROOM, Machine
 from .march import march
 
 H, SUB, N_TRAIN, N_UNSEEN = 6.0, 3, 1500, 900
+PAUSE = N_TRAIN * H + 1800.0  # s from the start of one record to that of the next: the clock runs on
 DISCRETE = (1.5, 10.0)  # whitened variance that the network's coarseness alone leaves
 STRENGTH = (3.0, 100.0)  # excess of the hidden effect, over that
 
@@ -108,7 +109,7 @@ class _Bench:
             hidden = MAKE[self.case.effect](m, self.where, size) if size else Hidden()
             fine = hidden.drive(np.repeat(U, SUB, axis=0), H / SUB)
             T0 = np.full(len(m.plant.capacity), U[0, -len(m.ambients)])
-            Y = march(m.plant, fine, T0, H, SUB, hidden.heats, self.shake(m, number))
+            Y = march(m.plant, fine, T0, H, SUB, hidden.heats, self.shake(m, number), number * PAUSE)
             for k, tau in hidden.lags.items():
                 Y[:, k] = lagged(Y[:, k], tau, H / SUB)
             for k, gain in hidden.gains.items():
@@ -132,7 +133,7 @@ class _Bench:
         rng = np.random.default_rng(self.noise_seed + number)
         return rt.Record(sample_time=H, inputs=self.U[number], outputs=Y + noise * rng.standard_normal(Y.shape),
                          input_names=self.columns, output_names=list(self.machine().plant.sensors),
-                         start_time=number * (N_TRAIN * H + 1800.0))
+                         start_time=number * PAUSE)
 
 
 def made(case: Case) -> Made:
@@ -148,7 +149,9 @@ def made(case: Case) -> Made:
         return bench.machine().network(noise, np.random.default_rng(told))
 
     def excess(Y: Array, noise: float) -> float:
-        return max(rt.diagnosis.refit(system(noise), bench.record(Y, 0, noise)).variance - 1.0, 1e-3)
+        fit = rt.diagnosis.refit(system(noise), bench.record(Y, 0, noise))
+        raised = float(np.mean(list(fit.levels.noise.values())) ** 2)  # its noise has grown with the misfit
+        return max(fit.variance * raised - 1.0, 1e-3)
 
     noise = 0.02
     for _ in range(5):

@@ -18,10 +18,10 @@ _D = 1.0 - 1.0 / (2.0 * _G)
 
 
 def march(plant: Field, U: Array, T0: Array, h: float, sub: int, heats: Sequence[Heat] = (),
-          shake: Array | None = None) -> Array:
+          shake: Array | None = None, start: float = 0.0) -> Array:
     """What the sensors see at every step, (n sub, n_sensors), with columns U (n sub, n_columns) held over every step.
 
-    `shake` (n sub, n_cells) is a random heat [W].
+    `shake` (n sub, n_cells) is a random heat [W]; the clock of the heats starts at `start` [s].
     """
     C, K, B = plant.matrices()
     dt = h / sub
@@ -43,7 +43,7 @@ def march(plant: Field, U: Array, T0: Array, h: float, sub: int, heats: Sequence
     T, out = np.array(T0, float), np.zeros((len(U), len(seen)))
     for k, u in enumerate(U):
         out[k] = seen @ T
-        t = k * dt
+        t = start + k * dt
         first = source(t, T, u, k)
         a = solve(C / dt * T + _G * first)
         second = source(t + _G * dt, a, u, k)

@@ -1,0 +1,158 @@
+"""The graded verdict: where no set of effects explains the records down to the noise, is one reproducibly better?
+
+The network is then allowed to be too coarse, and the search is repeated. What stays is named if it holds in block after
+block, keeps its size over the records, explains most of the gap, and closes it on validation data too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..errors import Diverged, InputError
+from ._judge import Judged, Progress, Validation, Verdict, alternatives, independent_of_step, judge
+from ._outcomes import DiagnosisCode
+from ._searching import coarsely_searched, validated
+from .evidence import NEEDED, Evidence, Gap, Stability, expected_rms, left, reproducible, stability
+from .fit import Refit, coarsened, exact
+from .search import Accepted, SearchState, ShortList, revise, without
+
+_SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
+_CLOSED = 0.3  # of the excess rms of the validation records
+
+
+def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple[Evidence, ...]:
+    """Evidence for every effect of a fit.
+
+    Parameters
+    ----------
+    rounds : sequence of Accepted
+        In the order of the effects of the fit.
+    fit, nominal : Refit
+        With all of them; without any.
+    """
+    if not rounds:
+        return ()
+    whole, bare = exact(fit), exact(nominal)
+    noise = expected_rms(whole) ** 2
+    excess = [max(bare.rms**2 - noise, 0.0)]
+    excess += [max(one.rms**2 - noise, 0.0) for one in _prefixes(whole, bare)]
+    out = []
+    for place, round_ in enumerate(rounds):
+        less = without(fit, place, nominal, round_.before)
+        plain = bare if len(rounds) == 1 else without(whole, place, bare)
+        before = max((whole if plain is None else plain).rms ** 2 - noise, 0.0)
+        out.append(Evidence(
+            share=(excess[place] - excess[place + 1]) / excess[0] if excess[0] > 0 else 0.0,
+            reproducible=0.0 if less is None else reproducible(fit, less),
+            stability=_stability(fit, place), needed=1.0 - excess[-1] / before if before > 0 else 0.0))
+    return tuple(out)
+
+
+def _stability(fit: Refit, place: int) -> Stability:
+    """Of the size of an effect, relative to it."""
+    structure = fit.structure
+    at = structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])
+    found, size = stability(fit, at), structure.effects[place].effect.size
+    scale = 1.0 if size.lower > 0 else abs(fit.v[at])  # a logarithm's spread is relative
+    return Stability(found.segments, found.spread / scale if scale > 0 else float("inf"))
+
+
+def _prefixes(whole: Refit, bare: Refit) -> list[Refit]:
+    """Fits with the first effect, the first two, and so on."""
+    out = [whole]
+    for place in range(len(whole.structure.effects) - 1, 0, -1):
+        out.append(without(out[-1], place, bare) or out[-1])
+    return out[::-1]
+
+
+def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged:
+    """Grade an answer that does not explain the records down to the noise.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer with the network taken to be right; returned as it is unless it is "unexplained" on records.
+    validation : Validation
+        Data that no fit has seen.
+    progress : callable
+        Called with a sentence before every stage.
+    """
+    state = judged.state
+    if judged.verdict != "unexplained" or not state.nominal.records:
+        return judged
+    try:
+        finer = coarsened(state.nominal)
+        if finer.structure.n_coarse:
+            state = coarsely_searched(finer, state, progress)
+        else:
+            finer = state.nominal
+        progress("testing over blocks, segments and validation data what may be named")
+        state, found = _lasting(state, finer)
+        if len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
+            state, found = _lasting(revise(replace(state, misfit_left=False)), finer)
+        if not found:
+            return _nothing_lasts(judged, finer)
+        return _graded(judged, validated(replace(state, misfit_left=False), validation, progress), finer, validation)
+    except (Diverged, InputError):  # a model that runs away is no explanation
+        return judged
+
+
+def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evidence, ...]]:
+    """The effects that hold over blocks and segments and are needed, the least needed one dropped first."""
+    rounds, fit = state.rounds, state.fit
+    found = evidence_of(rounds, fit, finer)
+    while not all(one.lasting for one in found):
+        worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
+        less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
+        if less is None:
+            return replace(state, rounds=(), fit=finer), ()
+        rounds, fit = rounds[:worst] + rounds[worst + 1:], less
+        if rounds and fit.structure.coarse:
+            fit = coarsened(fit)
+        if rounds:
+            rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
+        found = evidence_of(rounds, fit, finer)
+    return replace(state, nominal=finer, rounds=rounds, fit=fit), found
+
+
+def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:
+    """The verdict on what lasts."""
+    if not state.rounds:
+        return judged
+    fit, nominal = state.fit, judged.state.nominal
+    plain, bare = exact(fit), exact(nominal)
+    kept = replace(state, nominal=nominal, scores=judged.state.scores, short=ShortList(fit, (), {}), complete=True,
+                   joint=None)
+    down = judge(replace(kept, fit=plain), validation, lambda stage: None)
+    if down.verdict in ("named", "ambiguous"):
+        return down
+    held = validation.predicted(bare, plain)
+    gaps = [Gap(nominal.rms, plain.rms, expected_rms(plain))] + ([] if held is None else [held.gap])
+    if not _closes(gaps) or not independent_of_step(fit):
+        return judged
+    ambiguous = any(map(alternatives, state.rounds))
+    verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
+    code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
+    return Judged(state=kept, adequacy=down.adequacy, hold_out=held, verdict=verdict, outcome=code.outcome(),
+                  plain=plain, evidence=evidence_of(state.rounds, fit, finer))
+
+
+def _closes(gaps: Sequence[Gap]) -> bool:
+    """Whether most of the excess is gone on the training records, and enough of it on the validation records."""
+    if left(gaps[0]).share_explained < _SHARE:
+        return False
+    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in gaps[1:])
+
+
+def _nothing_lasts(judged: Judged, finer: Refit) -> Judged:
+    """The answer as it was; it says so if a finer network alone explains most of what is left."""
+    nominal = exact(judged.state.nominal)
+    if not finer.structure.n_coarse or nominal.variance < 1.0:
+        return judged
+    share = 1.0 - max(finer.variance - 1.0, 0.0) / max(judged.state.nominal.variance - 1.0, 1e-9)
+    if share < 1.0 - NEEDED:
+        return judged
+    text = ("No effect of the catalog is reproducibly better than none. What is left is what a finer network would "
+            "change: split the lumps where heat flows.")
+    return replace(judged, outcome=DiagnosisCode.UNEXPLAINED.outcome(text, remedy="Refine the network."))

@@ -1,0 +1,122 @@
+"""The search from its first stage to its last, with the network taken to be right and with one that is too coarse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ._judge import Progress, Validation
+from .evidence import validation_data
+from .fit import Refit, coarsened
+from .search import (
+    Accepted,
+    SearchState,
+    accept,
+    begin,
+    beside,
+    compare,
+    refit_candidates,
+    revise,
+    shortlist,
+    validate,
+)
+
+_NOISE_ONLY = 1.2  # whitened variance up to which a fit leaves noise, its level renewed
+
+
+def searched(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> SearchState:
+    """Search for effects with the network taken to be right.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Nominal system refitted.
+    names : tuple of str, optional
+        Effects to try; None for the whole catalog.
+    validation : Validation
+        Data that no fit has seen; they may take names back.
+    progress : callable
+        Called with a sentence before every stage.
+    """
+    progress("trying every effect of the catalog at every place")
+    state = accepted_effects(begin(nominal, names), progress)
+    if len(state.rounds) > 1 and not state.misfit_left:
+        progress(f"choosing each of {len(state.rounds)} effects again beside the others")
+    state = revise(state)
+    if len(state.rounds) > 1 and not state.misfit_left:
+        progress("selecting all effects at once, to compare")
+    return validated(compare(state), validation, progress)
+
+
+def coarsely_searched(finer: Refit, exact: SearchState, progress: Progress) -> SearchState:
+    """Search for effects beside a network that may be too coarse; nothing is revised yet.
+
+    Parameters
+    ----------
+    finer : Refit
+        Nominal system refitted together with what a finer network would change.
+    exact : SearchState
+        Search with the network taken to be right; its first effect is tried from where it was found.
+    progress : callable
+        Called with a sentence before every stage.
+    """
+    progress("allowing for a network that is too coarse, and searching again")
+    return accepted_effects(begin(finer, exact.names), progress, exact.rounds[0] if exact.rounds else None)
+
+
+def validated(state: SearchState, validation: Validation, progress: Progress) -> SearchState:
+    """Take back what validation data contradict.
+
+    Parameters
+    ----------
+    state : SearchState
+        Complete state of the search.
+    validation : Validation
+        Data that no fit has seen.
+    progress : callable
+        Called with a sentence before every stage.
+    """
+    if not state.rounds or validation.data is None or state.misfit_left:
+        return state
+    progress("testing on the validation data whether any effect is contradicted")
+    return validate(state, validation_data(state.fit, validation.data, validation.operating_point))
+
+
+def accepted_effects(state: SearchState, progress: Progress, known: Accepted | None = None) -> SearchState:
+    """Add effects one by one while any is beyond doubt.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `begin`.
+    progress : callable
+        Called with a sentence before every stage.
+    known : Accepted, optional
+        Effect found before, on the same nominal system; it is a candidate of the first round.
+    """
+    while not state.complete:
+        if state.rounds:
+            progress(f"trying every effect again beside {len(state.rounds)} accepted")
+        state = shortlist(state)
+        if not state.complete:
+            progress("refitting the best candidates")
+            state = refit_candidates(state)
+            if known is not None and not state.rounds:
+                state = replace(state, short=beside(state.short, known.best))
+            state = accept(state)
+            if _only_coarse(state):
+                state = replace(state, complete=True, misfit_left=True)
+    return state
+
+
+def _only_coarse(state: SearchState) -> bool:
+    """Whether what is left beside the effects accepted is what a finer network would change: no more effects then."""
+    fit = state.fit
+    if state.complete or fit.structure.coarse or not fit.records or _noise_only(fit):
+        return False
+    finer = coarsened(fit)
+    return bool(finer.structure.n_coarse) and _noise_only(finer)
+
+
+def _noise_only(fit: Refit) -> bool:
+    """Whether a fit leaves noise of the declared level: where more is left, the level has been raised to its limit."""
+    return fit.variance < _NOISE_ONLY and not fit.levels.exhausted

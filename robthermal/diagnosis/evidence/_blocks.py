@@ -1,0 +1,157 @@
+"""Evidence that knows model error: what holds in block after block of the records, not only in their sum.
+
+A remainder is no white noise: neighboring residuals share it. Blocks that are long against it are repetitions of the
+experiment; what differs between them is the scatter that a statement has to exceed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fit import Refit
+
+Array = NDArray[np.float64]
+BLOCKS = 24  # of all records together, at least
+SURE = 0.95  # share of the draws
+SEGMENTS = 6  # of all records together, at least
+WIDEST = 0.5  # spread of a size over segments, relative: beyond, it is no constant
+NEEDED = 0.3  # of what is left without it, that an effect must explain
+_DRAWS = 2000
+_SEED = 20  # of the bootstrap: an answer does not change when it is asked again
+
+
+@dataclass(frozen=True)
+class Stability:
+    """How an estimate agrees with itself over the records.
+
+    Parameters
+    ----------
+    segments : int
+        Number of segments that tell anything about it.
+    spread : float
+        Standard deviation of the segments' estimates, weighted by what they tell, over the size of the estimate.
+    """
+
+    segments: int
+    spread: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How far one effect of a set can be relied on where the model is not exact.
+
+    Parameters
+    ----------
+    share : float
+        Part of the excess mean square of the training records that it removed, in order of acceptance [-].
+    reproducible : float
+        Share of bootstrap draws of blocks in which the set with it is better than without it [-].
+    stability : Stability
+        Spread of its size over segments.
+    needed : float
+        Part of the excess mean square left without it that it removes [-].
+    """
+
+    share: float
+    reproducible: float
+    stability: Stability
+    needed: float
+
+    @property
+    def lasting(self) -> bool:
+        """Whether it holds over blocks and segments and is needed."""
+        return (self.reproducible >= SURE and self.stability.spread <= WIDEST and self.stability.segments > 1
+                and self.needed >= NEEDED)
+
+
+def reproducible(with_it: Refit, without: Refit) -> float:
+    """Share of bootstrap draws of blocks in which one fit has the smaller sum of squares.
+
+    Parameters
+    ----------
+    with_it, without : Refit
+        Fits to the same data with the same filters.
+    """
+    gain = block_sums(without, without.z**2) - block_sums(with_it, with_it.z**2)
+    draws = np.random.default_rng(_SEED).integers(gain.size, size=(_DRAWS, gain.size))
+    return float(np.mean(gain[draws].sum(axis=1) > 0.0))
+
+
+def block_sums(fit: Refit, rows: Array, count: int = BLOCKS) -> Array:
+    """Sums (n_blocks, ...) of rows (m, ...) over consecutive stretches of every data set; priors are left out.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit whose rows they are.
+    rows : ndarray, shape (m, ...)
+        One per whitened reading, then those of the priors.
+    count : int
+        Blocks of all data together, at least.
+    """
+    each = max(2, -(-count // len(fit.structure.data)))
+    out, row = [], 0
+    for one in fit.structure.data:
+        n, n_sensors = one.readings.shape
+        own = rows[row:row + n * n_sensors].reshape(n, n_sensors, -1).sum(axis=1)
+        out += [part.sum(axis=0) for part in np.array_split(own, each)]
+        row += n * n_sensors
+    return np.array(out).reshape(len(out), *rows.shape[1:])
+
+
+def stability(fit: Refit, column: int) -> Stability:
+    """Spread of one unknown over segments: one linear solve on the whitened derivatives, all others moving freely.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with the unknown.
+    column : int
+        Place of the unknown.
+    """
+    own = _alone(fit, column)
+    weight = block_sums(fit, own**2, SEGMENTS)
+    told = weight > 0.02 * weight.sum() / max(weight.size, 1)
+    moved = block_sums(fit, own * fit.z, SEGMENTS)[told] / weight[told]
+    if not told.any():
+        return Stability(0, float("inf"))
+    share = weight[told] / weight[told].sum()
+    scatter = float(np.sqrt(np.sum(share * (moved - share @ moved) ** 2)))
+    return Stability(int(told.sum()), scatter)
+
+
+def sandwich(fit: Refit, columns: Sequence[int]) -> Array:
+    """Standard deviations of unknowns in the optimizer's coordinates that include the remainder.
+
+    The scores of blocks, which a remainder makes larger than noise would, take the place of the information (White
+    1980; blocks as clusters); never below that of the model.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with the unknowns.
+    columns : sequence of int
+        Places of the unknowns.
+    """
+    out = []
+    for column in columns:
+        own = _alone(fit, column)
+        power = float(own @ own)
+        scores = block_sums(fit, own * fit.z)
+        free = scores.size / max(scores.size - 1, 1)
+        model = float(np.sqrt(max(fit.covariance[column, column], 0.0)))
+        out.append(max(model, float(np.sqrt(free * np.sum(scores**2))) / power if power > 0 else 0.0))
+    return np.array(out)
+
+
+def _alone(fit: Refit, column: int) -> Array:
+    """Whitened derivative by one unknown, without what all others can explain (m,)."""
+    others = np.delete(fit.J, column, axis=1)
+    scale = np.linalg.norm(others, axis=0)
+    others = others[:, scale > 0] / scale[scale > 0]
+    J = fit.J[:, column]
+    return np.asarray(J - others @ np.linalg.lstsq(others, J, rcond=1e-10)[0], np.float64)

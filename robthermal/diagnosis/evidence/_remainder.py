@@ -1,0 +1,170 @@
+"""What a model leaves beyond the noise: how much, where, in which band, and how large a heat would remove it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fit import Refit
+from ..path import LinearizedRecord, heat_splines
+from ._adequacy import side_by_side
+from ._hold_out import Gap, expected_squares
+
+Array = NDArray[np.float64]
+_HELD = 0.8  # of the power, in the band
+_SMALL = 1e-3  # relative singular value of a heat that no reading shows
+
+
+@dataclass(frozen=True)
+class Left:
+    """Remainder of one group of records.
+
+    Parameters
+    ----------
+    rms : float
+        √(mean square of the free-run residual less that of the noise), all sensors [K].
+    share_explained : float
+        1 − (after² − noise²)/(before² − noise²) [-].
+    """
+
+    rms: float
+    share_explained: float
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left beyond the noise after the named effects.
+
+    Parameters
+    ----------
+    gaps : dict
+        `Left` of "train" and, if given, "validation".
+    sensors : dict
+        Rms of every thermometer on the training records, noise subtracted [K].
+    where : tuple of tuple
+        (lump, share of the remainder that a free heat into it would remove), the largest first.
+    low, high : float
+        Narrowest band of octaves that holds 80 % of its power [Hz].
+    share : float
+        Part of its power in that band [-].
+    heat : float
+        Rms of the free heat into the first of these lumps [W].
+    """
+
+    gaps: dict[str, Left]
+    sensors: dict[str, float]
+    where: tuple[tuple[str, float], ...]
+    low: float
+    high: float
+    share: float
+    heat: float
+
+    def __str__(self) -> str:
+        """One sentence: how much, at which sensor and lump, in which band."""
+        seen = "validation" if "validation" in self.gaps else "train"
+        sensor = max(self.sensors, key=lambda name: self.sensors[name])
+        kind = "validation records" if seen == "validation" else "training records"
+        lump, share = self.where[0]
+        return (f"{self.gaps[seen].rms:.2g} K of the error on the {kind} is not explained, mostly at {sensor} between "
+                f"{self.low:.2g} and {self.high:.2g} Hz; a free heat of {self.heat:.2g} W rms into {lump} would remove "
+                f"{100 * share:.0f} % of it.")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in ``diagnosis.json``.
+
+        Returns
+        -------
+        dict
+        """
+        return {**{name: vars(left) for name, left in self.gaps.items()}, "sensors": self.sensors,
+                "where": [{"lump": lump, "share": share} for lump, share in self.where],
+                "band": {"low": self.low, "high": self.high, "share": self.share}, "heat": self.heat}
+
+
+def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:
+    """Remainder of a fit with the network taken to be right; None without any record of temperatures.
+
+    Parameters
+    ----------
+    fit : Refit
+        With the named effects, its noise levels no larger than declared.
+    gaps : mapping
+        `Gap` of "train" and, if given, "validation".
+    """
+    squares = _squares(fit)
+    if not squares:
+        return None
+    where, heat = _places(fit)
+    return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat)
+
+
+def left(gap: Gap) -> Left:
+    """Remainder of a gap.
+
+    Parameters
+    ----------
+    gap : Gap
+        Rms before and after, and that of the noise alone.
+    """
+    before, after = (max(value**2 - gap.noise**2, 0.0) for value in (gap.before, gap.after))
+    return Left(float(np.sqrt(after)), 1.0 - after / before if before > 0 else 0.0)
+
+
+def _squares(fit: Refit) -> dict[str, float]:
+    """Rms beyond the noise of every thermometer, over all records."""
+    power: dict[str, list[float]] = {}
+    for path in fit.records:
+        beyond = np.sum(path.residual**2, axis=0) - len(path.residual) * expected_squares(fit, path)
+        for name, value in zip(path.one.sensors, beyond, strict=True):
+            if name in fit.system.thermometers:
+                power.setdefault(name, []).extend([float(value), len(path.residual)])
+    return {name: float(np.sqrt(max(sum(parts[::2]) / sum(parts[1::2]), 0.0))) for name, parts in power.items()}
+
+
+def _places(fit: Refit) -> tuple[tuple[tuple[str, float], ...], float]:
+    """Share that a spline of heat into every lump removes of what is left, and the rms of the best one [W]."""
+    rest = float(fit.rest @ fit.rest)
+    beyond = max(rest - fit.degrees_of_freedom, 1e-3 * rest)
+    found: dict[str, tuple[float, float]] = {}
+    basis = np.concatenate([heat_splines(path.time) for path in fit.records])
+    for i, lump in enumerate(fit.system.lumps):
+        J = fit.project(fit.whiten(side_by_side([path.splines(i) for path in fit.paths], fit.paths)))
+        J = J[:, :basis.shape[1]]
+        U, s, Vt = np.linalg.svd(J, full_matrices=False)
+        kept = s > _SMALL * max(s[0], 1e-300)
+        along = U[:, kept].T @ fit.rest
+        size = Vt[kept].T @ (along / s[kept])
+        found[lump] = (min(float(along @ along) / beyond, 1.0), float(np.sqrt(np.mean((basis @ size) ** 2))))
+    order = sorted(found, key=lambda name: -found[name][0])
+    return tuple((name, found[name][0]) for name in order), found[order[0]][1]
+
+
+def _band(fit: Refit) -> tuple[float, float, float]:
+    """Narrowest run of octaves that holds most of the power beyond the noise [Hz, Hz, share]."""
+    longest = max(fit.records, key=lambda path: path.span)
+    n_octaves = max(1, int(np.ceil(np.log2(len(longest.residual) / 2.0))))
+    edges: Array = 0.5 / longest.h * 2.0 ** np.arange(-n_octaves, 1, dtype=np.float64)
+    power = sum((_octaves(fit, path, edges) for path in fit.records), np.zeros(n_octaves))
+    power = np.maximum(power, 0.0)
+    total = float(power.sum())
+    if total == 0.0:
+        return float(edges[0]), float(edges[-1]), 1.0
+    sums = np.concatenate([[0.0], np.cumsum(power)]) / total
+    runs = [(b - a, float(sums[a] - sums[b]), a, b) for a in range(n_octaves) for b in range(a + 1, n_octaves + 1)
+            if sums[b] - sums[a] >= _HELD - 1e-12]
+    _, missed, a, b = min(runs)
+    return float(edges[a]), float(edges[b]), -float(missed)
+
+
+def _octaves(fit: Refit, path: LinearizedRecord, edges: Array) -> Array:
+    """Power of the residual beyond white noise in every octave, all thermometers together."""
+    own = np.array([name in fit.system.thermometers for name in path.one.sensors])
+    r = path.residual[:, own]
+    spectrum = np.sum(np.abs(np.fft.rfft(r, axis=0)[1:]) ** 2, axis=1)
+    spectrum = spectrum - len(r) * float(np.sum(fit.levels.of(path, fit.floor)[0][own] ** 2))
+    place = np.clip(np.searchsorted(edges, np.fft.rfftfreq(len(r), path.h)[1:], side="left") - 1, 0, len(edges) - 2)
+    return np.asarray(np.bincount(place, weights=spectrum, minlength=len(edges) - 1), np.float64)

@@ -1,0 +1,56 @@
+"""The answer of a diagnosis in words that need no statistics."""
+
+from __future__ import annotations
+
+from ...diagnosis import Diagnosis
+
+_PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",
+          "radiation": "radiation from {0} to {1}", "natural_convection": "natural convection from {0} to {1}",
+          "hidden_mass": "a mass that hangs on {0}", "sensor_lag": "the lag of sensor {0}",
+          "heat_source": "a constant heat into {0}", "sensor_offset": "an offset of sensor {0}",
+          "sensor_gain": "a gain error of sensor {0}", "input_lag": "the lag of input {0}",
+          "input_delay": "the delay of input {0}", "periodic_load": "a periodic heat into {0}",
+          "input_feedthrough": "a share of the heat of {0} that goes to {1}",
+          "heater_power_slope": "that the power of {0} depends on its temperature",
+          "conductance_step": "a change of the conductance {0} during the record"}
+
+
+def answer_sentence(found: Diagnosis) -> str:
+    """What the model lacks, what adding it does to the error, and what is left.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    """
+    kind = "validation" if "validation" in found.gap else "train"
+    gap, records = found.gap[kind], "validation data" if kind == "validation" else "the training data"
+    parts = []
+    if found.effects:
+        sets = [[(effect.effect, effect.where), *others]
+                for effect, others in zip(found.effects, found.alternatives, strict=True)]
+        lacks = ", and ".join(" or ".join(in_words(name, where) for name, where in names) for names in sets)
+        parts.append(f"The model lacks {lacks}. With it the error on {records} falls from {gap.before:.2g} to "
+                     f"{gap.after:.2g} {gap.unit}.")
+    elif found.verdict == "consistent":
+        parts.append(f"The model explains the records: the error on {records} is {gap.before:.2g} {gap.unit}, noise "
+                     f"alone would give {gap.noise:.2g} {gap.unit}.")
+    else:
+        parts.append(f"Something is missing that no effect of the catalog explains: the error on {records} is "
+                     f"{gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} {gap.unit}.")
+    return " ".join([*parts, *([] if found.remainder is None else [str(found.remainder)])])
+
+
+def in_words(name: str, where: tuple[str, ...]) -> str:
+    """An effect at its place.
+
+    Parameters
+    ----------
+    name : str
+        Of the catalog, or your own.
+    where : tuple of str
+        Parts of the system it acts on.
+    """
+    if name in _PATHS:
+        return _PATHS[name].format(*where)
+    return f"{name.replace('_', ' ')} at {', '.join(where)}"
