@@ -97,8 +97,29 @@ def test_undecided_between_decided_bins_and_everywhere(pair: Pair) -> None:
         low, high = hertz[[place, place + 2]]
         assert f"cannot be decided from bins {low:.4g} … {high:.4g} Hz" in str(refusal.value)
         assert "not stabilize" not in str(refusal.value) and f"Measure {low:.4g}" in str(refusal.value)
+        assert "measured_in_closed_loop = true does not help" in str(refusal.value)
+        assert "3 of them have a confidence circle that is infinite" in str(refusal.value)
     with pytest.raises(rt.InputError, match="cannot be decided from bins 2 … 2400 Hz"):
         rt.coupling.dual_youla(measured(machine(pair), hertz, np.full(len(hertz), 1e4), 0, DT), *args)
+
+
+def test_undecided_bins_above_the_last_decided_one(pair: Pair) -> None:
+    """Refused whoever says what, with what to measure; who ends the response below them assumes what is said."""
+    hertz = scanner_grid()
+    args = (pair.P1, pair.P2), (pair.C1, pair.C2)
+    G = measured(machine(pair), hertz, np.where(np.arange(len(hertz)) < len(hertz) - 4, 0.01, 1e8), 0, DT)
+    end, low, high = hertz[[-5, -4, -1]]
+    for closed in (False, True):
+        with pytest.raises(rt.InputError) as refusal:
+            rt.coupling.dual_youla(G, *args, measured_in_closed_loop=closed)
+        said = str(refusal.value)
+        for words in (f"cannot be decided from bins {low:.4g} … {high:.4g} Hz", f"all 4 above {end:.4g} Hz",
+                      f"Measure {low:.4g} … {high:.4g} Hz longer", f"end the response at {end:.4g} Hz (band of",
+                      "measured_in_closed_loop = true does not help"):
+            assert words in said
+    u = rt.coupling.dual_youla(G.between(0.0, end), *args)
+    assert len(u.omega) == len(hertz) - 4 and not len(u.left_out)
+    np.testing.assert_array_equal(u.at(np.array([np.pi / DT]))[..., 0], u.envelope[..., -1])  # assumed above it
 
 
 def test_bins_near_crossover_are_not_joined_by_the_model(pair: Pair) -> None:
@@ -106,7 +127,7 @@ def test_bins_near_crossover_are_not_joined_by_the_model(pair: Pair) -> None:
     hertz = scanner_grid()
     args = (pair.P1, pair.P2), (pair.C1, pair.C2)
     G = measured(machine(pair), hertz, np.where(hertz < 150.0, 9.0, 0.01), 0, DT)
-    with pytest.raises(rt.InputError, match="cannot be decided from bins .* falls below 1 there"):
+    with pytest.raises(rt.InputError, match="cannot be decided .* falls below 1 there .*Or say measured_in_closed"):
         rt.coupling.dual_youla(G, *args)
     known = rt.coupling.dual_youla(G, *args, measured_in_closed_loop=True)  # the closed loop is the evidence
     assert known.left_out[-1] < 2 * np.pi * 150.0 <= known.omega[0]

@@ -237,17 +237,25 @@ def _loop_change(left: Array, radius: Array, diag: dict[str, Array]) -> Array:
 
 
 def _first_decided(undecided_bins: Array, measured: MeasuredPlants, where: str) -> int:
-    """Place of the first decided bin; undecided ones above it are refused."""
-    decided = np.flatnonzero(~undecided_bins)
+    """Place of the first decided bin; undecided ones above it are refused, above the last decided one too.
+
+    Below, the relative error of a model is the smaller the lower the frequency, up to drift; above, it grows with every
+    mode that the model lacks, so the last value of the envelope is no bound to assume unasked.
+    """
+    omega, decided = measured.omega, np.flatnonzero(~undecided_bins)
+    reason = "a confidence circle that is infinite, or holds plants that make det(I + P K0) zero"
     if len(decided) < 2:
-        raise undecided(measured.omega, where, "their confidence circles are infinite or hold plants that make "
-                        "det(I + P K0) zero")
-    rest = undecided_bins.copy()
-    rest[:decided[0]] = False
-    if rest.any():
-        raise undecided(measured.omega[rest], where, f"{int(rest.sum())} of them have a confidence circle that is "
-                        "infinite, or holds plants that make det(I + P K0) zero, above a decided bin")
-    return int(decided[0])
+        raise undecided(omega, where, f"{len(omega) - len(decided)} of {len(omega)} have {reason}", True)
+    first, last = int(decided[0]), int(decided[-1])
+    between = first + np.flatnonzero(undecided_bins[first:last])
+    if len(between):
+        raise undecided(omega[between], where, f"{len(between)} of them have {reason}, between decided bins", True)
+    if last + 1 < len(omega):
+        end = omega[last] / (2 * np.pi)
+        raise undecided(omega[last + 1:], where, f"all {len(omega) - last - 1} above {end:.4g} Hz have {reason}", True,
+                        f"Or end the response at {end:.4g} Hz (band of robthermal frf): then the model error above is "
+                        "assumed to be that at its last bin.")
+    return first
 
 
 def _ratios(P: Array, loop: Array, diag: dict[str, Array]) -> tuple[Array, Array]:

@@ -95,7 +95,7 @@ def expect_joined(loops: tuple[Loop, ...], left_out: Array, first: float, where:
                             f"(at {omega[close][0] / (2 * np.pi):.4g} Hz)")
 
 
-def undecided(omega: Array, where: str, why: str) -> InputError:
+def undecided(omega: Array, where: str, why: str, circles: bool = False, instead: str = "") -> InputError:
     """The refusal where a measurement does not tell, which is not that of an unstable loop.
 
     Parameters
@@ -106,13 +106,19 @@ def undecided(omega: Array, where: str, why: str) -> InputError:
         Name of the argument.
     why : str
         What the bins hold.
+    circles : bool
+        Whether it is the circles that are too large, for the envelope as for the count.
+    instead : str
+        What else can be done, besides measuring.
     """
     low, high = omega.min() / (2 * np.pi), omega.max() / (2 * np.pi)
+    closed = "measured_in_closed_loop = true does not help: it replaces the count, not the circles." if circles else \
+        "Or say measured_in_closed_loop = true if it was measured while these controllers ran."
+    measure = f"Measure {low:.4g} … {high:.4g} Hz longer or with more excitation."
     return InputError(f"whether the controllers stabilize this plant cannot be decided from bins {low:.4g} … "
                       f"{high:.4g} Hz: {why}", where=where,
                       expected="confidence sets in which every plant has the same loop",
-                      remedy=f"Measure {low:.4g} … {high:.4g} Hz longer or with more excitation, or say "
-                             "measured_in_closed_loop = true if it was measured while these controllers ran.")
+                      remedy=" ".join(part for part in (measure, instead, closed) if part))
 
 
 def _turns(ratio: Array) -> int:

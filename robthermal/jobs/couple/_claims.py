@@ -58,7 +58,8 @@ def coupling_assumptions(result: Coupling) -> Iterator[str]:
                    "inequality over every plant, entry and frequency), for estimates without bias.")
         if result.job.measured_in_closed_loop:
             yield ("The controllers stabilize the measured plants: they were measured while these controllers ran "
-                   "(measured_in_closed_loop = true). No encirclement was counted.")
+                   "and stayed bounded. The file states it (measured_in_closed_loop = true); no encirclement was "
+                   "counted, no record examined.")
     yield ARITHMETIC
 
 
