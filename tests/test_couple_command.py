@@ -169,6 +169,17 @@ class TestYes:
         assert frf.response[0, 1, 0] == 102 + 103j and frf.response[1, 0, 1] == 204 + 205j
 
 
+def test_measured_in_closed_loop_is_said_to_be_a_statement(tmp_path: Path) -> None:
+    """Without the statement nothing of it is said."""
+    said = {}
+    for value in ("true", "false"):
+        text = MANUAL.replace('frf_2 = ["r1.csv"', f'measured_in_closed_loop = {value}\nfrf_2 = ["r1.csv"')
+        result = rt.jobs.couple_subsystems(rt.jobs.read_coupling(write(tmp_path, text)))
+        said[value] = " ".join(rt.jobs.couple.coupling_report(result).assumptions)
+    assert "The file states it (measured_in_closed_loop = true); no encirclement was counted" in said["true"]
+    assert "measured_in_closed_loop" not in said["false"]
+
+
 class TestNo:
     def test_a_limit_that_cannot_be_met(self, run: Any, tmp_path: Path) -> None:
         out = tmp_path / "out"
