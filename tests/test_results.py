@@ -21,7 +21,7 @@ import robthermal as rt
 # Made by no short example; each of the same kind as others that are here, or made of nothing but what is.
 ELSEWHERE = {"calibration.Estimates", "diagnosis.Measurement", "diagnosis.Response", "diagnosis.Decision",
              "diagnosis.JointCheck", "design.CertifiedLoop", "design.Polarity", "coupling.Joint", "coupling.Norm",
-             "report.Printed"}
+             "diagnosis.Left", "diagnosis.Remainder", "report.Printed"}
 CLASSES = public_classes()
 DRAWN = [(one, name) for one in CLASSES for name in dir(one) if name == "plot" or name.startswith("plot_")]
 

@@ -13,11 +13,12 @@ from ..errors import Diverged, InputError
 from ._judge import Judged, Progress, Validation, Verdict, alternatives, independent_of_step, judge
 from ._outcomes import DiagnosisCode
 from ._searching import coarsely_searched, validated
-from .evidence import NEEDED, Evidence, Gap, Stability, expected_rms, left, reproducible, stability
+from .evidence import NEEDED, SURE, Evidence, Gap, Stability, expected_rms, left, reproducible, score, stability
 from .fit import Refit, coarsened, exact
-from .search import Accepted, SearchState, ShortList, revise, without
+from .search import Accepted, SearchState, ShortList, refit_short_list, revise, without
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
+_ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -93,7 +94,8 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             state, found = _lasting(revise(replace(state, misfit_left=False)), finer)
         if not found:
             return _nothing_lasts(judged, finer)
-        return _graded(judged, validated(replace(state, misfit_left=False), validation, progress), finer, validation)
+        state = _with_rivals(validated(replace(state, misfit_left=False), validation, progress), finer)
+        return _graded(judged, state, finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
 
@@ -114,6 +116,30 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
             rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
         found = evidence_of(rounds, fit, finer)
     return replace(state, nominal=finer, rounds=rounds, fit=fit), found
+
+
+def _with_rivals(state: SearchState, finer: Refit) -> SearchState:
+    """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
+
+    ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
+    was accepted.
+    """
+    if finer.structure.n_coarse:
+        return state
+    rounds = []
+    for place, round_ in enumerate(state.rounds):
+        less = without(state.fit, place, finer, round_.before)
+        known = {round_.best.candidate.key, *(entry.candidate.key for entry in round_.contenders)}
+        entries = () if less is None else refit_short_list(less, score(less, state.names)).entries
+        rivals = (entry for entry in entries if entry.candidate.key not in known
+                  and (reproducible(state.fit, entry.fit) < SURE or _nearly(state.fit, entry.fit, less)))
+        rounds.append(replace(round_, contenders=(*round_.contenders, *rivals)))
+    return replace(state, rounds=tuple(rounds))
+
+
+def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
+    """Whether a rival does nearly all that the effect does: the model error decides between them, not the records."""
+    return less is not None and less.rss - rival.rss > _ALIKE * (less.rss - fit.rss)
 
 
 def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:

@@ -15,7 +15,18 @@ from ._searching import searched
 from .data import Measured, as_measured, noise_floor
 from .diagnosis import Diagnosis, Found
 from .effects import candidates
-from .evidence import Evidence, Gap, expected_rms, locate, refuse_seen, remainder, sandwich, unknown_heat
+from .evidence import (
+    Evidence,
+    Gap,
+    Remainder,
+    expected_rms,
+    left,
+    locate,
+    refuse_seen,
+    remainder,
+    sandwich,
+    unknown_heat,
+)
 from .fit import Refit, SessionGain, exact, refit
 from .plan import NextExperiment, next_experiment, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
@@ -115,7 +126,7 @@ def concluded(judged: Judged) -> Diagnosis:
     if judged.hold_out is not None:
         gap["validation"] = judged.hold_out.gap
     where = locate(nominal)
-    rest = remainder(fit, gap) if unexplained or judged.plain is not None else None
+    rest = _beyond_noise(fit, gap) if unexplained or judged.plain is not None else None
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),
@@ -127,6 +138,11 @@ def concluded(judged: Judged) -> Diagnosis:
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest)
     said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions]
     return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
+
+
+def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:
+    """The remainder; None if all is within the noise."""
+    return remainder(fit, gap) if any(left(one).rms for one in gap.values()) else None
 
 
 def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:

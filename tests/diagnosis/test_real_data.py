@@ -53,6 +53,18 @@ def test_coupling_and_both_lags_are_added_to_the_two_heater_board(board: rt.diag
             assert unit == "s" and abs(value - 20.3) < 3 * std < 9.0
 
 
+def test_without_random_heat_coupling_is_named_and_lag_of_sensor_and_heater_stay_a_set(
+        records: tuple[rt.Record, rt.Record], room: float) -> None:
+    """The model is not exact then: by ΔBIC alone the lag of the heater, which no board has, is the only name."""
+    train, validation = records
+    quiet = two_heaters.nominal(room).with_parameters({f"lumps.heater_{i}.disturbance": 0.0 for i in (1, 2)})
+    found = rt.diagnose(quiet, train, validation=validation, effects=["missing_link", "sensor_lag", "input_lag"])
+    assert found.verdict == "ambiguous" and found.remainder is not None
+    assert {("missing_link", ("heater_1", "heater_2"))} in sets(found)
+    assert any({("sensor_lag", ("T1",)), ("input_lag", ("Q1",))} <= one for one in sets(found))
+    assert found.gap["validation"].after < 0.3 * found.gap["validation"].before
+
+
 def test_the_gap_shrinks_on_another_day_with_one_heater(board: rt.diagnosis.Diagnosis) -> None:
     assert board.hold_out is not None and board.hold_out.outcome.ok
     assert board.gap["validation"].before > 10.0 and board.gap["validation"].after < 1.7

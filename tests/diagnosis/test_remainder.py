@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from dataclasses import replace
 from functools import cache
@@ -91,6 +92,7 @@ def test_the_dominant_effect_is_named_with_its_remainder():
     assert [(effect.effect, effect.where)] == [(name, where) for name, where, _ in one.truth]
     assert rest is not None and 0.5 < rest.gaps["train"].rms / one.coarse < 2.0
     assert effect.evidence is not None and effect.evidence.lasting
+    assert pickle.loads(pickle.dumps(rest)) == rest
     assert effect.evidence.share == pytest.approx(rest.gaps["train"].share_explained, abs=0.02)
     value, std, _ = effect.values["slope"]
     assert abs(value - one.truth[0][2]) < 0.25 * one.truth[0][2] and std > 0
