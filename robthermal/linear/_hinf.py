@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.linalg import schur, solve_continuous_are, solve_discrete_are
 
 from .._arrays import Array
 from ..errors import InputError
@@ -16,6 +16,7 @@ from ._stability import coordinates
 from ._systems import Plant, made_by, read_plant, scaling
 
 _LOSSES = (0.0, 0.02, 0.1)  # given up in turn where a proof fails
+_LARGE = 60  # states above which the pencil of scipy takes too long
 SHIFTS = (1e-4, 1e-7)  # of the strict Riccati equation, relative to the bound²
 
 
@@ -105,12 +106,26 @@ def bounded_real_matrix(plant: Plant, level: float, shift: float) -> Array | Non
     Q, S, R = C.T @ C + shift * np.eye(len(A)), C.T @ D, D.T @ D - level**2 * np.eye(B.shape[1])
     solver = solve_discrete_are if plant.dt else solve_continuous_are
     try:
-        P = solver(A, B, Q, R, s=S)
+        large = not plant.dt and len(A) > _LARGE
+        P = _by_schur(A, B, Q, R, S) if large else solver(A, B, Q, R, s=S)
     except (np.linalg.LinAlgError, ValueError):
         return None
     inverse = np.linalg.inv(T)
     P = inverse.T @ P @ inverse
     return (P + P.T) / 2 if np.isfinite(P).all() else None
+
+
+def _by_schur(A: Array, B: Array, Q: Array, R: Array, S: Array) -> Array:
+    """The same solution from the Hamiltonian matrix of half the size: R is regular, below the bound."""
+    n = len(A)
+    gain = np.linalg.solve(R, np.hstack([S.T, B.T]))
+    own = A - B @ gain[:, :n]
+    H = np.block([[own, -B @ gain[:, n:]], [S @ gain[:, :n] - Q, -own.T]])
+    _, U, count = schur(H, sort="lhp")
+    if count != n:
+        raise np.linalg.LinAlgError("eigenvalues on the axis")
+    P: Array = np.linalg.solve(U[:n, :n].T, U[n:, :n].T).T
+    return P
 
 
 def _scaled(plant: Plant, L: Array | None, R: Array | None) -> Plant:

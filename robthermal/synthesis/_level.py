@@ -115,7 +115,7 @@ def _bisect(own: Regular, arithmetic: Arithmetic, high: float, accuracy: float) 
     low = max(least_level(own), _SPAN * high)
     count = 0
     while high > low * (1 + accuracy) and count < _MOST:
-        level = float(np.sqrt(low * high))
+        level = max(float(np.sqrt(low * high)), high / 3)  # the H2 controller is seldom far from the optimum
         if solutions(own, level, arithmetic) is None:
             low = level
         else:
