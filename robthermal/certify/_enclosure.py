@@ -163,9 +163,10 @@ def named_box(system: System, box: Array) -> dict[str, Interval]:
 
 def no_box(system: System, current: Currents) -> Certificate:
     """The refusal where no box was found."""
-    region = region_section(system, current, (COLDEST + 200, HOTTEST))
+    region = region_section(system, current, (COLDEST, HOTTEST))
     reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
-              "diverges. Narrow the currents, or improve the heat sink.")
+              f"diverges, or its box would reach below {COLDEST:g} K or above {HOTTEST:g} K. Narrow the currents, or "
+              "improve the heat sink.")
     return not_certified("invariance", system=system_section(system), region=region, evidence={}, reason=reason,
                          made_by=made_by("Newton's method on the faces", "none"))
 

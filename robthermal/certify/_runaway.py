@@ -34,7 +34,7 @@ class Runaway:
     curve : LoadCurve
         Equilibria on the way to the fold.
     certificates : dict
-        Module to the certificate of its closed form.
+        Module to the certificate of its closed form; none for a module whose hot face another module holds.
     outcome : Outcome
         How the two agree.
     """
@@ -116,7 +116,7 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     ends = [fold(system.with_parameters({key: end}), setpoint, ambient=ambient) for key, pair in box.items()
             for end in pair]
     certificates = {name: _certify(system, name, n, _ranges(n, [_constants(c, i, name) for c in ends]))
-                    for i, (name, n) in enumerate(numbers.items()) if n["sink_conductance"] > 0}
+                    for i, (name, n) in enumerate(numbers.items()) if 0 < n["sink_conductance"] < np.inf}
     worst = max(abs(closed[name] / current[name] - 1) for name in setpoint)
     sloped = any(m.seebeck.slope or m.resistance.slope or m.conductance.slope for m in system.modules.values())
     why = " (their S, R, K vary with temperature, the closed form's do not)" if sloped else ""
@@ -137,16 +137,30 @@ def _constants(curve: LoadCurve, i: int, name: str) -> dict[str, float]:
                ("seebeck", "resistance", "conductance"))
     current = curve.current[:, i]
     rejected = curve.load[:, i] + R * current**2 + S * (hot - cold) * current
+    if _hot_is_held(curve, name):  # by the module that it stands on: a heat sink without a limit
+        return {"seebeck": float(S[-1]), "resistance": float(R[-1]), "conductance": float(K[-1]),
+                "sink_conductance": float("inf"), "sink_temperature": float(hot[-1]), "setpoint": float(cold)}
     g = (rejected[-1] - rejected[0]) / (hot[-1] - hot[0])
     w = hot[-1] - rejected[-1] / g
     return {"seebeck": float(S[-1]), "resistance": float(R[-1]), "conductance": float(K[-1]),
             "sink_conductance": float(g), "sink_temperature": float(w), "setpoint": float(cold)}
 
 
+def _hot_is_held(curve: LoadCurve, name: str) -> bool:
+    """Whether the hot face of a module is the cold face of another that holds it, as in a cascade."""
+    modules = curve.system.modules
+    return modules[name].hot in {modules[other].cold for other in curve.setpoint}
+
+
 def smallest_root(n: Mapping[str, float]) -> float:
-    """Smallest positive root I* of the cubic of the errata [A]; nan if there is none."""
+    """Smallest positive root I* of the cubic of the errata [A]; nan if there is none.
+
+    Where the hot face is held the sink conductance is infinite, and the cubic becomes S x = R I.
+    """
     S, R, K = n["seebeck"], n["resistance"], n["conductance"]
     g, w, x = n["sink_conductance"], n["sink_temperature"], n["setpoint"]
+    if np.isinf(g):
+        return S * x / R
     roots = np.roots([-2 * R * S**2, S * (5 * K * R + 4 * g * R + 2 * S**2 * x),
                       -2 * (K + g) * (2 * K * R + g * R + 2 * S**2 * x), 2 * g * S * ((g + 2 * K) * x - K * w)])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]

@@ -13,10 +13,11 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from .._celsius import LOWEST_KELVIN
 from ._faces import SIGNS, Array, Faces, Outward
 
 HOTTEST = 1000.0  # K
-COLDEST = 60.0
+COLDEST = LOWEST_KELVIN  # no certificate is made below
 _STEPS = 100
 _SLOW_STEPS = 12  # after as many steps without a solution of the worst cases ahead there is taken to be none
 _ROUNDING = 1e-9

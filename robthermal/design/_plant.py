@@ -207,8 +207,10 @@ def cold_side(law: FeedbackLinearization, temperatures: ArrayLike | None = None,
     for name, part in zip(law.names, law.modules.parts, strict=True):
         if part.cold in hot:
             raise InputError(f"the cold face {part.cold!r} of module {name!r} is another module's hot face",
-                             where="argument law", expected="one stage", remedy="Linearize the cold stage only, with "
-                             "modules=[…], and let the other stage hold its own temperature.")
+                             where="argument law", expected="one stage: a cascade is not designed at once",
+                             remedy="In Python linearize the cold stage only, rt.design.feedback_linearization(..., "
+                             "modules=[…]), and let the other stage hold its own temperature; in a project file leave "
+                             "[design] out.")
     x = eq.initial() if temperatures is None else numbers(temperatures, "temperatures")
     law.modules.faces(x)
     full = _passive(eq, x)

@@ -16,6 +16,8 @@ from ._operating_point import OperatingPoint
 from ._response_whitening import ResponseWhitener, as_real, every_bin, kept_bins, response_whitener
 from ._sampled_response import sampled_response
 
+_LEAST_SHARE = 1e-13  # of the variance of the least known input, where that of the best known still has digits
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredResponse:
@@ -121,19 +123,27 @@ def measured_response(system: System, G: FrequencyResponse, where: str, operatin
     outputs, inputs = _channels(system, G, where)
     spare = G.degrees_of_freedom - len(G.output_names) - 1
     centered = G.frequencies * G.n_samples * G.sample_time > G.half_width + 0.5
-    trusted = ~np.isnan(G.response).any(axis=(0, 1)) & ~G.suspect & (spare > 0)
+    trusted = ~np.isnan(G.response).any(axis=(0, 1)) & ~G.suspect & (spare > 0) & ~_confounded(G)
     good = np.flatnonzero(trusted & centered if thinned else trusted)
     if not good.size:
         raise InputError("no bin of the frequency response can be used: all are undetermined, suspect or short of "
                          "degrees of freedom, so that their covariance is not known", where=f"argument {where}",
-                         remedy="Estimate it with rt.identify.lpm or lrmp, a larger half_width, better poles, or a "
-                                "longer record.")
+                         remedy="Excite every input at more frequencies, estimate with a larger half_width or better "
+                                "poles, or record longer.")
     o = np.array([G.output_names.index(name) for name in outputs], np.intp)
     i = np.array([G.input_names.index(name) for name in inputs], np.intp)
     index, factor = kept_bins(G, good, i) if thinned else every_bin(G, good)
     measured = G.response[np.ix_(o, i, index)].transpose(2, 1, 0).reshape(index.size, -1)
     return MeasuredResponse(G, index, outputs, inputs, as_real(measured), response_whitener(G, index, factor, o, i),
                             _point_of(system, G, operating_point))
+
+
+def _confounded(G: FrequencyResponse) -> NDArray[np.bool_]:
+    """Bins where some input is so weak beside the others, or so like them, that nothing is known of it."""
+    if G.gram is None:
+        return np.zeros(len(G), bool)
+    gram = np.nan_to_num(np.moveaxis(np.asarray(G.gram), -1, 0))
+    return np.asarray(np.linalg.eigvalsh(gram)[:, 0] <= _LEAST_SHARE * np.einsum("bii->b", gram).real)
 
 
 def _channels(system: System, G: FrequencyResponse, where: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -141,9 +141,17 @@ def response_whitener(G: FrequencyResponse, index: Places, factor: Complex, outp
 
 def inverse_roots(covariance: Complex, G: FrequencyResponse, index: Places) -> Complex:
     """L⁻¹ of every L Lᴴ."""
-    sound = [bool(np.all(np.isfinite(c))) and np.linalg.eigvalsh(c)[0] > 1e-13 * np.trace(c).real for c in covariance]
+    sound = [_is_definite(c) for c in covariance]
     if not all(sound):
         raise InputError(f"the covariance of the response at {G.frequencies[index[sound.index(False)]]:.4g} Hz is "
                          "missing or singular", where="argument records", expected="noise in every channel",
                          remedy="Estimate the response with rt.identify.lpm or lrmp, which give its covariance.")
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), np.complex128)
+
+
+def _is_definite(c: Complex) -> bool:
+    """Whether a covariance can be inverted, whatever the units of its channels."""
+    scale = np.sqrt(np.diag(c).real)
+    if not (np.all(np.isfinite(c)) and np.all(scale > 0.0)):
+        return False
+    return bool(np.linalg.eigvalsh(c / np.outer(scale, scale))[0] > 1e-13)

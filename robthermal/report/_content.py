@@ -269,6 +269,8 @@ class Report:
             claim.status)
 
     def _of_claims(self) -> list[Reason]:
+        if not self.claims and self.failed:
+            return []  # nothing is decided
         if not self.claims:
             return [Reason("fail", "not_certified", "certify", "claims", "Nothing is claimed.")]
         bad = {(claim.stage, claim.title) for claim in self.claims if claim.parameters != "ranges" and not claim.good}

@@ -174,3 +174,31 @@ def test_bad_input_is_named() -> None:
             ("no influence on the frequency", G, {"parameters": {"sensors.Ta.offset": (-1.0, 1.0)}})):
         with pytest.raises(InputError, match=match):
             rt.calibrate(system(), data, **({"parameters": RANGES} | options))
+
+
+def response_with(gram: Array) -> rt.identify.FrequencyResponse:
+    """Responses of both sensors to heater and room at three frequencies, as the truth has them, gram (2, 2, 3)."""
+    f = np.array([1e-4, 5e-4, 2e-3])
+    Ca, Gab, Gb = TRUTH.values()
+    A = np.array([[-Gab / Ca, Gab / Ca], [Gab / 90.0, -(Gab + Gb) / 90.0]])
+    B = np.array([[1.0 / Ca, 0.0], [0.0, Gb / 90.0]])
+    F = expm(np.block([[A, B], [np.zeros((2, 4))]]) * STEP)
+    G = [np.linalg.solve(np.exp(2j * np.pi * one * STEP) * np.eye(2) - F[:2, :2], F[:2, 2:]) for one in f]
+    return rt.identify.FrequencyResponse(frequencies=f, response=np.moveaxis(G, 0, -1), gram=gram,
+                                noise_covariance=np.repeat(np.eye(2)[:, :, None] * 1e-6, 3, axis=2),
+                                degrees_of_freedom=np.full(3, 50), input_names=["q", "room"], output_names=["Ta", "Tb"],
+                                sample_time=STEP, half_width=0, n_samples=20000, method="own",
+                                operating_point={"q": 5.0, "room": ROOM})
+
+
+def test_bins_in_which_an_input_is_not_excited_are_left_out() -> None:
+    """A multisine has nothing between its frequencies but rounding: such a bin is no reason to refuse the others."""
+    gram = np.repeat(np.eye(2)[:, :, None], 3, axis=2)
+    gram[1, 1, 1] = 1e40
+    fit = rt.calibrate(system(), response_with(gram), parameters=RANGES)
+    assert fit.outcome and fit.responses[0].bins.size == 2
+    for name, value in TRUTH.items():
+        assert abs(fit.parameters[name] - value) < 4.0 * fit.std[name]
+    gram[1, 1, :] = 1e40
+    with pytest.raises(InputError, match="no bin of the frequency response.*Excite every input"):
+        rt.calibrate(system(), response_with(gram), parameters=RANGES)

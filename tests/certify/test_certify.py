@@ -99,6 +99,22 @@ def test_runaway_of_the_errata(systems):
             assert cert.holds and rt.verify(cert).valid
 
 
+def test_runaway_of_a_cascade_whose_stages_both_hold_their_cold_faces():
+    """The lower stage holds the hot face of the upper one: its heat S x I - R I²/2 - K dT peaks at S x / R."""
+    stage = {"seebeck": 0.03, "resistance": 1.5, "conductance": 0.25}
+    modules = {"top": {"hot": "b", "cold": "a", **stage}, "bottom": {"hot": "c", "cold": "b", **stage}}
+    cascade = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={name: {"capacity": 20.0} for name in "abc"},
+                        links=[{"between": ("c", "room"), "conductance": 6.0}], modules=modules)
+    limit = rt.certify.runaway(cascade, setpoint={"top": 270.0, "bottom": 283.0})
+    assert limit.closed_form["top"] == pytest.approx(0.03 * 270.0 / 1.5)
+    currents = np.linspace(0.0, 20.0, 200001)
+    hot = (6.0 * 295.0 + 0.75 * currents**2 + 0.25 * 283.0) / (6.25 - 0.03 * currents)  # of the lower stage
+    taken = np.where(hot > 0.0, 0.03 * 283.0 * currents - 0.75 * currents**2 - 0.25 * (hot - 283.0), -np.inf)
+    assert limit.current["bottom"] == pytest.approx(currents[taken.argmax()], abs=1e-3)
+    assert limit.load["bottom"] == pytest.approx(taken.max(), rel=1e-6)
+    assert list(limit.certificates) == ["bottom"] and rt.verify(limit.certificates["bottom"]).valid
+
+
 def test_invariance_is_refused_where_the_simulation_leaves_the_box(systems):
     ranges = {"m1": (0.0, 1.5), "m2": (0.0, 1.5)}
     refused = rt.certify.invariance(systems["varying"], current=ranges, temperature=BOX)
@@ -107,6 +123,18 @@ def test_invariance_is_refused_where_the_simulation_leaves_the_box(systems):
     record = rt.Record(sample_time=1.0, inputs=np.tile([1.5, 1.5, 298.15], (n, 1)), outputs=np.zeros((n, 0)),
                        input_names=["m1", "m2", "room"], output_names=[])
     assert rt.thermal.trajectory(systems["varying"], record).lumps.min() < BOX[0]  # it was right to refuse
+
+
+def test_a_box_that_would_reach_below_150_K_is_not_certified_and_says_so():
+    """No certificate is made below 150 K; the claim fails, the input is not bad."""
+    weak = rt.System(ambients={"room": {"temperature": 295.0}},
+                     lumps={"c": {"capacity": 20.0}, "h": {"capacity": 90.0}},
+                     links=[{"between": ("h", "room"), "conductance": 9.0},
+                            {"between": ("c", "room"), "conductance": 0.1}],
+                     modules={"m": {"hot": "h", "cold": "c", "seebeck": 0.05, "resistance": 0.2, "conductance": 0.05}})
+    found = [rt.certify.runaway_free(weak, current={"m": (0.0, top)}) for top in (0.1, 4.0)]
+    assert [one.holds for one in found] == [True, False]
+    assert "below 150 K" in found[1].invariance.reason and rt.verify(found[0].invariance).valid
 
 
 def test_no_simulation_leaves_a_certified_box(systems):

@@ -198,12 +198,19 @@ def test_an_interrupt_of_the_first_stage_leaves_nothing(tmp_path: Path, run: Run
     assert not (tmp_path / "out").exists()
 
 
+def test_no_claim_is_called_failed_where_certify_was_not_reached() -> None:
+    report = rt.report.Report(title="bar", subtitle="", label="", claims=(), sections=(), provenance={}, assumptions=(),
+                              generated="now", stages=(rt.report.Stage("calibrate", "failed", text="bad file"),))
+    assert report.verdict == "NO VERDICT" and report.reasons == [] and not report.holds
+
+
 def test_a_stage_that_fails_leaves_the_earlier_ones(folder: Path, run: Run) -> None:
     edit(folder / "project.toml", "controller = 20.0", "controller = -5000.0")  # this loop is not stable
     said = run("run", folder / "project.toml", "--out", folder / "out")
     assert said.status == 2 and "[couple]" in said.err or "project.toml" in said.err
     summary = json.loads((folder / "out" / "summary.json").read_text())
     assert summary["verdict"] is None and summary["stages"]["couple"]["status"] == "failed"
+    assert not [one for one in summary["reasons"] if one["code"] == "not_certified"], "the claims that are there hold"
     assert summary["stages"]["certify"]["status"] == "cached" and summary["certificates"]
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "NO VERDICT" in page and 'class="verdict no"' in page and "Stage couple could not be computed" in page

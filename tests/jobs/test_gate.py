@@ -85,6 +85,8 @@ def test_remarks_about_the_data(tmp_path: Path) -> None:
     assert row.noise == pytest.approx(NOISE, rel=0.1), "from second differences"
     constant = bar(tmp_path, project=project.replace('["train.csv"]', '["still.csv"]')) if _still(tmp_path) else result
     assert "constant_input" in codes(constant, "remark")
+    held_out = project.replace('["train.csv"]', '["still.csv"]\nvalidation = ["validation.csv"]')
+    assert "constant_input" in codes(bar(tmp_path, project=held_out), "remark"), "a record held out is no help"
 
 
 def _still(folder: Path) -> bool:

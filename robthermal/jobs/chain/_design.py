@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ...errors import InputError
 from ...report import Report
 from ..certify import claim_ranges
 from ..design import design_from_table, design_report, design_system, save_design
@@ -33,12 +34,24 @@ def _run(context: Context, folder: Path) -> Report:
     assert project.design is not None
     system, estimates = certified_system(context)
     table = project.design.model_dump(exclude_unset=True)
-    request = design_from_table(system, table, project.boxes, claim_ranges(project.boxes, estimates))
-    result = design_system(system, request, context.progress)
+    try:
+        request = design_from_table(system, table, project.boxes, claim_ranges(project.boxes, estimates))
+        result = design_system(system, request, context.progress)
+    except InputError as error:
+        raise _of_table(error, project) from None
     (folder / FOLDER).mkdir()
     report = with_evidence(result.certification.checked, design_report(result, ()), folder / FOLDER)
     save_design(result, folder / FOLDER)
     return below(report, FOLDER, "design")
+
+
+def _of_table(error: InputError, project: Project) -> InputError:
+    """A refusal that names an option of the command names the key of the table instead."""
+    option, _, value = error.where.partition(" ")
+    if not option.startswith("--"):
+        return error
+    return InputError(error.what, where=f"{project.path} [design] {option[2:].replace('-', '_')} {value}".strip(),
+                      expected=error.expected, remedy=error.remedy)
 
 
 DESIGN = StageJob("design", _absent, certified_after, _depends, _run)

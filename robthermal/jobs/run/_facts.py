@@ -26,6 +26,8 @@ class DataFacts:
         How far the model is from every reading of every record.
     inputs : dict
         Range of every input [unit], module current [A] and ambient [K] in the records.
+    constant : tuple of str
+        Inputs, currents and ambients that never change in the records that were fitted.
     readings : tuple of float or None
         Coldest and hottest reading of sensors and ambients [K]; None without records.
     silent : tuple of str
@@ -40,6 +42,7 @@ class DataFacts:
     readings: tuple[float, float] | None = None
     silent: tuple[str, ...] = ()
     resampled: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
 
     def currents(self, system: System) -> dict[str, tuple[float, float]]:
         """Range of every module's current in the records [A]; empty without records.
@@ -99,7 +102,14 @@ def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Seque
         {name: _range(records, name) for name in names},
         (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None,
         tuple(name for name in sensors if name in system.sensors and not system.sensors[name].noise),
-        tuple(dict.fromkeys(file for file, what in actions if what == "resampled")))
+        tuple(dict.fromkeys(file for file, what in actions if what == "resampled")), _constant(comparisons))
+
+
+def _constant(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
+    """Where nothing was fitted, of the records that there are."""
+    fitted = [one.record for one in comparisons if one.kind == "train"] or [one.record for one in comparisons]
+    names = dict.fromkeys(name for record in fitted for name in record.input_names)
+    return tuple(name for name in names if len(set(_range(fitted, name))) == 1)
 
 
 def diagnosis_facts(found: Diagnosis, adopted: bool = False) -> DiagnosisFacts:

@@ -103,10 +103,9 @@ def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Rea
         yield remark(GateCode.NOT_DIAGNOSED, "diagnose", "records", GateCode.NOT_DIAGNOSED.meaning)
     if facts.kinds and simulated:
         yield remark(GateCode.SIMULATED_DATA, "calibrate", "records", GateCode.SIMULATED_DATA.meaning)
-    for name, (low, high) in (facts.inputs or {}).items():
-        if low == high:
-            yield remark(GateCode.CONSTANT_INPUT, "calibrate", name, f"{name} never changes in the records: nothing "
-                         "can be learnt about what it does.")
+    for name in facts.constant:
+        yield remark(GateCode.CONSTANT_INPUT, "calibrate", name, f"{name} never changes in the records that were "
+                     "fitted: nothing can be learnt about what it does.")
     for file in facts.resampled:
         yield remark(GateCode.RESAMPLED, "calibrate", file, f"The samples of {file} were not on a uniform grid.")
     if facts.silent:
