@@ -39,6 +39,7 @@ from ._observer import GainObserver as GainObserver
 from ._observer import observer as observer
 from ._observer_model import ObserverModel as ObserverModel
 from ._observer_model import unobservable as unobservable
+from ._operated_plants import face_ranges as face_ranges
 from ._outcomes import DesignCode as DesignCode
 from ._pid import PID as PID
 from ._pid import pid as pid
@@ -73,7 +74,7 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
            "PlantMargins", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen", "StateFeedback",
            "StepResponseLinearity", "Tuning", "certify_loop", "check_polarity", "checked_margins", "cold_side",
-           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "feed_forward",
+           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "face_ranges", "feed_forward",
            "feedback_linearization", "gains_digest", "linear_controller", "load_controller", "loop_margins",
            "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
            "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]

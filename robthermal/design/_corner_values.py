@@ -12,7 +12,7 @@ from ..thermal import System
 
 Ranges = Mapping[str, tuple[float, float]]
 Corner = dict[str, float]
-MOST = 256  # corners that are computed; all of up to eight parameters
+MOST = 64  # corners that are computed; all of up to six parameters
 
 
 def checked_ranges(system: System, parameters: Ranges | None) -> dict[str, tuple[float, float]]:

@@ -209,7 +209,7 @@ def loop_margins(law: FeedbackLinearization, controller: Controller, setpoint: M
     observer : GainObserver, optional
         Whose estimates law and controller take; default every lump is measured.
     parameters : mapping, optional
-        {parameter name: (lower, upper)} of the plant. With more than 256 corners those are taken at which every margin
+        {parameter name: (lower, upper)} of the plant. With more than 64 corners those are taken at which every margin
         should be smallest by the effects of single parameters, and others at random: the outcome says so.
     inputs : mapping, optional
         Ambients [K] and heaters [unit]; default nominal and off.

@@ -200,7 +200,7 @@ def test_a_corner_that_cannot_hold_the_set_point_is_said(loop_parts):
 
 
 def test_many_parameters_are_searched_where_the_margins_fall(loop_parts):
-    """Eleven parameters have 2048 corners: 256 are computed, among them one as bad as the worst of all single moves."""
+    """Eleven parameters have 2048 corners: 64 are computed, among them one as bad as the worst of all single moves."""
     nominal, plant, _ = loop_parts
     pi = rt.design.pid(plant, bandwidth=0.012, sample_time=2.0)
     base = machine()
@@ -210,7 +210,7 @@ def test_many_parameters_are_searched_where_the_margins_fall(loop_parts):
              "sensors.T_plate.time_constant"]
     ranges = {name: (0.95 * base.parameter(name), 1.05 * base.parameter(name)) for name in names}
     found = rt.design.loop_margins(nominal, pi, 288.15, regulate=REGULATE, parameters=ranges)
-    assert found.total == 2048 and len(found.corners) <= 256 and "of 2048 corners" in str(found.outcome)
+    assert found.total == 2048 and len(found.corners) <= 64 and "of 2048 corners" in str(found.outcome)
     # a brute force over 300 other corners finds nothing worse
     rng = np.random.default_rng(5)
     from robthermal.design._loop_margins import analyzed

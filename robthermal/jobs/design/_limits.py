@@ -18,7 +18,7 @@ from ...certify import (
     runaway_free,
     usable_current,
 )
-from ...design import feedback_linearization, reachable
+from ...design import face_ranges, feedback_linearization, reachable
 from ...errors import InputError
 from ...thermal import System
 from ...verification import Certificate
@@ -45,29 +45,20 @@ def cold_faces(system: System, request: DesignRequest, ambient: Mapping[str, flo
     return reachable(free, request.setpoint, inputs=ambient, regulate=request.regulate).faces
 
 
-def face_ranges(system: System, request: DesignRequest) -> dict[str, tuple[float, float]]:
+def held_faces(system: System, request: DesignRequest) -> dict[str, tuple[float, float]]:
     """Range of every cold face while the set-points are held, over ambients, and parameters one by one added up [K]."""
-    found = [cold_faces(system, request, at) for at in ambient_ends(request)]
-    ranges = {name: (min(faces[name] for faces in found), max(faces[name] for faces in found))
-              for name in request.setpoint}
-    if not (request.regulate and request.parameters):
-        return ranges
-    for at, middle in zip(ambient_ends(request), found, strict=True):
-        low, high = dict.fromkeys(middle, 0.0), dict.fromkeys(middle, 0.0)
-        for name, pair in request.parameters.items():
-            moved = [cold_faces(system.with_parameters({name: end}), request, at) for end in pair]
-            for module, face in middle.items():
-                changes = [faces[module] - face for faces in moved]
-                low[module] += min(*changes, 0.0)
-                high[module] += max(*changes, 0.0)
-        ranges = {module: (min(pair[0], middle[module] + low[module]), max(pair[1], middle[module] + high[module]))
-                  for module, pair in ranges.items()}
-    return ranges
+    if not request.regulate:
+        return {name: (value, value) for name, value in request.setpoint.items()}
+    free = feedback_linearization(system)
+    found = [face_ranges(free, request.setpoint, regulate=request.regulate, inputs=at,
+                                parameters=request.parameters) for at in ambient_ends(request)]
+    return {name: (min(faces[name][0] for faces in found), max(faces[name][1] for faces in found))
+            for name in request.setpoint}
 
 
 def coldest_faces(system: System, request: DesignRequest) -> dict[str, float]:
     """Temperatures of the cold faces where they are coldest [K]."""
-    return {name: low for name, (low, _) in face_ranges(system, request).items()}
+    return {name: low for name, (low, _) in held_faces(system, request).items()}
 
 
 def ambient_ends(request: DesignRequest) -> list[dict[str, float]]:
@@ -130,7 +121,7 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
 def usable_cooling(system: System, request: DesignRequest) -> UsableCurrent:
     """Usable cooling current at the set-points, for the parameter ranges where there are some."""
     return usable_current(system, temperature=request.temperature, ambient=request.ambient,
-                          setpoint=face_ranges(system, request), lower="reported", method=_fast(request),
+                          setpoint=held_faces(system, request), lower="reported", method=_fast(request),
                           parameters=request.parameters)
 
 
