@@ -53,7 +53,7 @@ def assemble(context: Context, stages: Sequence[Stage], system: System) -> Repor
         provenance=provenance(project.files), assumptions=common, generated=now(),
         evidence=tuple(one for _, report in parts for one in _resting(report, common)), checker=checker(),
         gate=applied(reasons, project.gate), usable=certified.report.usable if certified else (),
-        first=tuple(_first(context, facts)), data=data,
+        first=(*_notes(project), *_first(context, facts)), data=data,
         stages=tuple(replace(one, gates=_gates(one.name, context)) for one in stages))
 
 
@@ -76,6 +76,11 @@ def _sections(finished: Mapping[str, Finished], stages: Sequence[Stage]) -> Iter
         else:
             yield Section("Not computed" if stage.status == "failed" else "Not run", stage.text, chapter=chapter,
                           anchor=f"{stage.name}-{stage.status}")
+
+
+def _notes(project: Project) -> Iterator[Section]:
+    if project.notes:
+        yield Section("Notes", project.notes, anchor="notes")
 
 
 def _first(context: Context, facts: DataFacts) -> Iterator[Section]:

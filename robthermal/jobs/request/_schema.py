@@ -49,6 +49,7 @@ class ProjectTable(Table):
     train: list[str | RecordEntry] = []
     validation: list[str | RecordEntry] = []
     label: str = ""
+    notes: Annotated[str, Field(max_length=20_000)] = ""
     median_filter: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
 
@@ -215,6 +216,8 @@ class Project:
         Controller to design.
     couple : CoupleTable or None
         Subsystems to couple.
+    notes : str
+        What the reader of the report should know about machine and measurement, paragraphs between blank lines.
     """
 
     name: str
@@ -238,6 +241,7 @@ class Project:
     adopt: bool = False
     design: DesignTable | None = None
     couple: CoupleTable | None = None
+    notes: str = ""
 
 
 def read_project(path: str | Path) -> Project:
@@ -280,7 +284,7 @@ def read_project(path: str | Path) -> Project:
                    data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
                    (path, system_file, *measured), _gate(system, data.gate, path), data.diagnose is not None,
                    asked.session_gain, reading, path, system_file, identify, responses, asked.adopt, data.design,
-                   data.couple)
+                   data.couple, head.notes.strip())
 
 
 def _identification(name: str, table: IdentifyTable, system: System, path: Path, data: _File,
