@@ -266,7 +266,8 @@ def test_junit_has_a_suite_per_stage_and_a_case_per_claim_and_gate(finished: Pat
 
 
 def test_notes_of_a_project_stand_below_the_verdict(folder: Path) -> None:
-    edit(folder / "project.toml", "[project]\n", '[project]\nnotes = """Nobody knows <the paste>.\n\nThe fan is new."""\n')
+    notes = '[project]\nnotes = """Nobody knows <the paste>.\n\nThe fan is new."""\n'
+    edit(folder / "project.toml", "[project]\n", notes)
     assert again(folder) == those()  # nothing is computed again for a text
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert page.index("Nobody knows &lt;the paste&gt;.") < page.index("Model against data") < page.index("Input files")
