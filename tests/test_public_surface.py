@@ -40,8 +40,8 @@ SURFACE = {
         Polarity Reach Reachable RegulatedPoint Seen StateFeedback StepResponseLinearity Tuning certify_loop
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
-        loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback step_response_linearity
-        tune_pi unobservable
+        loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
+        step_response_linearity tune_pi unobservable
         Design FrfDesign RobustAgainst frf_pid h2 hinf
     """,
     "diagnosis": """
