@@ -98,7 +98,7 @@ def checked_again(stored: Report, folder: Path, progress: Callable[[int, int], N
     good = {one.evidence.file: one.certificate for one in found if one.evidence.good and one.certificate is not None}
     usable = tuple(rest_on_certificates(stored.usable, good))
     boxes = [claim.file for claim in stored.claims if claim.kind == "invariance" and claim.stage == "certify"]
-    inside = box_stays_inside(good, boxes, stored.data.get("certify", {}).get("temperature_lower") == "held")
+    inside = box_stays_inside(good, boxes, (stored.data.get("certify") or {}).get("temperature_lower") == "held")
     by_file = {one.evidence.file: one for one in found}
     current = _current(by_file.get("certificates/box.json"))
     runaway_free = bool(good) and within_usable(current, usable, inside)

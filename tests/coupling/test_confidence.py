@@ -14,7 +14,7 @@ from scipy.stats import binom
 import robthermal as rt
 from robthermal.coupling.factors._winding import MeasuredLoop
 
-from .conftest import DT, Pair, at
+from .conftest import DT, Pair, at, half_sample_late, stage
 
 Array = NDArray[Any]
 Q = 20  # degrees of freedom of the noise at every bin
@@ -131,6 +131,27 @@ def test_bins_near_crossover_are_not_joined_by_the_model(pair: Pair) -> None:
         rt.coupling.dual_youla(G, *args)
     known = rt.coupling.dual_youla(G, *args, measured_in_closed_loop=True)  # the closed loop is the evidence
     assert known.left_out[-1] < 2 * np.pi * 150.0 <= known.omega[0]
+
+
+def rigid(mass: float) -> control.StateSpace:
+    return half_sample_late(control.StateSpace([[0, 1], [0, 0]], [[0], [1 / mass]], [[1, 0]], [[0]]), DT)
+
+
+def test_a_response_that_ends_below_crossover_says_nothing_about_stability(pair: Pair) -> None:
+    """Up to 60 Hz a machine whose mode at 300 Hz turns the other way looks like the model; its loop is unstable."""
+    args, hertz = ((rigid(10.0), rigid(20.0)), (pair.C1, pair.C2)), np.geomspace(2.0, 60.0, 120)
+    true = stage(10.0, 300.0, 0.001, -1.0), args[0][1]
+    omega = 2 * np.pi * hertz
+    assert np.abs(at(true[0], omega) / at(args[0][0], omega) - 1).max() < 0.06
+    assert np.abs(control.poles(control.feedback(true[0], pair.C1))).max() > 1.001
+    below = measured(true, hertz, np.full(len(hertz), 0.02), 0, DT)
+    with pytest.raises(rt.InputError, match=r"ends at 60 Hz, and the model's \|T1\| is .* Measure further up, or say "
+                                            "measured_in_closed_loop"):
+        rt.coupling.dual_youla(below, *args)
+    assert rt.coupling.dual_youla(below, *args, measured_in_closed_loop=True).left_out.size == 0  # the user's word
+    whole = np.geomspace(2.0, 2400.0, 400)
+    u = rt.coupling.dual_youla(measured(args[0], whole, np.full(len(whole), 0.02), 0, DT), *args)
+    assert len(u.omega) == 400
 
 
 def turns(values: Array) -> int:

@@ -71,6 +71,7 @@ def test_the_first_run_computes_what_the_project_asks_for(finished: Path) -> Non
     summary = json.loads((finished / "out" / "summary.json").read_text())
     assert {name: one["status"] for name, one in summary["stages"].items()} == those("calibrate", "certify", "couple")
     assert list(summary["stages"]) == list(STAGES)
+    assert summary["design"] is None and summary["calibrate"] is not None and summary["couple"] is not None
     for name in ("calibrate", "certify", "couple"):
         assert summary["stages"][name]["seconds"] > 0.0 and len(summary["stages"][name]["hash"]) == 64
     names = {path.relative_to(finished / "out").as_posix() for path in (finished / "out").rglob("*") if path.is_file()}

@@ -126,7 +126,7 @@ def changed(old: str, new: str) -> str:
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    (changed("train", "trian"), ["unknown key", "trian"]),
+    (changed("train", "trian"), ["unknown key", "trian", "Did you mean 'train'?"]),
     (changed("[certify]", "[certfy]"), ["unknown key", "certfy"]),
     (changed('name = "bench"\n', ""), ["project.name", "missing"]),
     (changed('system = "bench.toml"\n', ""), ["project.system", "missing"]),

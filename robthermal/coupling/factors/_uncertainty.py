@@ -14,7 +14,7 @@ from ..systems import natural
 from ._coprime import CoprimeFactors, coprime
 from ._frf import Measured, MeasuredPlants, label, read_plants
 from ._loop import Loop
-from ._winding import MeasuredLoop, expect_joined, undecided
+from ._winding import MeasuredLoop, expect_beyond_crossover, expect_joined, undecided
 
 _RESONANT = 1 / np.sqrt(2)  # damping ratio below which a mode has a peak
 
@@ -200,6 +200,7 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confiden
     if not measured_in_closed_loop:
         if first:
             expect_joined(loops, out, omega[0], where)
+        expect_beyond_crossover(loops, float(omega[-1]), where)
         kept = {name: part[first:] for name, part in diag.items()}
         for k, covered in enumerate(measured.covered):
             ratios, swings = _ratios(P[k, first:], loop[k, first:], kept)

@@ -17,6 +17,7 @@ from ._loop import Loop
 _TURN = 0.9 * np.pi  # phase step between two frequencies beyond which turns cannot be counted
 _LARGEST_S = 1.0 + 1e-9  # of the model's |S| where bins are left out: |1 + P0 C0| keeps off zero by 1, below crossover
 _JOINED = 400  # frequencies at which the model is looked at there
+_FAR = 1e4  # times the last frequency: as far as the model of a continuous loop is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +94,26 @@ def expect_joined(loops: tuple[Loop, ...], left_out: Array, first: float, where:
         if close.any():
             raise undecided(left_out, where, f"the model's own |1 + P{number} C{number}| falls below 1 there "
                             f"(at {omega[close][0] / (2 * np.pi):.4g} Hz)")
+
+
+def expect_beyond_crossover(loops: tuple[Loop, ...], last: float, where: str) -> None:
+    """Refuse a count from a response that ends at `last` [rad/s] where the model's |T0| still exceeds 1 above.
+
+    Beyond the last bin 1 + PC = (1 + P0 C0)(1 + T0 (P - P0)/P0) does not vanish as long as the plant is within 1/|T0|
+    of the model: all of it with |T0| <= 1. Where |T0| is larger nothing measured says that the loop is stable.
+    """
+    for number, loop in enumerate(loops, 1):
+        top = np.pi / loop.P.dt if loop.P.dt else _FAR * last
+        omega = np.geomspace(last, top, _JOINED) if top > last else np.array([last])
+        T = np.abs(1 - loop.S.at(omega))
+        k = int(np.argmax(T))
+        if T[k] > _LARGEST_S:
+            end, needed = last / (2 * np.pi), omega[np.nonzero(T > _LARGEST_S)[0][-1]] / (2 * np.pi)
+            raise InputError(f"the response ends at {end:.4g} Hz, and the model's |T{number}| is {T[k]:.3g} at "
+                             f"{omega[k] / (2 * np.pi):.4g} Hz: nothing measured tells whether the loop is stable",
+                             where=where, expected=f"a response up to {needed:.4g} Hz at least",
+                             remedy="Measure further up, or say measured_in_closed_loop = true if it was measured "
+                             "while these controllers ran.")
 
 
 def undecided(omega: Array, where: str, why: str, circles: bool = False, instead: str = "") -> InputError:

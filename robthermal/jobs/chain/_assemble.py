@@ -119,7 +119,8 @@ def _data(context: Context, facts: DataFacts) -> dict[str, Any]:
         rows = {name: {**row, "range": _range(name, ranges)}
                 for name, row in found["calibrate"]["parameters"].items()}
         found["calibrate"] = {**found["calibrate"], "parameters": rows}
-    return {"imports": list(imports.values()), **found, "residuals": residual_table(facts.misfits)}
+    absent = dict.fromkeys(("calibrate", "certify", "design", "couple"))  # null where the stage has no result
+    return {"imports": list(imports.values()), **absent, **found, "residuals": residual_table(facts.misfits)}
 
 
 def _range(name: str, ranges: Mapping[str, Any]) -> list[float] | None:

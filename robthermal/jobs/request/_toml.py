@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Collection, Iterator
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -60,10 +62,10 @@ def read_toml(path: Path, schema: type[T], remedy: str) -> T:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
     except ValidationError as error:
-        raise refusal(error, path, remedy) from None
+        raise refusal(error, path, remedy, set(_keys(schema))) from None
 
 
-def refusal(error: ValidationError, path: Path, remedy: str) -> InputError:
+def refusal(error: ValidationError, path: Path, remedy: str, known: Collection[str] = ()) -> InputError:
     """One clear message for a table that does not fit; unknown keys come first.
 
     Parameters
@@ -74,10 +76,28 @@ def refusal(error: ValidationError, path: Path, remedy: str) -> InputError:
         File that the table comes from.
     remedy : str
         Where the user finds the keys.
+    known : collection of str, optional
+        Keys of the file's tables, for the nearest one to an unknown key.
     """
     faults: list[Any] = error.errors(include_url=False)
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
     place = ".".join(str(word) for word in fault["loc"])
     what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
         fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
-    return InputError(what, where=str(path), remedy=remedy)
+    near = get_close_matches(str(fault["loc"][-1]), known, n=1) if fault["type"] == "extra_forbidden" else []
+    return InputError(what, where=str(path), remedy=f"Did you mean {near[0]!r}? {remedy}" if near else remedy)
+
+
+def _keys(schema: type[BaseModel]) -> Iterator[str]:
+    """Keys of a table and of the tables in it."""
+    for name, field in schema.model_fields.items():
+        yield field.alias or name
+        for table in _tables(field.annotation):
+            yield from _keys(table)
+
+
+def _tables(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _tables(inner)
