@@ -467,7 +467,7 @@ def test_a_line_of_100_megabytes_is_refused_everywhere(run: Run, system: Path, t
     assert run("verify", first).status == 2
     second = write(first, HEADER.encode() + line)
     done = run("check", system, second)
-    refused(done, "first.csv", "line 2")
+    refused(done, "first.csv", "no data rows")  # a last row with too few cells is dropped
     assert len(done.err) < 1000
     first.unlink()
 

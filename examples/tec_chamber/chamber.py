@@ -32,8 +32,7 @@ def main(folder: Path, out: Path) -> None:
     for name in ("run01", "run04", "run06", "run02"):
         print(rt.read_record(folder / f"{name}.csv", system).imported)
     project = write_project(folder, out.with_suffix(".toml"))
-    result = rt.jobs.run_job(rt.jobs.read_project(project))
-    report = rt.jobs.write_job(result, out)
+    report = rt.jobs.run_project(rt.jobs.read_project(project), out)
     print(report.verdict, *report.reasons, sep="\n  ")
     print(f"report: {out / 'report.html'}; the same by: robthermal run {project} --out {out}")
 

@@ -22,6 +22,7 @@ from ._noise import scipy_loss as scipy_loss
 from ._noise import score as score
 from ._noise import score_slope as score_slope
 from ._noise import smallest_noise as smallest_noise
+from ._operating_point import OperatingPoint as OperatingPoint
 from ._problem import Problem as Problem
 from ._problem import Weigh as Weigh
 from ._problem import scaled as scaled

@@ -85,8 +85,8 @@ def test_uncertain_links():
     wide = dataclasses.replace(proven.loop, region={**proven.loop.region, "parameters": {names[0]: [1e-6, 10.0]}})
     assert not rt.verify(wide).valid
     for parameters, message in (({"modules.m.seebeck.value": (0.049, 0.051)},
-                                 "'modules.m.seebeck.value' cannot be uncertain in a loop: the law is made of .*"
-                                 "runaway_free and usable_current claim"),
+                                 "'modules.m.seebeck.value' cannot be uncertain in a loop: the feedback law is made "
+                                 "of .*runaway_free and usable_current claim"),
                                 ({"lumps.sink.capacity": (1.0, 1e3)}, "'lumps.sink.capacity' cannot be uncertain"),
                                 ({names[0]: (0.1, 0.2)}, "excludes")):
         with pytest.raises(rt.InputError, match=message):

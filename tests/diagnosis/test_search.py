@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
@@ -148,6 +149,8 @@ def test_where_the_search_gave_up_there_is_no_name(
     assert rt.diagnose(plant, train, validation=validation, effects=names).verdict == "named"
     # whatever the other gates say
     monkeypatch.setattr("robthermal.diagnosis.search._stages.leaves_large_misfit", lambda *_: True)
+    # and where no search beside a finer network follows, which asks again
+    monkeypatch.setattr(sys.modules["robthermal.diagnosis.diagnose"], "graded", lambda judged, *_: judged)
     found = rt.diagnose(plant, train, validation=validation, effects=names)
     assert found.verdict == "unexplained" and not found.effects and "A large misfit stays" in found.outcome.text
     assert [effect.label for effect in found.provisional] == ["natural_convection(plate, room)"]

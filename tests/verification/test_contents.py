@@ -10,9 +10,10 @@ CLAIMED = {"Lump": {"capacity"}, "Link": {"name", "between", "conductance", "nat
            "Module": {"hot", "cold", "seebeck", "resistance", "conductance", "reference_temperature"},
            "Sensor": {"lump", "gain"}, "Input": set(),
            "System": {"name", "ambients", "lumps", "links", "modules", "sensors"}}
-# starts, noise, limits of inputs, what a sensor adds to its reading; an observer refuses lag and delay by itself
+# starts, noise, limits of inputs, what a sensor adds to its reading; an observer refuses lag, delay, voltages itself
 HARMLESS = {"Lump": {"disturbance", "initial"}, "Module": {"current_limits"}, "Ambient": {"temperature"},
-            "Sensor": {"noise", "offset", "time_constant", "delay"}, "Input": {"lump", "gain", "limits", "unit"},
+            "Sensor": {"noise", "offset", "time_constant", "delay", "module", "quantity", "lead_resistance"},
+            "Input": {"lump", "gain", "limits", "unit"},
             "System": {"temperature_unit", "inputs", "fit", "record", "columns"}}  # how files are read
 
 

@@ -158,7 +158,7 @@ def _robust_numbers(problem: Problem, X_hat: control.StateSpace, Y_hat: control.
     delta = youla_parameter(problem, X_hat, Y_hat)
     robust, where = proofs.radius(delta, intervals)
     bare, without = problem.uncertainty.without_confidence(), robust
-    if not np.array_equal(bare.envelope, problem.uncertainty.envelope):
+    if not np.allclose(bare.envelope, problem.uncertainty.envelope, rtol=1e-9, atol=0.0):
         without = Proofs(False).radius(delta, intervals_of(bare, problem.dt))[0]
     return {"robust": robust, "robust_without_circles": without,
             "small_gain": proofs.small_gain(delta, intervals, intervals.weights())}, where

@@ -69,7 +69,8 @@ def run_project(project: Project, out: str | Path, *, only: Sequence[str] = (), 
     --------
     >>> from pathlib import Path
     >>> import robthermal as rt
-    >>> _ = Path("bar.toml").write_text('[system]\\nname = "bar"\\n[ambients.room]\\ntemperature = 295.0\\n'
+    >>> _ = Path("bar.toml").write_text('[system]\\nname = "bar"\\ntemperature_unit = "K"\\n'
+    ...     '[ambients.room]\\ntemperature = 295.0\\n'
     ...     '[lumps.bar]\\ncapacity = 50.0\\n[[links]]\\nbetween = ["bar", "room"]\\nconductance = 0.5\\n')
     >>> _ = Path("project.toml").write_text('[project]\\nname = "bar"\\nsystem = "bar.toml"\\n')
     >>> project = rt.jobs.read_project("project.toml")

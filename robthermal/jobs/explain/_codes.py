@@ -30,8 +30,8 @@ def outcome_codes() -> dict[str, tuple[OutcomeCode, ...]]:
     Examples
     --------
     >>> from robthermal.jobs.explain import outcome_codes
-    >>> [code.ok for code in outcome_codes()["not_certified"]]
-    [False, False]
+    >>> any(code.ok for code in outcome_codes()["not_certified"])
+    False
     """
     found: dict[str, list[OutcomeCode]] = {}
     for member in (member for enum in _ENUMS for member in enum):
