@@ -90,7 +90,7 @@ def write_json(report: Report, path: str | Path) -> Path:
     False
     """
     data = dict(report.data)
-    if "certify" in data:
+    if data.get("certify"):
         data["certify"] = {**data["certify"], "nominal": _answers(report, "nominal"),
                            "robust": _answers(report, "ranges")}
     stages = {one.name: {"status": one.status, "seconds": one.seconds, "hash": one.hash} for one in report.stages}
