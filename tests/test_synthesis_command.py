@@ -63,6 +63,10 @@ def test_pid_of_a_measured_response(run, tmp_path):
     assert done.status == 0, done.out + done.err
     design = json.loads((tmp_path / "out" / "design.json").read_text())
     assert design["outcome"]["code"] == "at_the_bins" and design["value"] <= 1 / 0.6
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert [reason["code"] for reason in summary["reasons"]] == ["at_the_bins"]
+    assert summary["verdict"] == "PASS WITH REMARKS"
+    assert "not proven: 1." in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize(("content", "method", "words"), [

@@ -11,7 +11,7 @@ from ..thermal import System
 from ._corner_values import Corner, Ranges, checked_ranges
 from ._linearization import FeedbackLinearization, feedback_linearization
 from ._modules import Array
-from ._reachable import held_near, reachable
+from ._reachable import Reachable, held_near, reachable
 from ._regulated_points import Regulate, regulated_points
 from ._sampled_loop import LoopParts, SampledLoop
 
@@ -92,6 +92,24 @@ class Operation:
         """
         held = reachable(law, setpoint, regulate=regulate, inputs=inputs)
         held.require()
+        return cls.at_reached(law, held, regulate, inputs)
+
+    @classmethod
+    def at_reached(cls, law: FeedbackLinearization, held: Reachable, regulate: Regulate,
+                   inputs: Mapping[str, float] | None) -> Operation:
+        """Around set-points known to be held.
+
+        Parameters
+        ----------
+        law : FeedbackLinearization
+            Of the nominal model.
+        held : Reachability
+            Steady state of the nominal plant.
+        regulate : mapping or None
+            Sensor or lump that a module regulates.
+        inputs : mapping or None
+            Heaters [unit] and ambients [K].
+        """
         around = dict(inputs or {})
         nominal = OperatedPlant({}, law.system, np.array(list(held.temperatures.values())), {**around, **held.current})
         return cls(law, held.setpoint, regulate, around, nominal)
@@ -198,9 +216,7 @@ def face_ranges(law: FeedbackLinearization, setpoint: Mapping[str, float] | floa
     ranges = checked_ranges(law.system, parameters)
     if not (held.outcome and regulate and ranges):
         return {name: (face, face) for name, face in held.faces.items()}
-    around = dict(inputs or {})
-    nominal = OperatedPlant({}, law.system, np.array(list(held.temperatures.values())), {**around, **held.current})
-    operation = Operation(law, held.setpoint, regulate, around, nominal)
+    operation = Operation.at_reached(law, held, regulate, inputs)
     faces = np.array(list(held.faces.values()))
     low = high = np.zeros(len(faces))
     for name, pair in ranges.items():

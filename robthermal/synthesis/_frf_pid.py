@@ -304,11 +304,12 @@ def _finished(discs: list[Discs], structure: Structure, bins: Bins, gains: Array
     """Evaluate the gains at the bins, and prove the loop where there is a model."""
     robust = min(float(bins.distance(gains).min()), _between(discs, structure, gains))
     stable = all(_stable(one, structure, gains, poles) for one in discs)
-    kept = stable and robust >= margin and bins.excess(gains) <= 1e-9
+    unmeasured = next((text for one in discs if (text := _crossing_not_measured(one, structure, gains))), "")
+    kept = stable and robust >= margin and bins.excess(gains) <= 1e-9 and not unmeasured
     K = structure.realized(gains)
     models = [one.model for one in discs if one.model is not None]
     certificates = [_sensitivity_below(model, K, margin) for model in models] if kept else []
-    outcome = _judge(kept, robust, margin, bins.excess(gains), certificates, len(discs))
+    outcome = _judge(kept, robust, margin, bins.excess(gains), certificates, unmeasured)
     value = 1 / robust if kept and not models else np.inf
     if models and kept and all(one.holds for one in certificates):
         value = max(float(one.region["bound"]) for one in certificates)
@@ -322,8 +323,27 @@ def _finished(discs: list[Discs], structure: Structure, bins: Bins, gains: Array
                      modulus_margin={"stated": margin, "robust": robust}, discs=discs, structure=structure)
 
 
+def _crossing_not_measured(one: Discs, structure: Structure, gains: Array) -> str:
+    """Where the loop of a measured response crosses 1 outside of its bins; empty where it does so within them.
+
+    There the bins say nothing about stability: a loop is above 1 below the first bin only by its integrator, and has to
+    be below 1 at the last one over the whole circle.
+    """
+    if one.model is not None:
+        return ""
+    C = abs(structure.basis(one.omega) @ gains)
+    if (abs(one.center[-1]) + one.radius[-1]) * C[-1] >= 1:
+        return f"above the last bin, {one.omega[-1] / (2 * np.pi):.4g} Hz: measure further up"
+    if structure.integral(gains) and abs(one.center[0]) * C[0] <= 1:
+        return f"below the first bin, {one.omega[0] / (2 * np.pi):.4g} Hz: measure longer, or further up"
+    return ""
+
+
 def _judge(kept: bool, robust: float, margin: float, excess: float, certificates: Sequence[Certificate],
-           count: int) -> Outcome:
+           unmeasured: str) -> Outcome:
+    if unmeasured:
+        return SynthesisCode.INFEASIBLE.outcome(f"The best loop found crosses 1 {unmeasured}.",
+                                                remedy="Nothing measured tells whether such a loop is stable.")
     if not kept:
         missed = f"{100 * excess:.3g} % of a weight is missing" if np.isfinite(excess) and robust >= margin else (
             f"the modulus margin over all circles is {robust:.3g}")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,6 +97,33 @@ def test_what_is_ambiguous_is_not_adopted(tmp_path: Path) -> None:
     assert report.verdict == "FAIL" and summary["diagnose"]["adopted"] is False  # type: ignore[index]
     assert {"diagnosis_ambiguous", "validation_misfit"} <= {one.code for one in report.reasons if one.level == "fail"}
     assert "sensors.T.time_constant" not in summary["certify"]["parameters"]  # type: ignore[index]
+
+
+def test_an_effect_beside_a_remainder_is_not_adopted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same effect, named while something else is left: a person has to judge it."""
+    room = importlib.import_module("robthermal.jobs.chain._diagnose")
+    found = room.diagnose_records
+
+    def with_remainder(*inputs: Any, **options: Any) -> Any:
+        result = found(*inputs, **options)
+        return replace(result, diagnosis=replace(result.diagnosis, verdict="named_with_remainder"))
+
+    monkeypatch.setattr(room, "diagnose_records", with_remainder)
+    _, summary = go(write_lagging(tmp_path, f"{PROJECT}[diagnose]\nadopt = true\n"), tmp_path / "out")
+    assert summary["diagnose"] == {"verdict": "named_with_remainder", "adopted": False,
+                                   "effects": ["sensor_lag(T)"]}
+    assert "sensors.T.time_constant" not in summary["certify"]["parameters"]  # type: ignore[index]
+
+
+def test_a_box_above_the_stated_temperatures_is_a_remark(tmp_path: Path) -> None:
+    """8 W through 0.4 W/K warm the bar by 20 K: with 30 degrees stated, the machine gets hotter than stated."""
+    project = PROJECT.replace("temperature = [15.0, 45.0]", "temperature = [15.0, 30.0]")
+    report, _ = go(write_bar(tmp_path, project=project), tmp_path / "out")
+    found = {one.code: one for one in report.reasons}["box_beyond_temperature"]
+    assert found.level == "remark" and report.verdict == "PASS WITH REMARKS"
+    assert found.value is not None and found.value > 273.15 + 21.0 + POWER / CONDUCTANCE
+    inside, _ = go(write_bar(tmp_path), tmp_path / "inside")
+    assert "box_beyond_temperature" not in {one.code for one in inside.reasons}
 
 
 def write_multisine(folder: Path, project: str, seed: int = 3) -> Path:

@@ -194,3 +194,12 @@ def test_result_prints_exports_and_has_margins(tmp_path):
     assert found["gain"] > 1 and 20 < found["phase"] < 120 and found["delay"] > 0
     d.export(tmp_path / "pi.json")
     assert (tmp_path / "pi.json").exists()
+
+
+@pytest.mark.parametrize("high", [0.01, 0.06])
+def test_a_loop_that_crosses_one_outside_of_the_bins_is_refused(high):
+    """The phase of 1/(s+1)^3 passes -180 degrees at 0.28 Hz: nothing measured says how a useful loop ends there."""
+    G = measured(control.tf([1], [1, 3, 3, 1]), 1e-6, high=high)
+    d = rt.design.frf_pid(G, modulus_margin=0.5)
+    assert not d.holds and d.outcome.code == "infeasible"
+    assert "crosses 1 below the first bin" in d.outcome.text, d.outcome.text

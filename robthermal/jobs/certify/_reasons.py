@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
+from ..._celsius import ZERO_CELSIUS
 from ...report import Reason
 from ..claims import Certification, GateCode
 from ._currents import CODES, box_stays_inside, current_reasons, within_usable
 
-CERTIFY_GATES = tuple(code.code for code in (*CODES.values(), GateCode.NOMINAL_ONLY))
+CERTIFY_GATES = tuple(code.code for code in (*CODES.values(), GateCode.BOX_BEYOND_TEMPERATURE, GateCode.NOMINAL_ONLY))
 
 
 def certification_reasons(result: Certification, measured: Mapping[str, tuple[float, float]] | None = None
@@ -23,9 +24,24 @@ def certification_reasons(result: Certification, measured: Mapping[str, tuple[fl
         Range of the currents in the records, by module [A].
     """
     found = [*current_reasons(result.current, measured or {}, result.usable, box_inside(result))]
+    found.extend(_hotter_than_stated(result))
     if result.parameters is None:
         found.append(remark(GateCode.NOMINAL_ONLY, "certify", "parameters", GateCode.NOMINAL_ONLY.meaning))
     return tuple(found)
+
+
+def _hotter_than_stated(result: Certification) -> Iterator[Reason]:
+    """Of machines without modules; with modules the usable current is what keeps the box inside the stated one."""
+    if result.system.modules:
+        return
+    boxes = [one.certificate.region["temperature"] for one in result.checked
+             if one.required and one.good and one.certificate.kind == "invariance"]
+    hottest = max((float(high) for box in boxes for _, high in box.values()), default=0.0)
+    stated = result.boxes.temperature[1]
+    if hottest > stated:
+        text = (f"With the stated heats and ambients the machine is certified to stay below "
+                f"{hottest - ZERO_CELSIUS:.1f} °C, not below the stated {stated - ZERO_CELSIUS:.1f} °C.")
+        yield remark(GateCode.BOX_BEYOND_TEMPERATURE, "certify", "temperature", text, hottest, stated)
 
 
 def box_inside(result: Certification) -> bool:

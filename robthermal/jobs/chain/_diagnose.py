@@ -42,7 +42,7 @@ def _run(context: Context, folder: Path) -> Report:
                               [*data.validation, *data.held_out], context.progress, session_gain=project.session_gain)
     found = result.diagnosis
     save_diagnosis(found, folder)
-    adopted = project.adopt and found.verdict in ("named", "named_with_remainder")
+    adopted = project.adopt and found.verdict == "named"  # a name beside a remainder is for a person to judge
     facts: dict[str, Any] = {"diagnosis": asdict(diagnosis_facts(found, adopted))}
     tables: dict[str, Any] = {"diagnose": {"verdict": found.verdict, "adopted": adopted,
                                            "effects": [effect.label for effect in found.effects]}}

@@ -39,6 +39,9 @@ class GateCode(Enum):
                               "Ask for less current.")
     CURRENT_BEYOND_INVARIANCE = ("Currents exceed those for which a box inside the stated one is never left.",
                                  "Ask for less current, or improve the heat sink.")
+    BOX_BEYOND_TEMPERATURE = ("The box that is certified never to be left reaches above the stated temperatures: with "
+                              "the stated heats and ambients the machine may get hotter than stated.",
+                              "Narrow [certify] heat or ambient, or raise [certify] temperature.")
     OUTSIDE_DATA = ("A claim reaches beyond what the records hold.",
                     "Measure there, or narrow what is claimed.")
     SIMULATED_DATA = ("The records are simulated: they say nothing about a machine.", "Replace them by measurements.")
@@ -54,6 +57,8 @@ class GateCode(Enum):
                      "Ask for less bandwidth or margin; the reason says how much bandwidth is possible.")
     LOOP_NOT_ROBUST = ("A loop is unstable, or cannot hold its set-point, for some parameters in their ranges.",
                        "Ask for less bandwidth, move the set-points, or measure the parameter that is named better.")
+    AT_THE_BINS = ("The controller was judged at the bins of a measured response only, in floating point: that the "
+                   "loop is stable is not proven.", "Give a model of the plant for a proof; step the loop with care.")
     REPORT_CHANGED = ("report.json is not what the job wrote.", "Run the job again.")
 
     def __init__(self, meaning: str, remedy: str) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 
 from ...export import plain
-from ...report import Claim, Report, Section, Table
-from ..claims import ARITHMETIC
+from ...report import Claim, Reason, Report, Section, Table
+from ..claims import ARITHMETIC, GateCode
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
@@ -56,12 +56,18 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
     report = Report(title=f"Controller by {result.method}", subtitle=result.job.files[0].name, label="",
                     claims=tuple(_claims(result)), sections=tuple(_sections(result)),
                     provenance=provenance(result.job.files), assumptions=(*_ASSUMED, ARITHMETIC), generated=now(),
-                    data=data)
+                    gate=tuple(_remarks(result)), gates=(GateCode.AT_THE_BINS.code,), data=data)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
         for name in ("design.json", *(("controller.c", "controller.h") if design.controller.dt else ())):
             design.export(folder / name)
     return report
+
+
+def _remarks(result: Synthesis) -> Iterator[Reason]:
+    if result.design.holds and not result.checked:
+        code = GateCode.AT_THE_BINS
+        yield Reason("remark", code.code, "design", "response", code.meaning, code.remedy)
 
 
 def _claims(result: Synthesis) -> Iterator[Claim]:
@@ -81,12 +87,19 @@ def _claims(result: Synthesis) -> Iterator[Claim]:
                     one.file, one.certificate.kind, one.verdict.seconds if one.verdict else 0.0)
 
 
+def _reached(result: Synthesis) -> str:
+    if not result.design.holds:
+        return "Nothing is proven."
+    how = "Proven" if result.checked else "Evaluated at the bins in floating point, not proven"
+    return f"{how}: {result.design.value:.6g}."
+
+
 def _sections(result: Synthesis) -> Iterator[Section]:
     design = result.design
     K = design.controller
     sizes = f"{K.nstates} states, {K.ninputs} inputs, {K.noutputs} outputs"
     text = (f"{design.method}, {design.solver}; {design.solve_time:.3g} s.\n\nController: {sizes}, "
-            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\nProven: {design.value:.6g}. Best possible, "
+            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\n{_reached(result)} Best possible, "
             f"estimated: {design.lower:.6g}.\n\n{design.outcome.text}\n\n{design.robust_against.text}")
     rows = pd.DataFrame([{"loop": name, **{key: f"{value:.4g}" for key, value in one.items()}}
                          for name, one in design.margins.items()])

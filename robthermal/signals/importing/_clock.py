@@ -104,7 +104,7 @@ def time_reader(source: Source, places: tuple[int, ...], options: ImportOptions)
     """Reader of the time of every row of a source, chosen by its first rows."""
     table, most = source.table, source.most_rows
     if not places:
-        return Counted(table, float(options.sample_time or 1.0))
+        return Counted(float(options.sample_time or 1.0))
     if len(places) == 2:
         return date_reader(table, places, most, options)
     header = table.headers[places[0]]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ._options import ImportOptions
 from ._table import Block, Table
-from ._times import CLOCK, DURATION, NUMERIC, Clock, Durations, Numbers, TimeReader, TimesOfDay, texts_of
+from ._times import CLOCK, DURATION, NUMERIC, CellReader, Clock, Durations, Numbers, TimeReader, TimesOfDay, texts_of
 from ._tokens import NUMBER, short
 from ._zones import since_first
 
@@ -51,7 +51,7 @@ def stamp_reader(
     """
     cells, declared = table.columns[places[0]], options.time_format
     if isinstance(cells, pd.DatetimeIndex):
-        return DateCells(table, places, most, options)
+        return DateCells(table, places, options)
     pattern = declared is not None and "%" in declared
     if cells.dtype.kind == "f" and not pattern or declared in (*NUMERIC, "epoch_s", "epoch_ms", "excel"):
         return Numbers(table, places, most, unit, options)
@@ -90,9 +90,9 @@ class DateCells(TimeReader):
 
     text = False
 
-    def __init__(self, table: Table, places: tuple[int, ...], most: int, options: ImportOptions):
-        super().__init__(table, places, 0)
-        self._options = options
+    def __init__(self, table: Table, places: tuple[int, ...], options: ImportOptions):
+        self.places = places
+        self._table, self._options = table, options
         self._stamps = pd.DatetimeIndex([])
 
     def add(self, block: Block) -> None:
@@ -101,16 +101,17 @@ class DateCells(TimeReader):
 
     def clock(self) -> Clock:
         """The clock of all rows."""
-        return Clock(*since_first(self.table, self.header, self._stamps, self._options), "date cells")
+        header = self._table.headers[self.places[0]]
+        return Clock(*since_first(self._table, header, self._stamps, self._options), "date cells")
 
 
-class Dates(TimeReader):
+class Dates(CellReader):
     """Dates as texts.
 
     Parameters
     ----------
     table, places, most
-        As for `TimeReader`.
+        As for `CellReader`.
     options : ImportOptions
         time_format and timezone.
     first : str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,8 +44,23 @@ class Clock:
     format: str
 
 
-class TimeReader:
-    """Time of every row, block by block.
+class TimeReader(ABC):
+    """Time of every row, block by block."""
+
+    text = True  # whether the columns are to be left as texts
+    places: tuple[int, ...] = ()  # columns of the table
+
+    @abstractmethod
+    def add(self, block: Block) -> None:
+        """Take the times of further rows."""
+
+    @abstractmethod
+    def clock(self) -> Clock:
+        """The clock of all rows; refuses cells that are no times."""
+
+
+class CellReader(TimeReader):
+    """Times from cells; what a kind of cell means is for subclasses to say.
 
     Parameters
     ----------
@@ -56,7 +72,6 @@ class TimeReader:
         As many rows as there can be.
     """
 
-    text = True  # whether the columns are to be left as texts
     dtype: Any = np.float64
     expected = ""
 
@@ -98,14 +113,16 @@ class TimeReader:
     def _cells(self, block: Block) -> Any:
         return block.columns[self.places[0]]
 
+    @abstractmethod
     def _parsed(self, cells: Any) -> Any:
-        raise NotImplementedError
+        """Values of cells; what is none of them is not finite."""
 
     def _bad(self, values: Any) -> NDArray[np.bool_]:
         return ~np.isfinite(values)
 
+    @abstractmethod
     def _finished(self, values: Any) -> Clock:
-        raise NotImplementedError
+        """The clock of the values of all rows."""
 
     def _refuse_faults(self) -> None:
         if self._missing and (not self._wrong or self._missing[0] < self._wrong[0]):
@@ -128,8 +145,8 @@ class TimeReader:
 class Counted(TimeReader):
     """Rows of a file without a time column, a sample time apart."""
 
-    def __init__(self, table: Table, sample_time: float):
-        super().__init__(table, (), 0)
+    def __init__(self, sample_time: float):
+        self._n = 0
         self._step = sample_time
 
     def add(self, block: Block) -> None:
@@ -141,7 +158,7 @@ class Counted(TimeReader):
         return Clock(np.arange(self._n, dtype=np.float64) * self._step, None, "counted")
 
 
-class Numbers(TimeReader):
+class Numbers(CellReader):
     """Numbers of a unit of time, or since an epoch."""
 
     expected = "a number"
@@ -196,7 +213,7 @@ def _unit_of_time(table: Table, header: str, unit: str | None) -> tuple[float, s
     return found.factor, found.name
 
 
-class TimesOfDay(TimeReader):
+class TimesOfDay(CellReader):
     """h:mm:ss or h:mm; times of day may pass midnight, which elapsed time does not."""
 
     expected = "h:mm:ss"
@@ -226,7 +243,7 @@ class TimesOfDay(TimeReader):
         return Clock(values, None, self._name)
 
 
-class Durations(TimeReader):
+class Durations(CellReader):
     """``12 sec``: a number and a unit of time in every cell."""
 
     expected = "a number and s, ms, min or h"
