@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -196,6 +197,40 @@ def test_rounded_stamps_are_counted_and_a_lost_row_is_not(tmp_path: Path, stage:
     assert (record.sample_time, record.n_samples) == (1.5, N) and adds_up(record)
     path.write_text(HEADER + rows(lambda k: f"{k},20.{k:02d},0.5,1", skip=(20,)))
     assert [part.n_samples for part in rt.read_records(path, stage)] == [20, 39]
+
+
+@pytest.mark.parametrize("h", [0.7, 1.02, 1.4, 2.35, 7.3])
+@pytest.mark.parametrize("phase", [0.0, 0.41])
+def test_any_step_of_a_clock_of_whole_seconds(tmp_path: Path, stage: Any, h: float, phase: float) -> None:
+    """A logger whose period is no multiple of the second of its stamps."""
+    path = tmp_path / "run.csv"
+    path.write_text(HEADER + "".join(rounded_rows(h, phase, ())))
+    record = rt.read_record(path, stage)
+    assert record.n_samples == 600 and record.sample_time == pytest.approx(h, abs=1.1 / 600) and adds_up(record)
+
+
+@pytest.mark.parametrize("h", [1.02, 1.4, 2.35, 7.3])  # a gap of n periods shorter than the unit is n or n + 1 rows
+def test_parts_of_a_rounded_clock_stay_on_one_grid(tmp_path: Path, stage: Any, h: float) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(HEADER + "".join(rounded_rows(h, 0.0, range(200, 205))))
+    parts = rt.read_records(path, stage)
+    assert [part.n_samples for part in parts] == [200, 395] and parts[0].sample_time == parts[1].sample_time
+    assert parts[1].start_time == pytest.approx(205 * h, abs=1.01 + h / 2)
+    filled = rt.read_record(path, stage, gaps="fill", fill_up_to=5)
+    np.testing.assert_allclose(filled["T1"], 293.15 + 0.001 * np.arange(600), atol=1e-9)
+
+
+def rounded_rows(h: float, phase: float, lost: Sequence[int]) -> list[str]:
+    return [f"{round(h * k + phase)},{20 + 0.001 * k:.3f},0.5,1\n" for k in range(600) if k not in lost]
+
+
+def test_lost_rows_are_not_taken_for_a_rounded_clock(tmp_path: Path, stage: Any) -> None:
+    """One row in 30 lost at random, of a logger with a true step of 1 s: never a grid of another step."""
+    for seed in range(20):
+        kept = np.sort(np.random.default_rng(seed).permutation(np.arange(1, 600))[:579])
+        path = tmp_path / "run.csv"
+        path.write_text(HEADER + "".join(f"{k},20.0,0.5,1\n" for k in kept))
+        assert {part.sample_time for part in rt.read_records(path, stage)} == {1.0}
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

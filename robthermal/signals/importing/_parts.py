@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ._options import ImportOptions
-from ._samples import nice
+from ._rounded import nice
 from ._table import Action, Array, Table, spans
 
 Flags = NDArray[np.bool_]
@@ -261,7 +261,8 @@ def _step(long: Sequence[slice], stamps: Array, median: float) -> float:
     duration = intervals = 0.0
     for rows in long:
         duration += float(stamps[rows.stop - 1] - stamps[rows.start])
-        intervals += max(sum(float(np.rint(steps / median).sum()) for _, steps in _steps(stamps[rows])), 1.0)
+        counts = (np.ceil(steps / median - 0.5) for _, steps in _steps(stamps[rows]))  # 1.5 steps of a rounded clock: 1
+        intervals += max(sum(float(count.sum()) for count in counts), 1.0)
     h = duration / intervals
     worst = max(float(np.abs(steps - h).max()) for rows in long for _, steps in _steps(stamps[rows]))
     return nice(h, worst / duration)
