@@ -123,6 +123,32 @@ def test_imports_stand_at_the_top(path: Path) -> None:
     assert not hidden, f"{relative(path)}: imports inside functions at (line, module) {sorted(hidden)}"
 
 
+_ON_FIRST_USE = ("control", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate",
+                 "scipy.ndimage", "scipy.io", "scipy.fft")
+
+
+def test_slow_libraries_are_imported_on_first_use() -> None:
+    """`import scipy`, then `scipy.signal.lfilter(...)`, which scipy loads when asked; `from .._control import control`."""
+    found = [f"{relative(path)}:{node.lineno} {name}" for path in FILES if path.name != "conftest.py"
+             for node in ast.parse(path.read_text(encoding="utf-8")).body for name in _imported(node)
+             if any(f"{name}.".startswith(f"{slow}.") for slow in _ON_FIRST_USE)]
+    assert not found
+
+
+def _imported(node: ast.stmt) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom) and not node.level:
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return []
+
+
+def test_imports_at_the_top_are_seen() -> None:
+    code = "import control, scipy\nfrom scipy import stats\nfrom scipy.signal import lfilter\nfrom . import x"
+    assert [name for node in ast.parse(code).body for name in _imported(node)] == [
+        "control", "scipy", "scipy.stats", "scipy.signal.lfilter"]
+
+
 @pytest.mark.parametrize("path", FILES, ids=relative)
 def test_no_file_is_longer_than_400_lines(path: Path) -> None:
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400

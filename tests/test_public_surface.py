@@ -155,10 +155,13 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert [name for name in loaded if name.split(".")[0] in heavy] == []
 
 
+_ON_FIRST_USE = ("control", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize")  # slow to import
+
+
 @pytest.mark.parametrize(("package", "unused"), [
     ("errors", ("numpy", "scipy", "pandas")), ("verification", ("scipy", "pandas", "control", "cvxpy", "matplotlib")),
-    ("signals", ("cvxpy", "control", "matplotlib")), ("thermal", ("cvxpy", "clarabel")),
-    ("identify", ("cvxpy", "clarabel"))])
+    ("signals", ("cvxpy", *_ON_FIRST_USE)), ("thermal", ("cvxpy", "clarabel", *_ON_FIRST_USE)),
+    ("identify", ("cvxpy", "clarabel", *_ON_FIRST_USE)), ("jobs.chain", ("cvxpy", *_ON_FIRST_USE))])
 def test_packages_load_no_more_than_they_need(package: str, unused: tuple[str, ...]) -> None:
     code = f"import sys, robthermal.{package}; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True

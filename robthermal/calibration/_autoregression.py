@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from .._arrays import Floats
 
@@ -34,7 +34,8 @@ class Correlation:
         Zeros before the first sample let the innovations before it count too: e was stationary when it began.
         """
         J = np.concatenate([np.zeros_like(J), J])
-        back = np.stack([lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)], axis=1)
+        back = np.stack([scipy.signal.lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)],
+                        axis=1)
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
 
     def share(self, psi: Floats) -> float:
@@ -77,7 +78,7 @@ def correlation_of(segments: list[Floats]) -> Correlation:
     """
     n_sensors = segments[0].shape[1]
     polynomials = tuple(burg([e[:, s] for e in segments]) for s in range(n_sensors))
-    v = np.concatenate([np.column_stack([lfilter(a, [1.0], e[:, s]) for s, a in enumerate(polynomials)])
+    v = np.concatenate([np.column_stack([scipy.signal.lfilter(a, [1.0], e[:, s]) for s, a in enumerate(polynomials)])
                         for e in segments])
     return Correlation(polynomials, v.T @ v / len(v))
 

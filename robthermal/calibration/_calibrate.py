@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 from threadpoolctl import threadpool_limits
 
 from .._arrays import Floats
@@ -182,8 +182,9 @@ def _solve(problem: JointProblem, declared: dict[str, float], loss: Loss, max_it
         records.weigh = _weights(records, v, noise, filtered)
         if several:  # by size first, from wherever the start is; then by combinations, which need to be near
             problem = problem.weighed(v, combined=number > 0)
-        run = least_squares(problem.vector, v, problem.jacobian, bounds=records.bounds, x_scale="jac",
-                            loss=scipy_loss(loss, records.n_readings), max_nfev=left, ftol=enough, xtol=1e-9, gtol=1e-9)
+        run = scipy.optimize.least_squares(problem.vector, v, problem.jacobian, bounds=records.bounds, x_scale="jac",
+                                           loss=scipy_loss(loss, records.n_readings), max_nfev=left, ftol=enough,
+                                           xtol=1e-9, gtol=1e-9)
         moved = np.abs(run.x - v)[:p] / problem.ranges.unit
         v, left = run.x, left - run.nfev
         new = _levels(records, v, unknown, loss)

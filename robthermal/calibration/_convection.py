@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
+import scipy
 
 from .._arrays import Floats
 from ..errors import InputError, Outcome
@@ -142,9 +142,10 @@ def _law(p: Floats, excess: Floats) -> Floats:
 def _fitted(excess: Floats, heat: Floats, area: float) -> ConvectionLaw:
     h = heat / (area * excess)
     scale = float(h.mean())
-    run = least_squares(lambda p: (_law(p, excess) - h) / scale, [scale / 2, scale / 2 / excess.mean() ** 0.25, 0.25],
-                        bounds=([0.0, 0.0, 0.01], [np.inf, np.inf, 1.0]), x_scale=[scale, scale, 1.0], xtol=1e-12,
-                        ftol=1e-12, gtol=1e-12)
+    run = scipy.optimize.least_squares(
+        lambda p: (_law(p, excess) - h) / scale, [scale / 2, scale / 2 / excess.mean() ** 0.25, 0.25],
+        bounds=([0.0, 0.0, 0.01], [np.inf, np.inf, 1.0]), x_scale=[scale, scale, 1.0], xtol=1e-12, ftol=1e-12,
+        gtol=1e-12)
     spare = h.size - _UNKNOWN
     variance = 2.0 * float(run.cost) / spare if spare else math.inf
     information = run.jac.T @ run.jac

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from scipy.stats import f as f_distribution
-from scipy.stats import t as t_distribution
+import scipy
 
 from ..errors import InputError
 
@@ -31,8 +30,8 @@ def factor(shape: str, count: int, degrees_of_freedom: float, confidence: float)
     if not count:
         return 0.0
     if shape == "box":
-        return float(t_distribution.ppf(1.0 - (1.0 - confidence) / (2 * count), degrees_of_freedom))
-    return math.sqrt(count * float(f_distribution.ppf(confidence, count, degrees_of_freedom)))
+        return float(scipy.stats.t.ppf(1.0 - (1.0 - confidence) / (2 * count), degrees_of_freedom))
+    return math.sqrt(count * float(scipy.stats.f.ppf(confidence, count, degrees_of_freedom)))
 
 
 def check_request(confidence: float, shape: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from .._arrays import Floats
 from ._autoregression import Correlation
@@ -58,4 +58,4 @@ def covariance_scale(found: Floats, expected: Floats, count: int) -> float:
         return 1.0
     root = vectors[:, kept] / np.sqrt(values[kept])
     ratio = float(np.trace(root.T @ found @ root)) / int(kept.sum()) * count / (count - 1)
-    return ratio if ratio > chi2.ppf(1.0 - _LEVEL, count - 1) / (count - 1) else 1.0
+    return ratio if ratio > scipy.stats.chi2.ppf(1.0 - _LEVEL, count - 1) / (count - 1) else 1.0

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import control
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
 from .._checks import positive_number
+from .._control import control
 from ..errors import InputError
 from ._controller import Controller, ControllerInput, expect_modules
 from ._modules import Array

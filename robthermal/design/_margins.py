@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 from ._modules import Array
 from ._sampled_loop import SampledLoop
@@ -101,7 +101,7 @@ def margins(loop: SampledLoop, frequency: Array, response: np.ndarray) -> Margin
 def _roots(frequency: Array, values: Array, at: Callable[[float], float]) -> list[float]:
     """Frequencies at which a function changes its sign."""
     change = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
-    return [float(brentq(at, frequency[k], frequency[k + 1], rtol=1e-12)) for k in change]
+    return [float(scipy.optimize.brentq(at, frequency[k], frequency[k + 1], rtol=1e-12)) for k in change]
 
 
 def _modulus(frequency: Array, response: np.ndarray, at: Callable[[float], complex]) -> float:
@@ -109,8 +109,8 @@ def _modulus(frequency: Array, response: np.ndarray, at: Callable[[float], compl
     distance = np.abs(1 + response)
     k = int(np.argmin(distance))
     low, high = frequency[max(k - 1, 0)], frequency[min(k + 1, len(frequency) - 1)]
-    found = minimize_scalar(lambda w: abs(1 + at(w)), bounds=(low, high), method="bounded",
-                            options={"xatol": 1e-9 * high})
+    found = scipy.optimize.minimize_scalar(lambda w: abs(1 + at(w)), bounds=(low, high), method="bounded",
+                                           options={"xatol": 1e-9 * high})
     return float(min(found.fun, distance[k]))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from .._checks import positive_number
 from ..errors import Outcome
@@ -111,7 +111,8 @@ def _weights(columns: list[Array], left: dict[int, Array], rate: float) -> bool:
             row = corner.copy()
             row[j] -= rate
             rows.append(row)
-    solved = linprog(np.ones(n), A_ub=np.array(rows), b_ub=np.zeros(len(rows)), bounds=(1, None), method="highs")
+    solved = scipy.optimize.linprog(np.ones(n), A_ub=np.array(rows), b_ub=np.zeros(len(rows)), bounds=(1, None),
+                                    method="highs")
     return bool(solved.status == 0)
 
 
@@ -135,7 +136,7 @@ def _solve(model: ObserverModel, columns: list[Array], rate: float) -> tuple[Arr
     cost = np.concatenate([np.zeros(n), np.ones(n * p)])
     free = _largest_gain(model, columns).T.ravel() < 0  # elsewhere no entry of L need be negative
     bounds = [(1, 1e6)] * n + [(None if below else 0.0, None) for below in free]
-    solved = linprog(cost, A_ub=np.array(rows), b_ub=np.zeros(len(rows)), bounds=bounds, method="highs")
+    solved = scipy.optimize.linprog(cost, A_ub=np.array(rows), b_ub=np.zeros(len(rows)), bounds=bounds, method="highs")
     if solved.status != 0:
         return None
     c = solved.x[:n]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-import control
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
+from .._control import control
 from ..conic import Form, Inequality, inside, largest_margin
 from ..errors import InputError, Outcome
 from ._constant_gain import ConstantGain

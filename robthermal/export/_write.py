@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import savemat
+import scipy
 
 from .._write import write
 from ..errors import InputError
@@ -106,5 +106,5 @@ def matlab_bytes(content: Mapping[str, Any]) -> bytes:
         Of arrays, numbers, texts and mappings of them.
     """
     file = BytesIO()
-    savemat(file, dict(content), oned_as="row", long_field_names=True)
+    scipy.io.savemat(file, dict(content), oned_as="row", long_field_names=True)
     return file.getvalue()

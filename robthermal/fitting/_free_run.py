@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from .._arrays import Floats
 from ..thermal import System
@@ -72,5 +72,6 @@ def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]
         head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head])
         weights = scaled(np.array([noise.get(name) or _UNKNOWN[system.sensors[name].unit] for name in one.sensors]))
         problem = Problem(system, [head], NONE, [initial], [weights])
-        v = least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds, x_scale="jac").x
+        v = scipy.optimize.least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds,
+                                         x_scale="jac").x
     return FreeRun(one, whole.temperatures(v)[0], whole.residuals(v)[0])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
@@ -257,7 +257,7 @@ def _elementwise(both: _Both) -> _Quotient:
 
 def _not_significant(square: Array, variance: Array, both: _Both) -> Array:
     q = np.maximum(both.found.degrees_of_freedom, 1)
-    return np.logical_not(square > stats.f.ppf(0.95, 2, 2 * q) * variance)
+    return np.logical_not(square > scipy.stats.f.ppf(0.95, 2, 2 * q) * variance)
 
 
 def _notes(singular: Array, frequencies: Array) -> list[str]:

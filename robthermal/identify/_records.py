@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
@@ -161,7 +161,7 @@ def _half_spectrum(signals: Array) -> Array:
 
     def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
         column = signals[:, c]
-        half[c] = fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
+        half[c] = scipy.fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
 
     run_all(transform, range(channels), worth=channels > 1 and _SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
     return half

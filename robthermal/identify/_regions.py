@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
@@ -16,7 +16,7 @@ def quantile(p: float, q: Array) -> Array:
         raise InputError(f"the confidence level p is {p!r}", where="p", expected="a number between 0 and 1, as 0.95")
     q = np.asarray(q, dtype=float)
     values, place = np.unique(q, return_inverse=True)
-    quantiles = np.array([stats.f.ppf(p, 2, 2 * v) if v > 0 else np.inf for v in values])
+    quantiles = np.array([scipy.stats.f.ppf(p, 2, 2 * v) if v > 0 else np.inf for v in values])
     return quantiles[place]
 
 

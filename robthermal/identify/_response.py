@@ -8,13 +8,13 @@ from functools import cached_property, partial
 from os import PathLike
 from typing import Any
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError, Outcome
 
+from .._control import control
 from . import _response_files, _response_plots, _response_text
 from ._deferred import Deferred, fixed, narrow, part_of, shifted
 from ._regions import correlated_blocks, independent_blocks, radius_of

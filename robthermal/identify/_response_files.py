@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import io
 
 from robthermal._checks import excerpt, quoted
 from robthermal._matfile import kind_of, read_matlab
@@ -80,7 +80,7 @@ def save(result: FrequencyResponse, path: str | PathLike[str]) -> None:
             np.savez_compressed(part, allow_pickle=False, **head, **lists, **arrays)
         else:
             cells = {name: np.array(value, dtype=object) for name, value in texts.items()}
-            io.savemat(part, {**head, **cells, **arrays}, long_field_names=True)
+            scipy.io.savemat(part, {**head, **cells, **arrays}, long_field_names=True)
 
 
 def format_of(path: Path) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy import fft, signal
+import scipy
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
@@ -76,7 +76,7 @@ def spectral(
     if length < 4:
         raise InputError(f"segments of {length} samples", where="segments", remedy="Take fewer segments.")
     hop = max(1, round(length * (1.0 - overlap)))
-    shape = signal.windows.get_window("hann" if window == "hann" else "boxcar", length)
+    shape = scipy.signal.windows.get_window("hann" if window == "hann" else "boxcar", length)
     shape = shape / np.sqrt(np.sum(shape**2))  # white noise of standard deviation sigma keeps the variance sigma^2
     pieces = [piece for r in records for piece in _pieces(r, length, hop)]
     independent = sum(_independent(shape, hop, len(list(_pieces(r, length, hop)))) for r in records)
@@ -121,7 +121,7 @@ def _pieces(record: Record, length: int, hop: int) -> Iterator[tuple[Array, Arra
 def _spectrum(part: Array, shape: Array) -> Array:
     """Spectrum of the windowed deviations from the segment's mean, bins 1 ... (length-1)//2, (channels, F)."""
     windowed = (part - part.mean(axis=0)) * shape[:, None]
-    half = np.asarray(fft.rfft(windowed, axis=0)[1 : (shape.size - 1) // 2 + 1].T)
+    half = np.asarray(scipy.fft.rfft(windowed, axis=0)[1 : (shape.size - 1) // 2 + 1].T)
     half[np.abs(half) <= rounding_level(part)[:, None]] = 0.0
     return half
 

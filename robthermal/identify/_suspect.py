@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import stats
 
 from .._arrays import Array
 from ._threads import run_all
@@ -31,7 +31,7 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
     values, place = np.unique(q, return_inverse=True)
-    limit = np.array([stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in values])[place]
+    limit = np.array([scipy.stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in values])[place]
     by_output = np.zeros((n_y, n_f), dtype=bool)
 
     def compare(o: int) -> None:

@@ -3,7 +3,6 @@
 Shared by the packages certify and coupling; public through `robthermal.certify`.
 """
 
-from .. import _control as _control  # state spaces can be pickled
 from ._bound import GainBound as GainBound
 from ._closed_loop import close as close
 from ._closed_loop import closed_loop as closed_loop

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from .._arrays import Array
 from ..verification import Certificate, establish, not_certified
@@ -106,7 +106,8 @@ def _best_decay(plant: Plant) -> float:
     found = [squared(log) for log in grid]
     k = int(np.argmin(found))
     low, high = grid[max(k - 1, 0)], grid[min(k + 1, _SCAN - 1)]
-    return float(np.exp(minimize_scalar(squared, bounds=(low, high), method="bounded", options={"xatol": 1e-4}).x))
+    found = scipy.optimize.minimize_scalar(squared, bounds=(low, high), method="bounded", options={"xatol": 1e-4})
+    return float(np.exp(found.x))
 
 
 def _smallest(plant: Plant, decay: float) -> Array:
@@ -142,5 +143,5 @@ def _share(plant: Plant, Q: Array, decay: float) -> tuple[float, float]:
 
     if not direct.any():
         return 1 - 1e-9, squared(1 - 1e-9)
-    found = minimize_scalar(squared, bounds=(1e-9, 1 - 1e-9), method="bounded", options={"xatol": 1e-9})
+    found = scipy.optimize.minimize_scalar(squared, bounds=(1e-9, 1 - 1e-9), method="bounded", options={"xatol": 1e-9})
     return float(found.x), float(found.fun)

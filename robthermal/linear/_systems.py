@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
+from .._control import control
 from ..errors import InputError
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
-from scipy.optimize import minimize
 
 from ..errors import InputError
 from ._checks import Array, finite_number
@@ -61,7 +60,7 @@ def wave_of(lines: NDArray[np.intp], amplitudes: Array, phases: Array, n: int) -
     """Sum of amplitude * cos(2 pi line i / n + phase), i = 0 ... n-1; `phases` (..., lines) give waves (..., n)."""
     spectrum = np.zeros((*phases.shape[:-1], n // 2 + 1), dtype=complex)
     spectrum[..., lines] = 0.5 * n * amplitudes * np.exp(1j * phases)
-    return np.asarray(fft.irfft(spectrum, n, axis=-1))
+    return np.asarray(scipy.fft.irfft(spectrum, n, axis=-1))
 
 
 def schroeder_phases(lines: NDArray[np.intp], amplitudes: Array) -> Array:
@@ -95,11 +94,11 @@ def low_crest_phases(
         if (crest := crest_of(wave)) < lowest:
             best, lowest = phases, crest
         limit = (0.7 + 0.28 * step / _CLIPPINGS) * np.abs(wave).max()
-        clipped = fft.rfft(np.clip(wave, -limit, limit))[:, lines] * np.exp(-1j * rotation)
+        clipped = scipy.fft.rfft(np.clip(wave, -limit, limit))[:, lines] * np.exp(-1j * rotation)
         phases = np.angle(clipped.sum(axis=0))
     phases = best
     for p in _NORMS:
-        phases = minimize(
+        phases = scipy.optimize.minimize(
             _norm_and_gradient,
             phases,
             (p, lines, amplitudes, n, rotation),
@@ -120,6 +119,6 @@ def _norm_and_gradient(
     peak = np.abs(wave).max()
     relative = wave / peak  # powers up to 512 of numbers below one: no overflow
     mean = np.mean(relative**p)
-    turned = fft.rfft(relative ** (p - 1))[:, lines].conj() * np.exp(1j * (phases + rotation))
+    turned = scipy.fft.rfft(relative ** (p - 1))[:, lines].conj() * np.exp(1j * (phases + rotation))
     gradient = -amplitudes * turned.imag.sum(axis=0) * mean ** (1.0 / p - 1.0) / wave.size
     return float(peak * mean ** (1.0 / p)), gradient

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from .._checks import whole_number
 from ..errors import InputError
@@ -46,7 +46,8 @@ class Spectra:
 def spectra_of(u: Array) -> Spectra:
     """Spectra of experiments (experiments, n, n_u)."""
     n = u.shape[1]
-    U = fft.rfft(u - u.mean(axis=1, keepdims=True), axis=1, norm="ortho")[:, 1 : (n - 1) // 2 + 1].transpose(0, 2, 1)
+    lines = scipy.fft.rfft(u - u.mean(axis=1, keepdims=True), axis=1, norm="ortho")[:, 1 : (n - 1) // 2 + 1]
+    U = lines.transpose(0, 2, 1)
     level = _LINE_SILENT * np.finfo(float).eps * np.abs(u).max(axis=(0, 1))
     return Spectra(np.where(np.abs(U) > level[None, :, None], U, 0.0), n)
 

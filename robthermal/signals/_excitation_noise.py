@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from .._checks import whole_number
 from ..errors import InputError
@@ -70,8 +70,8 @@ def noise(
     impulse = np.zeros(settling)
     impulse[0] = 1.0
     # Variance of filtered white noise: the energy of the impulse response.
-    energy = float(np.sum(signal.sosfilt(sections, impulse) ** 2))
-    colored: Array = signal.sosfilt(sections, rng.normal(size=settling + n))[settling:]
+    energy = float(np.sum(scipy.signal.sosfilt(sections, impulse) ** 2))
+    colored: Array = scipy.signal.sosfilt(sections, rng.normal(size=settling + n))[settling:]
     return shifted(level / np.sqrt(energy) * colored, offset)
 
 
@@ -81,7 +81,7 @@ def _filter(band: object, h: float) -> tuple[Array, int]:
     if low == high:
         raise InputError(f"band is {(low, high)} Hz", where="argument band", expected="lowest < highest")
     limits, kind = ((low, high), "bandpass") if low > 0.0 else (high, "lowpass")
-    sections = signal.butter(_ORDER, limits, kind, fs=1.0 / h, output="sos")
+    sections = scipy.signal.butter(_ORDER, limits, kind, fs=1.0 / h, output="sos")
     memory = max(np.abs(np.roots(section[3:])).max() for section in sections)
     settling = np.log(_SETTLED) / np.log(memory) if memory < 1.0 else np.inf
     if not settling < _LONGEST:
@@ -153,5 +153,5 @@ def prbs(
         )
     # From 1: a register of zeros would stay at zero for ever.
     number = int(np.random.default_rng(whole_number(seed, "seed", 0)).integers(1, 2**length))
-    bits = signal.max_len_seq(length, state=[number >> place & 1 for place in range(length)])[0]
+    bits = scipy.signal.max_len_seq(length, state=[number >> place & 1 for place in range(length)])[0]
     return np.tile(np.repeat(levels[bits], width), repeats)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from scipy.io import savemat
+import scipy
 
 from .._write import whole_file
 from ..errors import InputError
@@ -145,7 +145,7 @@ def _write_matlab(table: pd.DataFrame, part: Path, path: Path) -> None:
             )
     columns = {name: table[name].to_numpy() for name in table.columns}
     with part.open("wb") as file:
-        savemat(file, columns, do_compression=True, oned_as="column", long_field_names=True)
+        scipy.io.savemat(file, columns, do_compression=True, oned_as="column", long_field_names=True)
 
 
 def require_pyarrow() -> tuple[Any, Any]:

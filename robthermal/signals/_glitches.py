@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter as running_median
-from scipy.ndimage import rank_filter
 
 from ..errors import InputError
 from ._checks import Array, positive_number
@@ -108,13 +107,14 @@ def glitch_rows(column: Array) -> NDArray[np.intp]:
 
 def _residual(column: Array) -> Array:
     # "mirror" counts the end sample once, so that a glitch in the first row does not hide itself.
-    return np.asarray(np.abs(column - running_median(column, size=_NEIGHBORS, mode="mirror")))
+    return np.asarray(np.abs(column - scipy.ndimage.median_filter(column, size=_NEIGHBORS, mode="mirror")))
 
 
 def _excess(column: Array) -> Array:
     """Residual where it is large beside the spread of its neighbors, else zero."""
     residual = _residual(column)
-    spread = rank_filter(column, 4, size=7, mode="mirror") - rank_filter(column, 2, size=7, mode="mirror")
+    upper, lower = (scipy.ndimage.rank_filter(column, rank, size=7, mode="mirror") for rank in (4, 2))
+    spread = upper - lower
     return np.where(residual > _SWING * spread, residual, 0.0)
 
 
@@ -146,7 +146,7 @@ def _median_of(what: Callable[[Array], Array], column: Array, lost: int) -> floa
 
 def filtered(column: Array, samples: int) -> Array:
     """Running median over an odd number of samples."""
-    smooth: Array = running_median(np.ascontiguousarray(column), size=samples, mode="nearest")
+    smooth: Array = scipy.ndimage.median_filter(np.ascontiguousarray(column), size=samples, mode="nearest")
     return smooth
 
 

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import control
 import numpy as np
 from scipy.linalg import expm
 
 from .._checks import positive_number, quoted
+from .._control import control
 from ..errors import InputError
 from ._plant import GeneralizedPlant
 

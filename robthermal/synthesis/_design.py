@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 
+from .._control import control
 from .._drawing import axes_for
 from ..errors import Outcome
 from ..linear import Plant, close, read_plant, responder

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
+from .._control import control
 from .._write import write
 from ..errors import InputError
 from ..export import Program, by_suffix, comment, identifier, json_bytes, matlab_bytes, number, plain, write_export

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
+from .._control import control
 from ..errors import InputError
 from ..identify import FrequencyResponse
 from ..linear import Plant, read_plant, responder

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
 from .._checks import finite_number, positive_number, quoted, whole_number
+from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate

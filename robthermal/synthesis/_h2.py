@@ -6,11 +6,11 @@ import time
 from contextlib import nullcontext
 from dataclasses import replace
 
-import control
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from .._arrays import Array
+from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, h2_norm, prove_closed_loop
 from ..verification import Certificate

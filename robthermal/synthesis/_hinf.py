@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
-import control
 import numpy as np
 
 from .._checks import positive_number
+from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate

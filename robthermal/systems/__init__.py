@@ -1,6 +1,5 @@
 """Embedded systems and sourced parameter sets."""
 
-from .. import _control as _control  # state spaces can be pickled
 from ._datasheets import datasheets as datasheets
 from ._embedded import tclab as tclab
 from ._embedded import tclab_two_state as tclab_two_state

@@ -9,11 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import control
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_lyapunov
-from scipy.signal import bilinear, tf2ss
+
+from .._control import control
 
 Array = NDArray[Any]
 _SAMPLE_TIME = 2e-4  # s
@@ -191,7 +192,7 @@ def _tustin(numerator: list[float], denominator: list[float], frequency: float) 
     """Bilinear transform, exact at one frequency [Hz]."""
     omega = 2 * np.pi * frequency
     rate = omega / (2 * np.tan(omega * _SAMPLE_TIME / 2))
-    return control.ss(*tf2ss(*bilinear(numerator, denominator, rate)), _SAMPLE_TIME)
+    return control.ss(*scipy.signal.tf2ss(*scipy.signal.bilinear(numerator, denominator, rate)), _SAMPLE_TIME)
 
 
 def _measure(P1: control.StateSpace, P2: control.StateSpace) -> control.FrequencyResponseData:

@@ -1,6 +1,5 @@
 """Thermal systems: lumps, links, thermoelectric modules; equations, simulation, steady state, linearization."""
 
-from .. import _control as _control  # state spaces can be pickled
 from ._datasheet import DatasheetFit as DatasheetFit
 from ._datasheet import ModuleParameters as ModuleParameters
 from ._datasheet import module_from_datasheet as module_from_datasheet

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
@@ -130,7 +130,7 @@ def _last(path: _Path, first: _Point) -> _Point:
         point = path.at(mean, inside)
         return -1.0 if point is None else point.growth
 
-    root = brentq(growth, inside.mean, beyond, xtol=_CLOSE) if inside.growth > 0 else inside.mean
+    root = scipy.optimize.brentq(growth, inside.mean, beyond, xtol=_CLOSE) if inside.growth > 0 else inside.mean
     for back_off in (10 * _CLOSE, 1e-8, 1e-6, 1e-4):
         point = path.at(root - back_off, inside)
         if point is not None and point.growth > 0:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 from .._checks import finite_number, positive_number
 from ..errors import InputError, Outcome
@@ -163,7 +163,7 @@ class SinkSize:
             return _resistance(self.properties, self.limit.cold, self.ambient, self.load, current) - wanted
 
         low = best.current if excess(best.current) < 0 else 0.0
-        current = float(brentq(excess, low, self.limit.current, xtol=1e-12))
+        current = float(scipy.optimize.brentq(excess, low, self.limit.current, xtol=1e-12))
         hot = _hot_face(self.properties, self.limit.cold, self.load, current)
         return _point(self.properties, hot, self.limit.cold, current, ThermalCode.HELD.outcome())
 
@@ -219,8 +219,9 @@ def size_sink(properties: Properties, *, cold: float, ambient: float, load: floa
     found = np.array([_resistance(properties, cold, ambient, load, current) for current in currents])
     k = int(found.argmax())
     around = (currents[max(k - 1, 0)], currents[min(k + 1, _GRID - 1)])
-    best = minimize_scalar(lambda current: -_resistance(properties, cold, ambient, load, current), bounds=around,
-                           method="bounded", options={"xatol": 1e-10})
+    best = scipy.optimize.minimize_scalar(
+        lambda current: -_resistance(properties, cold, ambient, load, current), bounds=around, method="bounded",
+        options={"xatol": 1e-10})
     current = float(best.x)
     hot = _hot_face(properties, cold, load, current)
     limit = _point(properties, hot, cold, current, ThermalCode.HELD.outcome())
@@ -246,7 +247,7 @@ def _hot_face(properties: Properties, cold: float, load: float, current: float) 
     if surplus(high) > 0:
         raise InputError(f"the hot face would be more than {_HOTTEST:g} K above the cold one", where="the module",
                          expected="a module whose sheet allows for such a load", remedy="Is its conductance right?")
-    return float(brentq(surplus, low, high, xtol=1e-10))
+    return float(scipy.optimize.brentq(surplus, low, high, xtol=1e-10))
 
 
 def _point(properties: Properties, hot: float, cold: float, current: float, outcome: Outcome) -> ModulePoint:

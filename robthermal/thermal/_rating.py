@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from .._checks import positive_number
 from ..errors import InputError
@@ -184,7 +184,7 @@ class Properties:
             raise InputError(f"no largest temperature difference at a hot side of {t_hot:.4g} K", where="the module",
                              expected="properties that hold down to the coldest face",
                              remedy="The slopes do not hold that far: take one column of the sheet.")
-        t_cold = float(brentq(surplus, low, t_hot, xtol=1e-10))
+        t_cold = float(scipy.optimize.brentq(surplus, low, t_hot, xtol=1e-10))
         S, R, _ = self.at(0.5 * (t_hot + t_cold))
         current = S * t_cold / R
         S_hot, R_hot, _ = self.at(t_hot)

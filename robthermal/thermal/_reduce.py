@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import control
 import numpy as np
 from scipy.linalg import eig, solve_continuous_lyapunov, svd
 
+from .._control import control
 from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ._outcomes import ThermalCode

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from ._equations import Equations
 from ._layout import Layout
@@ -142,7 +142,7 @@ def _lag(x: Array, tau: float, h: float) -> Array:
     p = np.exp(-h / tau)
     ramp = 1 - tau / h * (1 - p)  # weight of the newest sample
     drive = ramp * x[1:] + (1 - p - ramp) * x[:-1]
-    return np.concatenate([x[:1], lfilter([1.0], [1.0, -p], drive, zi=[p * x[0]])[0]])
+    return np.concatenate([x[:1], scipy.signal.lfilter([1.0], [1.0, -p], drive, zi=[p * x[0]])[0]])
 
 
 def _of(rates: Rates, state: int) -> tuple[Array, Array] | None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import control
 import numpy as np
 from scipy.linalg import block_diag
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..evaluation import Filters
 from ..problem import Problem, radius

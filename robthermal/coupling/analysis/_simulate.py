@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import control
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ...signals import Record
 from ..evaluation import Filters

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import control
 import numpy as np
 
+from ..._control import control
 from ...errors import Outcome
 from .._outcomes import CouplingCode
 from ..factors import intervals_of

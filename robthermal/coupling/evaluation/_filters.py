@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import Outcome
 from ...verification import Certificate
 from ..implementation import FixedPoint, export, fixed_point, save_filters, sections

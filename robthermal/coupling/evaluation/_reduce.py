@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from .._outcomes import CouplingCode
 from ..systems import Zpk, realize, series

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import control
-
+from ..._control import control
 from ...errors import InputError
 from ._evaluate import evaluate
 from ._filters import Filters

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import Any
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ...linear import hinf
 from ...verification import Certificate

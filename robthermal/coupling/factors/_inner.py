@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
-from scipy.signal import buttap
+import scipy
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..systems import LTI, Zpk, on_boundary, realize, sample_time_of, stable, zpk_of
 
@@ -140,7 +140,7 @@ def _lowpass(plant: Zpk, where: str, cutoff: float | None, other_corners: Array)
         raise InputError(f"cut-off {cutoff} for {where}, which has relative degree {order}", where="cutoff",
                          expected="a positive frequency [rad/s], above the frequencies that matter",
                          remedy="Give cutoff: the corner of the low-pass that makes P⁻¹Z proper.")
-    poles = buttap(order)[1] * corner
+    poles = scipy.signal.buttap(order)[1] * corner
     poles = np.where(np.abs(poles.imag) < 1e-9 * corner, poles.real, poles)
     poles = np.concatenate([poles[poles.imag > 0], poles[poles.imag > 0].conj(), poles[poles.imag == 0]])
     return Zpk(np.array([], dtype=complex), poles, float(corner**order), 0.0)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import control
 import numpy as np
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..systems import LTI, Zpk, constant, expect_stable, natural, paired, realize, stable, zpk_of
 from ._inner import inner_zpk, inverse_times

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import control
 import numpy as np
 from scipy.linalg import solve_continuous_are, solve_continuous_lyapunov, solve_discrete_are, solve_discrete_lyapunov
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 
 _SIDES = ("right", "left")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..systems import Zpk, paired, realize
 from ._uncertainty import Uncertainty
@@ -76,8 +76,8 @@ def _smallest_above(spectra: Array, target: Array) -> Array:
     scale = 1.0 / relative.max(axis=0)
     scaled, rows = relative * scale, len(target)
     A = np.block([[-scaled, np.zeros((rows, 1))], [scaled, -np.ones((rows, 1))]])
-    solution = linprog(np.append(np.zeros(len(scale)), 1.0), A_ub=A, method="highs",
-                       b_ub=np.concatenate([-np.ones(rows), np.zeros(rows)]))
+    solution = scipy.optimize.linprog(np.append(np.zeros(len(scale)), 1.0), A_ub=A, method="highs",
+                                      b_ub=np.concatenate([-np.ones(rows), np.zeros(rows)]))
     candidate = np.ones(len(scale)) if solution.x is None else np.maximum(solution.x[:-1], 0.0)
     weights = candidate * scale
     return weights / float(np.min(relative @ weights))  # on or above, whatever the solver made of it

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import control
 import numpy as np
 
+from ..._control import control
 from ..._write import write
 from ...errors import InputError, Outcome
 from ...export import json_bytes, plain

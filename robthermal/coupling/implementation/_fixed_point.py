@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import sosfilt
+import scipy
 
 from ..._arrays import Array
 from ...errors import InputError
@@ -137,7 +137,7 @@ def _nodes(rows: Array, length: int) -> Array:
     x[0] = 1.0
     found = []
     for row in rows:
-        y = sosfilt(row[None], x)
+        y = scipy.signal.sosfilt(row[None], x)
         first = y - row[0] * x  # the state that is added to b0 x
         second = np.zeros(length)
         second[1:] = row[2] * x[:-1] - row[5] * y[:-1]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import control
 import numpy as np
-from scipy.signal import sosfreqz
+import scipy
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..systems import Zpk, grouped, siso, zpk_of
 
@@ -70,7 +70,7 @@ def _expect_accurate(rows: Array, system: control.StateSpace, name: str) -> None
     top = np.pi / float(system.dt)
     omega = np.geomspace(1e-5 * top, 0.9999 * top, 500)
     exact = siso(system, omega)
-    error = np.abs(sosfreqz(rows, omega * float(system.dt))[1] - exact)
+    error = np.abs(scipy.signal.sosfreqz(rows, omega * float(system.dt))[1] - exact)
     size = np.maximum(np.abs(exact), _QUIET * float(np.max(np.abs(exact))))
     worst = float(np.max(np.divide(error, size, out=np.zeros_like(error), where=size > 0)))
     if not worst <= _ACCURACY:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import control
 import numpy as np
 from numpy.typing import NDArray
 
 from robthermal.linear import interval_norms
 
+from ..._control import control
 from ..systems import Response
 from ._blocks import Complex, Real, Structure
 from ._cycles import cycles

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import control
 import numpy as np
 
 from robthermal.errors import InputError
 from robthermal.linear import frequency_norm, hinf
 from robthermal.verification import Certificate
 
+from ..._control import control
 from .._outcomes import CouplingCode
 from ._blocks import Complex, Real, read_blocks
 from ._intervals import Samples, cover

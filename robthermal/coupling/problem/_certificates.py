@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import control
 import numpy as np
 
 from ..._arrays import Array
+from ..._control import control
 from ...linear import frequency_radius, hinf, hinf_norm, interval_norms, interval_radii, stability
 from ...verification import Certificate
 from ..factors import Intervals

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import control
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from ..._arrays import Array
+from ..._control import control
 from ..systems import plus_one, realize, series
 from ._problem import Problem, Subsystem
 

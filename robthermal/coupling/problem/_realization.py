@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import control
 import numpy as np
 from scipy.linalg import block_diag
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..factors import feedback_matrix
 from ..systems import apart, expect_stable, realize, series

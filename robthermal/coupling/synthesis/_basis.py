@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import null_space, solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 
 

@@ -6,11 +6,11 @@ variance is [1, c] G [1, c]ᵀ. G comes from one Lyapunov equation, not from a f
 
 from __future__ import annotations
 
-import control
 import numpy as np
 from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..systems import series
 from ._basis import Basis

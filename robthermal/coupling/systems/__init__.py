@@ -1,6 +1,5 @@
 """Linear systems as zeros, poles and gain, as state spaces, and as responses at frequencies."""
 
-from ... import _control as _control  # state spaces can be pickled
 from ._cascade import grouped as grouped
 from ._cascade import realize as realize
 from ._joined import apart as apart

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 
 from ..._arrays import Array
+from ..._control import control
 from ._zpk import Zpk
 
 Matrices = tuple[Array, Array, Array, Array]

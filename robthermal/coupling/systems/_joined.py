@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 from scipy.linalg import block_diag
+
+from ..._control import control
 
 
 def beside(first: control.StateSpace, second: control.StateSpace) -> control.StateSpace:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from numbers import Real
 from typing import Any
 
-import control
 import numpy as np
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ._cascade import realize
 from ._roots import paired, snapped, zeros_and_gain

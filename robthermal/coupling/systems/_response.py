@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import schur
 
 from ..._arrays import Array
+from ..._control import control
 from ._zpk import from_origin
 
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
 
 from ..._drawing import axes_for
 from ...errors import Outcome
@@ -101,14 +100,14 @@ def adequacy(fit: Refit) -> Adequacy:
     tested = [statistics[name] for name in statistics if name not in fit.floor.quantized]  # steps are never white
     together = (sum(Q for Q, _ in tested), sum(lags for _, lags in tested))
     lumps = {name: p for name, (_, p) in spline_tests(fit).items()}
-    white = float(chi2.sf(*together)) if tested else 1.0
+    white = float(scipy.stats.chi2.sf(*together)) if tested else 1.0
     p = min(1.0, 2.0 * min(white, min(lumps.values()) * len(lumps)))
     ok = p > SMALLEST_P
     outcome = DiagnosisCode.ADEQUATE.outcome(f"Nothing is left to explain (p = {p:.2g}).") if ok else (
         DiagnosisCode.INADEQUATE.outcome(
             f"Something is left (p = {p:.1e}): the model with these effects does not explain the records.", remedy=""))
-    return Adequacy({name: float(chi2.sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p, fit.variance,
-                    outcome)
+    return Adequacy({name: float(scipy.stats.chi2.sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p,
+                    fit.variance, outcome)
 
 
 def _portmanteau(segments: list[Array]) -> tuple[float, int]:
@@ -155,4 +154,4 @@ def f_test(fit: Refit, J: Array) -> tuple[float, float]:
     explained = float(np.sum((U.T @ fit.rest) ** 2))
     F = (explained / q) / (max(float(fit.rest @ fit.rest) - explained, 1e-300) / nu)
     F /= float(np.mean(inflation(fit, U)))
-    return F, float(f_distribution.sf(F, q * relative_degrees_of_freedom(fit, U), nu))
+    return F, float(scipy.stats.f.sf(F, q * relative_degrees_of_freedom(fit, U), nu))

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
-from scipy.stats import norm
 
 from ..._drawing import axes_for
 from ..effects import Candidate, candidates
@@ -198,12 +197,13 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     variance = np.maximum(power - along**2, 1e-12 * power) / nu
     statistic = along**2 / variance / inflation(fit, unit)
     # the phase of a pair was chosen by the data: two degrees of freedom
-    chance = f_distribution.sf(statistic / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
+    chance = scipy.stats.f.sf(statistic / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
     p_value = np.minimum(chance * max(len(trials), 1), 1.0)
     size, std = along / own_safe, np.sqrt(variance) / own_safe
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
-    threshold = math.sqrt(max(norm.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
-    limit = np.where(visible, (threshold + norm.ppf(POWER)) / own_safe, np.inf)  # z has unit noise, whatever is missing
+    normal = scipy.stats.norm
+    threshold = math.sqrt(max(normal.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
+    limit = np.where(visible, (threshold + normal.ppf(POWER)) / own_safe, np.inf)  # unit noise, whatever is missing
     possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
                          in zip(trials, size, std, strict=True)], bool)
     best = _best_of(trials, statistic, size, possible)

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import qr
-from scipy.optimize import lsq_linear
 
 from ...errors import Diverged, InputError
 
@@ -194,7 +194,8 @@ def _best_step(z: Array, J: Array, v: Array, bounds: tuple[Array, Array]) -> Arr
     scale = np.linalg.norm(J[:, free], axis=0)
     scale[scale == 0] = 1.0
     low, high = ((bound - v)[free] * scale for bound in bounds)
-    step[free] = lsq_linear(J[:, free] / scale, z, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x / scale
+    ends = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    step[free] = scipy.optimize.lsq_linear(J[:, free] / scale, z, ends, "bvls").x / scale
     return step
 
 

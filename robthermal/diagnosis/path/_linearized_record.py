@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 from scipy.linalg import expm
 
 from ...errors import InputError
@@ -359,7 +359,8 @@ def heat_splines(time: Array, count: int = N_SPLINES) -> Array:
     t = (time - time[0]) / (time[-1] - time[0])
     inner = np.linspace(0.0, 1.0, count - 2)
     knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
+    basis = scipy.interpolate.BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3)
+    return np.asarray(basis.toarray(), np.float64)
 
 
 def linearized_record(system: System, one: RecordData, run: Trajectory | None = None) -> LinearizedRecord:

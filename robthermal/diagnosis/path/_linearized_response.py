@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from ...errors import Diverged, InputError
 from ...fitting import ResponseWhitener, as_complex, as_real, residual
@@ -188,4 +188,5 @@ def log_splines(frequencies: Array) -> Array:
     t = np.log(frequencies)
     t = (t - t[0]) / max(t[-1] - t[0], 1e-12)
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, count - 2), [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3).toarray(), np.float64)
+    basis = scipy.interpolate.BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3)
+    return np.asarray(basis.toarray(), np.float64)

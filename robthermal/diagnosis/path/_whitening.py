@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_are
-from scipy.signal import lfilter
 
 from ...thermal import Equations
 
@@ -215,7 +215,7 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
     gain = P @ C.T @ np.linalg.inv(S)
     poles, V = np.linalg.eig(A - A @ gain @ C)  # x(k+1) = (A - A K C) x + A K r, mode by mode
     push = r @ (np.linalg.solve(V, (A @ gain).astype(complex))).T
-    modes = np.column_stack([lfilter([0.0, 1.0], [1.0, -pole], column)
+    modes = np.column_stack([scipy.signal.lfilter([0.0, 1.0], [1.0, -pole], column)
                              for pole, column in zip(poles, push.T, strict=True)])
     e = r - (modes @ (C @ V).T).real
     return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])

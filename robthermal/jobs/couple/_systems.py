@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-import control
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
+from ..._control import control
 from ...errors import InputError
 from ..request import Number, Table, read_text, refusal
 

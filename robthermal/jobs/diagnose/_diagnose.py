@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from ...diagnosis import Diagnosis, LinearizedRecord, diagnose
 from ...diagnosis.path import LinearizedResponse
@@ -56,7 +56,8 @@ class Residuals:
 
     def _welch(self, values: Array) -> tuple[Array, Array]:
         n = values.size
-        f, power = welch(values, fs=1.0 / float(self.time[1] - self.time[0]), nperseg=max(min(n, 8), n // 4))
+        f, power = scipy.signal.welch(values, fs=1.0 / float(self.time[1] - self.time[0]),
+                                      nperseg=max(min(n, 8), n // 4))
         return f[1:], power[1:]
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 from pydantic import Field
 
+from ..._control import control
 from ...errors import InputError
 from ...identify import FrequencyResponse, read_response
 from ..request import Number, Table, read_text, read_toml

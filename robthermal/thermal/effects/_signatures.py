@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from .._system import System
 from ._response import Array, RecordContext, Response, Signature, Values, Where
@@ -81,14 +81,14 @@ def follow(T: Array, tau: float, h: float) -> Array:
     p = np.exp(-h / tau)
     ramp = 1.0 - tau / h * (1.0 - p)
     drive = ramp * T[1:] + (1.0 - p - ramp) * T[:-1]
-    lagged, _ = lfilter([1.0], [1.0, -p], drive, zi=[p * T[0]])
+    lagged, _ = scipy.signal.lfilter([1.0], [1.0, -p], drive, zi=[p * T[0]])
     return np.concatenate([T[:1], lagged])
 
 
 def follow_held(u: Array, tau: float, h: float, start: float) -> Array:
     """First-order lag of a held signal: its value at the start of every sample, (n,)."""
     p = np.exp(-h / tau)
-    lagged, _ = lfilter([1.0 - p], [1.0, -p], u[:-1], zi=[p * start])
+    lagged, _ = scipy.signal.lfilter([1.0 - p], [1.0, -p], u[:-1], zi=[p * start])
     return np.concatenate([[start], lagged])
 
 
