@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import os
 import sys
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from robthermal import cli
 
 os.environ["MPLBACKEND"] = "Agg"  # read when matplotlib is first imported; most tests never do
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]  # what several packages or scripts share
 
-from commands import Run, Said  # noqa: E402
+from commands import Run, command  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
@@ -28,21 +25,10 @@ def _close_figures() -> Iterator[None]:
         pyplot.close("all")
 
 
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
+@pytest.fixture(scope="session")
+def run() -> Run:
     """The command line in this process: an exception that would be a traceback fails the test."""
-    monkeypatch.setattr("robthermal.cli._progress.EVERY", 3600.0)  # s: on a slow machine too, nothing but what was said
-
-    def call(*words: object) -> Said:
-        monkeypatch.setattr(sys, "argv", ["robthermal", *map(str, words)])
-        capsys.readouterr()
-        with warnings.catch_warnings(), pytest.raises(SystemExit) as stop:  # main() shows warnings its own way
-            cli.main()
-        said = capsys.readouterr()
-        code = stop.value.code
-        return Said(code if isinstance(code, int) else int(code is not None), said.out, said.err)
-
-    return call
+    return command
 
 
 @pytest.fixture(scope="session")

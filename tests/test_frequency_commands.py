@@ -1,52 +1,47 @@
 """Commands frf and excitation: from a designed signal to an estimate that covers the truth."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from commands import command
 
 import robthermal as rt
 
 
-def robthermal(*arguments, cwd):
-    return subprocess.run([sys.executable, "-m", "robthermal", *map(str, arguments)], cwd=cwd, capture_output=True,
-                          text=True, timeout=120, check=False)
-
-
-@pytest.fixture
-def setup(tmp_path):
-    """A heated bar, its system file, and a record simulated with noise."""
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    """A heated bar, and a folder with its system file and a record simulated with noise."""
+    folder = tmp_path_factory.mktemp("bar")
     system = rt.System(name="bar", ambients={"room": {"temperature": 298.15}}, lumps={"bar": {"capacity": 40.0}},
                        links=[{"between": ("bar", "room"), "conductance": 2.0}], sensors={"T": {"lump": "bar"}},
                        inputs={"q": {"lump": "bar"}})
-    rt.thermal.write_system(system, tmp_path / "bar.toml")
-    done = robthermal("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
-                      "--nonnegative", "--periods", 2, "--system", "bar.toml", "--out", "u.csv", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    drive = rt.read_record(tmp_path / "u.csv", inputs=["q"], outputs=[])
+    rt.thermal.write_system(system, folder / "bar.toml")
+    done = command("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
+                   "--nonnegative", "--periods", 2, "--system", "bar.toml", "--out", "u.csv", "--json", folder=folder)
+    assert done.status == 0, done.err
+    drive = rt.read_record(folder / "u.csv", inputs=["q"], outputs=[])
     assert drive["q"].min() >= -1e-9
     clean = rt.thermal.simulate(system, drive)
     noisy = clean.outputs + np.random.default_rng(0).normal(0, 0.01, clean.outputs.shape)
     rt.Record(sample_time=1.0, inputs=drive.inputs, outputs=noisy, input_names=["q"], output_names=["T"]).save(
-        tmp_path / "run.csv")
-    return system, tmp_path
+        folder / "run.csv")
+    return system, folder
 
 
-def test_excitation_says_what_stays_unresolved(setup):
-    _, folder = setup
-    shown = robthermal("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
-                       "--system", "bar.toml", cwd=folder)
-    assert shown.returncode == 0 and "time constant" in shown.stdout and (folder / "excitation.csv").is_file()
+def test_excitation_says_what_stays_unresolved(bar):
+    _, folder = bar
+    shown = command("excitation", "q", "--period", 1000, "--sample-time", 1, "--band", 0.001, 0.2, "--amplitude", 5,
+                    "--system", "bar.toml", folder=folder)
+    assert shown.status == 0 and "time constant" in shown.out and (folder / "excitation.csv").is_file()
 
 
-def test_frf_covers_the_truth(setup):
-    system, folder = setup
-    done = robthermal("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--out", "G.json",
-                      "--plot", "G.svg", "--band", 0.002, 0.2, "--json", cwd=folder)
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
+def test_frf_covers_the_truth(bar):
+    system, folder = bar
+    done = command("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--out", "G.json",
+                   "--plot", "G.svg", "--band", 0.002, 0.2, "--json", folder=folder)
+    assert done.status == 0, done.err
+    summary = json.loads(done.out)
     assert summary["inputs"] == ["q"] and summary["outputs"] == ["T"] and (folder / "G.svg").is_file()
     G = rt.identify.FrequencyResponse.load(folder / "G.json")
     z = np.exp(2j * np.pi * G.frequencies)
@@ -60,16 +55,16 @@ def test_frf_covers_the_truth(setup):
     (["run.csv"], "--system"), (["run.csv", "--system", "bar.toml", "--method", "magic"], "--method"),
     (["run.csv", "--input", "q", "--output", "nothing"], "nothing"),
     (["run.csv", "--system", "bar.toml", "--half-width", "-1"], "half_width")])
-def test_bad_requests_are_one_message_and_status_two(setup, arguments, words):
-    _, folder = setup
-    done = robthermal("frf", *arguments, cwd=folder)
-    assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
+def test_bad_requests_are_one_message_and_status_two(bar, arguments, words):
+    _, folder = bar
+    done = command("frf", *arguments, folder=folder)
+    assert done.status == 2 and words in done.err and "Traceback" not in done.err
     assert not (folder / "frf.json").exists()
 
 
-def test_inputs_that_never_change_are_left_out_and_stay_in_the_operating_point(setup):
+def test_inputs_that_never_change_are_left_out_and_stay_in_the_operating_point(bar):
     """Two inputs, two outputs, a column of another name, a room that never changes: every ordinary record."""
-    _, folder = setup
+    _, folder = bar
     system = rt.System(
         name="two", ambients={"room": {"temperature": 295.0}},
         lumps={"a": {"capacity": 40.0}, "b": {"capacity": 60.0}},
@@ -83,22 +78,22 @@ def test_inputs_that_never_change_are_left_out_and_stay_in_the_operating_point(s
     rows += [f"{k};{q[k]:.6f};1.5;294.0;{T[k]:.6f};{296.5 + 0.01 * rng.normal():.6f}" for k in range(600)]
     (folder / "two.csv").write_text("\n".join(rows), encoding="utf-8")
     for out in ("G.json", "G.npz", "G.mat"):
-        done = robthermal("frf", "two.csv", "--system", "two.toml", "--column", "qa=heater 1", "--column", "Ta=NTC 1",
-                          "--input", "qa", "--input", "qb", "--output", "Ta", "--output", "Tb", "--out", out, "--json",
-                          cwd=folder)
-        assert done.returncode == 0, done.stderr
+        done = command("frf", "two.csv", "--system", "two.toml", "--column", "qa=heater 1", "--column", "Ta=NTC 1",
+                       "--input", "qa", "--input", "qb", "--output", "Ta", "--output", "Tb", "--out", out, "--json",
+                       folder=folder)
+        assert done.status == 0, done.err
         G = rt.identify.read_response(folder / out)
         assert (G.input_names, G.output_names) == (("qa",), ("Ta", "Tb")) and G.has_covariance
         assert G.operating_point == {"qa": pytest.approx(q.mean(), abs=1e-6), "qb": 1.5, "room": 294.0}
         assert [one.code for one in G.remarks] == ["constant_input"]
-        assert "qb" in json.loads(done.stdout)["notes"][-1] and "qb" in G.notes[-1]
+        assert "qb" in json.loads(done.out)["notes"][-1] and "qb" in G.notes[-1]
         np.testing.assert_allclose(G.covariance[0, 0], rt.identify.read_response(folder / "G.json").covariance[0, 0])
 
 
-def test_no_input_that_changes_is_refused_with_its_name(setup):
-    system, folder = setup
+def test_no_input_that_changes_is_refused_with_its_name(bar):
+    system, folder = bar
     rest = rt.Record(sample_time=1.0, inputs=np.full(300, 2.0), outputs=np.full(300, 299.0), input_names=["q"],
                      output_names=["T"])
     rest.save(folder / "rest.csv")
-    done = robthermal("frf", "rest.csv", "--system", "bar.toml", cwd=folder)
-    assert done.returncode == 2 and "no input changes: q" in done.stderr
+    done = command("frf", "rest.csv", "--system", "bar.toml", folder=folder)
+    assert done.status == 2 and "no input changes: q" in done.err
