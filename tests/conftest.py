@@ -6,8 +6,11 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+import robthermal as rt
 
 os.environ["MPLBACKEND"] = "Agg"  # read when matplotlib is first imported; most tests never do
 
@@ -29,6 +32,21 @@ def _close_figures() -> Iterator[None]:
 def run() -> Run:
     """The command line in this process: an exception that would be a traceback fails the test."""
     return command
+
+
+@pytest.fixture(scope="module")
+def sketched() -> Iterator[None]:
+    """Figures of reports are made, but a frame stands for each in the page: for tests of a report's other contents.
+
+    Turning a drawing into SVG takes most of the time of a small report. The same figures are turned into it where
+    figures are tested: the demo, one run of every command, and tests/report.
+    """
+    def frame(cls: type[rt.report.Figure], figure: Any, *, alt: str, caption: str) -> rt.report.Figure:
+        return cls('<svg viewBox="0 0 1 1"></svg>', alt, caption)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rt.report.Figure, "draw", classmethod(frame))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ from heated_bar import PROJECT, write_bar
 
 import robthermal as rt
 
+pytestmark = pytest.mark.usefixtures("sketched")
 LAG = 12.0  # s, of the sensor
 
 

@@ -15,6 +15,7 @@ from heated_bar import NOISE, PROJECT, write_bar
 import robthermal as rt
 from robthermal.jobs.chain import _run as chain
 
+pytestmark = pytest.mark.usefixtures("sketched")
 STAGES = ("identify", "calibrate", "diagnose", "certify", "design", "couple")
 COUPLE = """
 [couple]

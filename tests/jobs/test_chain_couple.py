@@ -20,6 +20,7 @@ from scipy.signal import dlsim, lfilter, tf2ss
 
 import robthermal as rt
 
+pytestmark = pytest.mark.usefixtures("sketched")
 Array = NDArray[Any]
 GCC = shutil.which("gcc") or shutil.which("cc") or shutil.which("clang")
 FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off"]

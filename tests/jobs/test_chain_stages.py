@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 
 import robthermal as rt
 
+pytestmark = pytest.mark.usefixtures("sketched")
 LAG = 12.0  # s, of the sensor, which the system file does not have
 A, B = 0.99, 0.01  # plant of the coupling, y = B/(z - A) u, sampled every 0.01 s
 COUPLE = f"""
