@@ -73,6 +73,7 @@ class Integrator:
         self.layout = Layout(self.eq)
         self.port_heat = PortHeat.of(self.eq, self.layout)
         self.nz, self.nq = self.parts.F.shape[0], self.parts.N.shape[1]
+        self._gains: dict[tuple[int, int], Array] = {}
         self._fixed: dict[tuple[int, int], FixedPoint] = {}
         self._window: tuple[Step, Array, FixedPoint] | None = None
 
@@ -89,8 +90,11 @@ class Integrator:
 
     def gain(self, kind: int, level: int) -> Array:
         """Temperature that one watt of each heat is worth over a step [K/W]."""
-        lumps = slice(DEGREE * self.ports.size, DEGREE * self.ports.size + len(self.eq.capacity))
-        return np.abs(self.step(kind, level).M[lumps]).reshape(len(self.eq.capacity), DEGREE + 1, self.nq).sum(1).max(0)
+        if (kind, level) not in self._gains:
+            n, first = len(self.eq.capacity), DEGREE * self.ports.size
+            lumps = np.abs(self.step(kind, level).M[first:first + n])
+            self._gains[kind, level] = lumps.reshape(n, DEGREE + 1, self.nq).sum(1).max(0)
+        return self._gains[kind, level]
 
     def fixed(self, kind: int, level: int) -> FixedPoint:
         """Fixed point of a step of lengths[kind] / 2**level; the ports at its start are known."""

@@ -72,6 +72,22 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
                     np.searchsorted(at, np.arange(n) - _SAME).astype(np.intp))
 
 
+def one_sample(eq: Equations, u: Array, h: float) -> Schedule:
+    """The schedule of a single sample, of a system without delayed inputs and steps of conductance.
+
+    Parameters
+    ----------
+    eq : Equations
+        Equations whose drives follow from the values.
+    u : ndarray, shape (n_u,)
+        Exogenous values, held over the sample.
+    h : float
+        Sample time [s].
+    """
+    held = np.array([u, u])
+    return Schedule((h,), np.array([0.0, 1.0]), np.zeros(2, np.intp), held, eq.drives(held), np.arange(2))
+
+
 def _distinct(at: Array, n: int) -> Array:
     """Sorted times [samples] within the record, without those that coincide; whole samples stay exact."""
     nearest = np.round(at)

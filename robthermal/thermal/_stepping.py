@@ -14,7 +14,7 @@ from ._drive import settle
 from ._equations import Equations
 from ._exponential import Integrator
 from ._parts import Input
-from ._schedule import schedule
+from ._schedule import one_sample
 from ._sensors import read_sensors
 from ._simulate import is_small
 from ._steady import exogenous_point
@@ -134,7 +134,7 @@ class Stepper:
         named = {f"load on {lump}": heat for lump, heat in (load or {}).items()}
         u = exogenous_point(self._eq, {**(inputs or {}), **named})
         try:
-            self.state = self._integrator.run(self.state, schedule(self._eq, np.array([u, u]), self.sample_time)).z[-1]
+            self.state = self._integrator.run(self.state, one_sample(self._eq, u, self.sample_time)).z[-1]
         except Diverged as error:  # its clock starts anew at every step
             why = str(error).partition(": ")[2]
             raise Diverged(f"the simulation runs away at {self.time:.6g} s: {why}", time=self.time) from None
