@@ -17,7 +17,7 @@ RESONANT = control.tf([1], np.polymul([1, 0.2, 1], [1, 1]))
 def measured(plant, noise=0.0, count=150, low=1e-4, high=1.0, seed=0, dof=200):
     """Response of a plant on a grid [Hz] with white noise of relative size, and its covariance."""
     f = np.geomspace(low, high, count)
-    G = np.array([complex(plant(2j * np.pi * x)) for x in f])
+    G = plant(2j * np.pi * f)
     variance = (noise * abs(G[0])) ** 2 * np.ones(count)
     rng = np.random.default_rng(seed)
     error = np.sqrt(variance / 2) * (rng.standard_normal(count) + 1j * rng.standard_normal(count))
@@ -34,14 +34,14 @@ def stable(plant, gains, **more):
 
 def brute(G, w, radius, margin, plant, Kp, Ki):
     """Largest integral gain of a grid that keeps the margin at the bins and whose loop with the plant is stable."""
-    best = 0.0
+    best, num, den = 0.0, plant.num[0][0], np.append(plant.den[0][0], 0.0)
     for p in Kp:
         C = p + Ki[:, None] / (1j * w)
         keep = (abs(1 + G * C) - radius * abs(C)).min(axis=1) >= margin
         for k in np.flatnonzero(keep)[::-1]:
             if Ki[k] <= best:
                 break
-            if stable(plant, {"Kp": p, "Ki": Ki[k]}):
+            if (np.roots(np.polyadd(den, np.polymul(num, [p, Ki[k]]))).real < 0).all():
                 best = Ki[k]
                 break
     return best
@@ -71,7 +71,7 @@ def test_plants_drawn_from_the_covariance_keep_the_margin():
     C, sigma = d.gains["Kp"] + d.gains["Ki"] / (1j * w), np.sqrt(G.variance[0, 0] / 2)
     drawn = G.response[0, 0] + sigma * (rng.standard_normal((1000, len(w))) + 1j * rng.standard_normal((1000, len(w))))
     assert d.holds and (abs(1 + drawn * C).min(axis=1) >= 0.6).mean() >= 0.99
-    true = np.array([complex(LAG(1j * x)) for x in w])
+    true = LAG(1j * w)
     assert abs(1 + true * C).min() >= 0.6
 
 
@@ -86,7 +86,7 @@ def test_model_is_certified_at_every_frequency():
     assert d.holds and rt.verify(c).valid and d.value == c.region["bound"] == pytest.approx(1 / 0.6)
     loop = control.feedback(1, RESONANT * d.controller)
     w = np.geomspace(1e-4, 1e3, 20000)
-    assert max(abs(np.array([complex(loop(1j * x)) for x in w]))) < 1 / 0.6
+    assert abs(loop(1j * w)).max() < 1 / 0.6
     assert (d.closed_loop.poles().real < 0).all()
 
 
@@ -124,7 +124,7 @@ def test_sampled_controller_of_a_measured_response():
     loop = control.feedback(1, held * d.controller)
     assert d.holds and (abs(loop.poles()) < 1).all()
     w = np.geomspace(1e-4, np.pi / T, 5000)
-    assert max(abs(complex(loop(np.exp(1j * x * T)))) for x in w) < 1 / 0.59
+    assert abs(loop(np.exp(1j * w * T))).max() < 1 / 0.59
 
 
 def test_one_controller_for_several_responses():
@@ -138,7 +138,7 @@ def test_one_controller_for_several_responses():
 def test_bandwidth_and_weights():
     d = rt.design.frf_pid(LAG, structure="pid", bandwidth=0.05)
     w = np.geomspace(1e-4, 0.05, 300)
-    S = np.array([1 / (1 + complex(LAG(1j * x)) * complex(d.controller(1j * x))) for x in w])
+    S = 1 / (1 + LAG(1j * w) * d.controller(1j * w))
     assert d.holds and abs(S).max() <= 1 / np.sqrt(2) * 1.001
     d = rt.design.frf_pid(LAG, structure="pi", bandwidth=5.0)
     assert not d.holds and d.outcome.code == "infeasible" and d.value == np.inf and not d.certificates

@@ -140,9 +140,10 @@ def test_decay_of_the_closed_loop():
 def test_gain_of_the_controller_is_limited():
     P = mixed_sensitivity(0.1)
     free = rt.design.hinf(P, 1, 1)
-    top = max(abs(free.controller(1j * w)) for w in np.geomspace(1e-4, 1e5, 4000))
+    w = np.geomspace(1e-4, 1e5, 4000)
+    top = abs(free.controller(1j * w)).max()
     d = rt.design.hinf(P, 1, 1, max_gain=0.85 * top)
-    assert d.holds and max(abs(d.controller(1j * w)) for w in np.geomspace(1e-4, 1e5, 4000)) <= 0.85 * top
+    assert d.holds and abs(d.controller(1j * w)).max() <= 0.85 * top
     assert proven(d, P) and d.value > free.value
     d = rt.design.hinf(P, 1, 1, max_gain=1e-6 * top)
     assert not d.holds and "max_gain" in d.outcome.text
@@ -217,7 +218,7 @@ def test_margins_are_those_of_the_loop():
     d = rt.design.hinf(P, 1, 1)
     G, K = control.ss(P.A, P.B[:, -1:], P.C[-1:], 0), d.controller
     w = np.geomspace(1e-4, 1e5, 20000)
-    L = np.array([G(1j * x) * K(1j * x) for x in w])
+    L = G(1j * w) * K(1j * w)
     S = 1 / (1 - L)
     found = d.margins[K.output_labels[0]]
     assert found["disk"] == pytest.approx(2 / abs(2 * S - 1).max(), rel=1e-3)
