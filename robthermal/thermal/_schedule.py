@@ -82,7 +82,7 @@ def one_sample(eq: Equations, u: Array, h: float) -> Schedule:
     u : ndarray, shape (n_u,)
         Exogenous values, held over the sample.
     h : float
-        Sample time [s].
+        Length of the sample [s].
     """
     held = np.array([u, u])
     return Schedule((h,), np.array([0.0, 1.0]), np.zeros(2, np.intp), held, eq.drives(held), np.arange(2))
