@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from . import _contraction, _gain, _invariance, _network, _observer, _runaway, _stability
+from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _stability
 from ._exact import Interval, short
 from ._hash import machine_hash, short_hash
 from ._thermal import Network
@@ -62,8 +62,8 @@ def _span(box: Interval) -> str:
     return f"[{decimal(box[0])}, {decimal(box[1])}]"
 
 
-def _plural(count: int, word: str) -> str:
-    return f"{count} {word}" + ("" if count == 1 else "s")
+def _plural(count: int, word: str, many: str = "") -> str:
+    return f"{count} {word if count == 1 else many or word + 's'}"
 
 
 def _parameters(parameters: Mapping[str, Interval], parts: Parts) -> str:
@@ -175,6 +175,47 @@ def _stability_claim(problem: _stability.Problem, parts: Parts) -> str:
             f"parameters, is asymptotically stable: all eigenvalues of A have {modes}.")
 
 
+def _polytope_claim(problem: _polytope.Problem, parts: Parts) -> str:
+    sampled, rates = problem.sample_time > 0, problem.rates
+    if problem.measure == "region" or (problem.slack is not None and rates is None):
+        plants = "every constant plant"
+    elif rates is None:
+        plants = "every plant, constant or varying with time in any way,"
+    else:
+        plants = ("every plant, constant or varying with time, its weights of the vertices no faster than "
+                  f"{', '.join(map(decimal, rates))} 1/s,")
+    sizes = ", ".join([_plural(len(problem.loops[0][0]), "state"), _plural(problem.inputs, "input"),
+                       f"the last {problem.controls} for control",
+                       *([_plural(problem.outputs, "output")] if problem.outputs else [])])
+    time = f"sampled at {decimal(problem.sample_time)} s" if sampled else "continuous"
+    return (f"The state feedback u = F x as given, {time}, stabilizes {plants} in the convex hull of "
+            f"{_plural(len(problem.loops), 'vertex', 'vertices')} as given ({sizes}) (machine "
+            f"{machine_hash(parts['system'])}), nominal parameters: {_polytope_measure(problem, sampled)}.")
+
+
+def _polytope_measure(problem: _polytope.Problem, sampled: bool) -> str:
+    stated, rate = problem.numbers, problem.numbers.get("rate", Fraction(0))
+    if problem.measure == "stability":
+        form = "x'Px" if problem.slack is None else "x'P(w)x, P(w) affine in the weights w,"
+        if sampled:
+            return f"{form} " + (f"shrinks at least by the factor {decimal(1 - rate)}² per sample" if rate > 0 else
+                                 "shrinks strictly with every sample")
+        return f"{form} " + (f"falls at least as exp(-2 rate t), rate = {decimal(rate)} 1/s" if rate > 0 else
+                             "falls strictly")
+    if problem.measure == "hinf":
+        return ("the H-infinity norm, of a varying plant the L2 gain, from w to z stays below "
+                f"{decimal(stated['bound'])}")
+    if problem.measure == "h2":
+        return ("the H2 norm, of a varying plant the root mean square of z in the long run under white noise w of unit "
+                f"intensity, stays below {decimal(stated['bound'])}")
+    words = [f"real parts below {decimal(-stated['decay'])} 1/s"] if "decay" in stated else []
+    words += [f"damping ratios above {decimal(stated['damping'])}"] if "damping" in stated else []
+    words += ([f"absolute values below {decimal(stated['radius'])}{'' if sampled else ' 1/s'}"] if "radius" in stated
+              else [])
+    return f"all eigenvalues of its loop have {' and '.join(words)}"
+
+
 _KINDS: dict[str, Callable[[Any, Parts], str]] = {
     "contraction": _contraction_claim, "invariance": _invariance_claim, "gain": _gain_claim,
-    "observer": _observer_claim, "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}
+    "observer": _observer_claim, "polytope": _polytope_claim,
+    "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}

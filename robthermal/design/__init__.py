@@ -1,11 +1,13 @@
 """Controllers and observers for systems with thermoelectric modules; syntheses for any linear plant."""
 
 from ..synthesis import Design as Design
+from ..synthesis import FeedbackDesign as FeedbackDesign
 from ..synthesis import FrfDesign as FrfDesign
 from ..synthesis import RobustAgainst as RobustAgainst
 from ..synthesis import frf_pid as frf_pid
 from ..synthesis import h2 as h2
 from ..synthesis import hinf as hinf
+from ..synthesis import polytopic_feedback as polytopic_feedback
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
 from ._constant_gain import ConstantGain as ConstantGain
@@ -78,4 +80,5 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "feedback_linearization", "gains_digest", "linear_controller", "load_controller", "loop_margins",
            "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
            "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]
-__all__ += ["Design", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf"]  # of the package synthesis
+__all__ += ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf",  # of synthesis
+            "polytopic_feedback"]

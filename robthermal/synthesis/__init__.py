@@ -5,10 +5,13 @@ For any linear plant; thermal front ends are in `robthermal.design`, which also 
 
 from ._design import Design as Design
 from ._design import RobustAgainst as RobustAgainst
+from ._feedback import FeedbackDesign as FeedbackDesign
+from ._feedback import polytopic_feedback as polytopic_feedback
 from ._frf_pid import FrfDesign as FrfDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
 from ._outcomes import SynthesisCode as SynthesisCode
 
-__all__ = ["Design", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf"]
+__all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf",
+           "polytopic_feedback"]

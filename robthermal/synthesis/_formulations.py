@@ -15,6 +15,7 @@ from .._arrays import Array
 from ..errors import InputError
 from ._frf_program import Bins
 from ._plant import GeneralizedPlant, balanced
+from ._vertices import Vertices
 
 cp: Any = cvxpy  # its types name only part of what it exports
 _SETTINGS = {"chordal_decomposition_enable": False, "max_iter": 400}  # with it Clarabel 0.11 may abort
@@ -70,6 +71,29 @@ def margin_step(bins: Bins, at: Array, objective: Array, margin: float) -> Array
         constraints.append((c.conjugate() / abs(c)).real + row.real @ x >= max(margin, bins.S[k]) + bins.radius[k] * C)
     cp.Problem(cp.Maximize(objective @ x), constraints).solve(solver=cp.CLARABEL)
     return np.asarray(x.value, float)
+
+
+def polytope_level(vertices: Vertices, objective: str) -> float:
+    """Smallest bound that one state feedback and one quadratic form show for a hull of continuous plants.
+
+    H-infinity: Boyd et al. (1994), section 7.5.1, minimize g with [AW + BY + ., B1, (CW + D2Y)'; ., -1, D1'; ., ., -g]
+    <= 0 at every vertex. H2: minimize g with [AW + BY + ., (CW + D2Y)'; ., -1] <= 0, tr B1' W^-1 B1 <= g.
+    """
+    n, w, m, p = vertices.sizes
+    W, Y, g = cp.Variable((n, n), symmetric=True), cp.Variable((m, n)), cp.Variable()
+    constraints = [W >> 0]
+    for A, B1, B2, C, D1, D2 in zip(vertices.A, vertices.B1, vertices.B2, vertices.C, vertices.D1, vertices.D2,
+                                    strict=True):
+        moved, seen = A @ W + B2 @ Y, C @ W + D2 @ Y
+        if objective == "hinf":
+            constraints.append(_negative(cp.bmat([[moved + moved.T, B1, seen.T], [B1.T, -np.eye(w), D1.T],
+                                                  [seen, D1, -g * np.eye(p)]])))
+        else:
+            Z = cp.Variable((w, w), symmetric=True)
+            energy = cp.bmat([[Z, B1.T], [B1, W]])
+            constraints += [_negative(cp.bmat([[moved + moved.T, seen.T], [seen, -np.eye(p)]])),
+                            (energy + energy.T) / 2 >> 0, cp.trace(Z) <= g]
+    return float(np.sqrt(_minimum(g, constraints)))
 
 
 def _outer(rows: Array, more: int) -> Array:

@@ -13,10 +13,11 @@ from ._loop import LOOP
 from ._network import NETWORK
 from ._observer import OBSERVER
 from ._peak import PEAK
+from ._polytope import POLYTOPE
 from ._regulated import REGULATED
 from ._runaway import RUNAWAY
 from ._stability import STABILITY
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
                                                        REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP,
-                                                       CLOSED_LOOP)}
+                                                       CLOSED_LOOP, POLYTOPE)}

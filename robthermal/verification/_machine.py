@@ -92,6 +92,8 @@ def _content(section: Any) -> list[Any]:
         return [Name("closed_loop"), *(get(mapping(get(table, part, "system"), f"system.{part}"), key, f"system.{part}")
                                        for part in ("plant", "controller") for key in "ABCD"),
                 *(get(table, key, "system") for key in ("n_meas", "n_ctrl", "sample_time"))]
+    if "vertices" in table:
+        return [Name("polytope"), *(get(table, key, "system") for key in ("vertices", "gain", "sample_time"))]
     for family, keys in _SIZES.items():
         if keys[0] in table:
             return [Name(family), *(get(table, key, "system") for key in keys)]

@@ -15,11 +15,12 @@ import numpy as np
 from _timing import header
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
+import mutant_feedback  # noqa: E402 - beside the tests, not on the path before
 import mutant_linear  # noqa: E402 - beside the tests, not on the path before
 import mutant_thermal  # noqa: E402
 from mutants import ALARMS, run  # noqa: E402
 
-SUBJECTS = (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS)
+SUBJECTS = (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS, *mutant_feedback.SUBJECTS)
 
 
 def main(count: int, seed: int) -> int:

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import certificate_truth
+import mutant_feedback
 import mutant_linear
 import mutant_thermal
 import numpy as np
@@ -22,8 +23,9 @@ import robthermal as rt
 from robthermal.verification import establish
 from robthermal.verification._kinds import KINDS
 
-SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS)}
-COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer")
+SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
+                                                  *mutant_feedback.SUBJECTS)}
+COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope")
 
 
 def document_of(certificate) -> dict:

@@ -104,7 +104,7 @@ def break_stability(document: Document, rng: np.random.Generator) -> float:
 # hinf
 
 
-def _norm(system: Document, left: np.ndarray | float = 1.0, right: np.ndarray | float = 1.0) -> float:
+def norm_of(system: Document, left: np.ndarray | float = 1.0, right: np.ndarray | float = 1.0) -> float:
     return float(np.linalg.norm(_scaled(responses(system, grid(system)), left, right), 2, axis=(1, 2)).max())
 
 
@@ -120,7 +120,7 @@ def make_hinf(rng: np.random.Generator) -> Document:
     if rng.random() < 0.3:
         scalings = {"left": np.diag(rng.uniform(0.5, 1, p).round(3)), "right": np.diag(rng.uniform(1, 2, m).round(3))}
         B, C, D = B / np.diag(scalings["right"]), scalings["left"] @ C, _scaled(D, *scalings.values())
-    bound = (_norm(system, *scalings.values()) + 1e-3) * (1 + 10 ** float(rng.uniform(-2.5, -1)))
+    bound = (norm_of(system, *scalings.values()) + 1e-3) * (1 + 10 ** float(rng.uniform(-2.5, -1)))
     evidence: Document = {"method": "polynomial"}
     if rng.random() < 0.6:
         solve = solve_discrete_are if system["sample_time"] else solve_continuous_are
@@ -138,7 +138,7 @@ def make_hinf(rng: np.random.Generator) -> Document:
 def break_hinf(document: Document, rng: np.random.Generator) -> float:
     region, system = document["region"], document["system"]
     left, right = (_complex(region[key]) if key in region else 1.0 for key in ("left", "right"))
-    return max(spare_decay(system), _norm(system, left, right) / truth.number(region["bound"]) - 1)
+    return max(spare_decay(system), norm_of(system, left, right) / truth.number(region["bound"]) - 1)
 
 
 # frequency
@@ -316,7 +316,7 @@ def make_closed_loop(rng: np.random.Generator) -> Document:
     if spare_decay(loop) >= 0:
         return make_closed_loop(rng)
     A, B, C, D = matrices(loop)
-    region: Document = {"measure": "hinf", "bound": _norm(loop) * (1 + 10 ** float(rng.uniform(-2.5, -1)))}
+    region: Document = {"measure": "hinf", "bound": norm_of(loop) * (1 + 10 ** float(rng.uniform(-2.5, -1)))}
     evidence: Document = {"method": "polynomial"}
     if rng.random() < 0.3:
         region = {"measure": "stability", "rate": 0.9 * (spare if not dt else 1 - np.abs(np.linalg.eigvals(A)).max())}
@@ -347,7 +347,7 @@ def break_closed_loop(document: Document, rng: np.random.Generator) -> float:
         return spare_decay(loop, truth.number(region.get("rate", 0)))
     loss, bound = spare_decay(loop), truth.number(region["bound"])
     if loss > 0 or region["measure"] == "hinf":
-        return max(loss, _norm(loop) / bound - 1)
+        return max(loss, norm_of(loop) / bound - 1)
     A, B, C, D = matrices(loop)
     P = gramian(A, C, truth.number(loop["sample_time"]) > 0)
     return float(np.sqrt(max(np.trace(B.T @ P @ B) + np.sum(D**2), 0.0))) / bound - 1

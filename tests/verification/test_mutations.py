@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mutant_feedback
 import mutant_linear
 import mutant_thermal
 import numpy as np
@@ -10,7 +11,8 @@ from mutants import ALARMS, FALSE, Subject, judge, run
 
 from robthermal.verification._kinds import KINDS
 
-SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS)}
+SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
+                                                  *mutant_feedback.SUBJECTS)}
 
 
 def test_every_kind_has_a_falsifier():
@@ -35,6 +37,11 @@ def test_falsifiers_find_what_is_false(kind):
     region, evidence = document["region"], document["evidence"]
     if kind == "stability":
         region["rate"] = 0.9 * (1 if document["system"]["sample_time"] else 1e6)
+    elif kind == "polytope":
+        region.update({key: value / 4 if key in ("bound", "radius") else 4 * value + 0.1
+                       for key, value in region.items() if key in ("rate", "bound", "decay", "radius")})
+        if document["system"]["sample_time"] and "rate" in region:
+            region["rate"] = 0.999
     elif kind == "closed_loop":
         region["rate" if region["measure"] == "stability" else "bound"] = (
             (0.999 if document["system"]["sample_time"] else 1e6) if region["measure"] == "stability"

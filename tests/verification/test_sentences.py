@@ -9,6 +9,7 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import certificate_truth as truth
+import mutant_feedback
 import mutant_linear
 import mutant_thermal
 import numpy as np
@@ -26,7 +27,8 @@ ROD = {"name": "rod", "lumps": {"rod": {"capacity": 10.0}}, "ambients": ["room"]
        "links": [{"name": "rod-room", "between": ["rod", "room"], "conductance": 0.5}]}
 LAG = {"A": [[-2]], "B": [[1]], "C": [[2]], "D": [[0]], "sample_time": 0}
 HALF = {"A": [["0.5"]], "B": [[1]], "C": [["0.5"]], "D": [[0]], "sample_time": 1}
-SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS)}
+SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
+                                                  *mutant_feedback.SUBJECTS)}
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
 

@@ -51,6 +51,8 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
     "frequency": (_LINEAR,),
     "closed_loop": (_LINEAR, "The controller runs with the numbers of the certificate file, without limits or delays "
                     "beyond those of the plant."),
+    "polytope": ("The plant is linear at every moment and lies in the convex hull of the vertices; its states are "
+                 "measured.", "The gain runs with the numbers of the certificate file, without limits or delays."),
     "loop": (
         "Controller and linearizing feedback law run as in the certificate file, read the true temperatures at the "
         "samples, and the current is held between them. Where the sentence says \"sampled model\", nothing is claimed "
