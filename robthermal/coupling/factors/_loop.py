@@ -9,7 +9,7 @@ import numpy as np
 from ..._arrays import Array
 from ..._control import control
 from ...errors import InputError
-from ..systems import LTI, Zpk, constant, expect_stable, natural, paired, realize, stable, zpk_of
+from ..systems import LTI, Zpk, closed_loop_poles, constant, expect_stable, natural, paired, stable, zpk_of
 from ._inner import inner_zpk, inverse_times
 
 
@@ -65,16 +65,16 @@ def close(P: LTI, C: LTI, number: int, dt: float, Z: LTI | None = None, cutoff: 
 
 
 def _closed_loop_poles(plant: Zpk, controller: Zpk, names: tuple[str, str, str]) -> Array:
-    """Eigenvalues of the loop, which is refused unless all are strictly stable."""
+    """Poles of the loop, which is refused unless all are strictly stable."""
     direct = 1.0 + plant.at_infinity() * controller.at_infinity()
     where = f"{names[0]}, {names[1]}"
     if abs(direct) < 1e-12:
         raise InputError("1 + P(∞) C(∞) = 0: the loop is not well posed", where=where,
                          expected="a well-posed loop", remedy="Add a delay or a low-pass filter to the controller.")
-    poles = paired(np.linalg.eigvals(feedback_matrix(realize(plant), realize(controller))))
+    poles = closed_loop_poles(plant, controller)
     expect_stable(poles, where, plant.dt, "the loop of plant and controller is unstable",
                   "The controllers must stabilize their own plants (negative feedback, e = r - y).")
-    return _polished(poles, plant, controller)
+    return poles
 
 
 def feedback_matrix(plant: control.StateSpace, controller: control.StateSpace) -> Array:
@@ -89,30 +89,6 @@ def feedback_matrix(plant: control.StateSpace, controller: control.StateSpace) -
     e_p, e_k = -well @ plant.C, -well @ plant.D @ controller.C
     u_p, u_k = controller.D @ e_p, controller.C + controller.D @ e_k
     return np.block([[plant.A + plant.B @ u_p, plant.B @ u_k], [controller.B @ e_p, controller.A + controller.B @ e_k]])
-
-
-def _polished(poles: Array, plant: Zpk, controller: Zpk) -> Array:
-    """Newton steps on 1 + PC = 0 in factored form, kept where they are small and stay in the upper half-plane."""
-    loop = plant.times(controller)
-    upper = poles[poles.imag >= 0]
-    with np.errstate(all="ignore"):
-        for _ in range(2):
-            L = loop.gain * np.ones(len(upper), dtype=complex)
-            slope = np.zeros(len(upper), dtype=complex)  # L'/L
-            for sign, roots in ((1, loop.zeros), (-1, loop.poles)):
-                for root in roots:
-                    L = L * (upper - root) ** sign
-                    slope = slope + sign / (upper - root)
-            step = -(1.0 + L) / (L * slope)
-            good = np.isfinite(step) & (np.abs(step) < 1e-6 * _spread(upper))
-            upper = np.where(good, upper + np.where(upper.imag == 0, step.real, step), upper)
-    return np.concatenate([upper, upper[upper.imag > 0].conj()])
-
-
-def _spread(roots: Array) -> Array:
-    """Distance of each root to its nearest neighbor."""
-    gaps = np.abs(roots[:, None] - roots[None, :]) + np.diag(np.full(len(roots), np.inf))
-    return gaps.min(axis=1, initial=1.0)
 
 
 def _controller_factors(controller: Zpk, closed_poles: Array) -> tuple[Zpk, Zpk]:

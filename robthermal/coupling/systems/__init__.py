@@ -2,6 +2,7 @@
 
 from ._cascade import grouped as grouped
 from ._cascade import realize as realize
+from ._exact import closed_loop_poles as closed_loop_poles
 from ._joined import apart as apart
 from ._joined import beside as beside
 from ._joined import minus_identity as minus_identity
@@ -24,6 +25,6 @@ from ._zpk import natural as natural
 from ._zpk import on_boundary as on_boundary
 from ._zpk import stable as stable
 
-__all__ = ["LTI", "Response", "Zpk", "apart", "beside", "connected", "constant", "diagonal", "expect_stable", "grouped",
-           "minus_identity", "natural", "negative", "on_boundary", "paired", "plus_one", "realize", "sample_time_of",
-           "series", "siso", "stable", "state_space_of", "zpk_of"]
+__all__ = ["LTI", "Response", "Zpk", "apart", "beside", "closed_loop_poles", "connected", "constant", "diagonal",
+           "expect_stable", "grouped", "minus_identity", "natural", "negative", "on_boundary", "paired", "plus_one",
+           "realize", "sample_time_of", "series", "siso", "stable", "state_space_of", "zpk_of"]

@@ -11,7 +11,8 @@ from ..._arrays import Array
 from ..._control import control
 from ...errors import InputError
 from ._cascade import realize
-from ._roots import paired, snapped, zeros_and_gain
+from ._exact import from_coefficients, roots_of, transfer, truncated
+from ._roots import number_of_zeros, snapped
 from ._zpk import Zpk, constant, stable
 
 LTI = Any  # control.StateSpace, control.TransferFunction or a number
@@ -189,17 +190,21 @@ def _from_polynomials(system: control.TransferFunction, where: str, dt: float) -
     if len(num) > len(den):
         raise InputError(f"improper: numerator of degree {len(num) - 1}, denominator of degree {len(den) - 1}",
                          where=where, expected="a proper transfer function", remedy="Add a low-pass filter.")
-    roots = [snapped(paired(np.roots(c)), dt) for c in (num, den)]
+    roots = [snapped(roots_of(from_coefficients(c)), dt) for c in (num, den)]
     return Zpk(roots[0], roots[1], float(num[0] / den[0]), dt).without_hidden()
 
 
 def _from_matrices(system: control.StateSpace, where: str, dt: float) -> Zpk:
     A, B, C, D = _without_idle_states(system, where, dt)
-    poles = snapped(paired(np.linalg.eigvals(A)), dt) if len(A) else np.array([], dtype=complex)
-    zeros, gain = zeros_and_gain(A, B, C, D)
-    if gain == 0.0:
+    if not len(A):
+        return constant(float(D[0, 0]), dt)
+    degree = number_of_zeros(A, B, C, D)
+    if degree is None:
         return constant(0.0, dt)
-    return Zpk(snapped(paired(zeros), dt), poles, gain, dt).without_hidden()
+    numerator, denominator = transfer(A, B, C, D)
+    numerator = truncated(numerator, degree)
+    zeros, poles = (snapped(roots_of(polynomial), dt) for polynomial in (numerator, denominator))
+    return Zpk(zeros, poles, float(numerator[degree]), dt).without_hidden()
 
 
 def _expect_siso(system: LTI, where: str, dt: float) -> None:

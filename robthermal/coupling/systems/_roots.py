@@ -52,11 +52,12 @@ def paired(roots: Array) -> Array:
     return np.concatenate([above, above.conj(), roots[roots.imag == 0]])
 
 
-def zeros_and_gain(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, float]:
-    """Finite zeros and leading coefficient of one channel, by orthogonal reduction.
+def number_of_zeros(A: Array, B: Array, C: Array, D: Array) -> int | None:
+    """How many finite zeros one channel has, by orthogonal reduction; None: it passes nothing.
 
     Where the feedthrough vanishes, the output holds one state at zero; that state's equation is the next output
     (Emami-Naeini and Van Dooren 1982, for one input and one output). Every step takes one pole more than zeros.
+    The numerator itself does not tell: a feedthrough of rounding would make one more zero, far away.
 
     Parameters
     ----------
@@ -64,17 +65,16 @@ def zeros_and_gain(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, float
         (n, n), (n, 1), (1, n), (1, 1).
     """
     A, B, C = _balanced(A, B, C)
-    gain, rounding = 1.0, _ROUNDING * float(np.linalg.norm(B) * np.linalg.norm(C)) / max(1.0, float(np.linalg.norm(A)))
+    rounding = _ROUNDING * float(np.linalg.norm(B) * np.linalg.norm(C)) / max(1.0, float(np.linalg.norm(A)))
     while True:
-        direct, length = float(D[0, 0]), float(np.linalg.norm(C))
-        if abs(direct) > rounding:
-            zeros = np.linalg.eigvals(A - B @ C / direct) if len(A) else np.array([], dtype=complex)
-            return zeros, gain * direct
+        if abs(float(D[0, 0])) > rounding:
+            return len(A)
+        length = float(np.linalg.norm(C))
         if length == 0.0:
-            return np.array([], dtype=complex), 0.0
+            return None
         basis = _last_axis(C[0] / length)
         A, B = basis.T @ A @ basis, basis.T @ B
-        gain, rounding = gain * length, _ROUNDING * float(np.linalg.norm(B))
+        rounding = _ROUNDING * float(np.linalg.norm(B))
         A, B, C, D = A[:-1, :-1], B[:-1], A[-1:, :-1], B[-1:]
 
 
