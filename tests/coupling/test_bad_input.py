@@ -64,6 +64,7 @@ def test_filters() -> None:
 def test_all_pass_factors() -> None:
     refuses("P1⁻¹Z is improper: Z has relative degree 0, P1 has 2", Z1=rt.coupling.inner_factor(
         control.zpk(control.ss(PAIR.P1).zeros(), [0.1, 0.1], 1, dt=0.01))[0])
+    refuses("P1⁻¹Z is unstable: Z lacks the zero of P1 at .*, and improper: Z has relative degree 0, P1 has", Z1=1.0)
     refuses("Z lacks the zero of P2", Z2=control.tf([1], [1, 0, 0], 0.01))
     refuses("Z1: is unstable", Z1=control.tf([1], [1, -2], 0.01))
 

@@ -234,6 +234,19 @@ def test_continuous_time():
     assert np.all(np.linalg.eigvals(filters.X_hat.A).real < 0)
 
 
+@pytest.mark.parametrize("extra", [[], [2.0]])
+def test_least_peak_in_continuous_time_is_what_the_wrong_side_zero_leaves(extra):
+    """X vanishes at the zero of P1 at 2 rad/s, so the peak of (1+X) S2 W2 is at least |S2 W2| there; 5 % above it."""
+    s, noise, C = control.tf("s"), control.tf([1.0], [1.0, 1.0]), control.tf([0.5], [1.0, 1.0])
+    P = (2 - s) / (s + 3) / (s + 1)
+    for pole in extra:
+        P = P / (s + pole)
+    least = abs((noise / (1 + P * C))(2.0))
+    filters = rt.coupling.synthesize(P, P, C, C, disturbances=(0, noise), objective="hinf", couple=("X",))
+    assert filters.holds and least < filters.norms["hinf"] <= 1.05 * least
+    assert abs(filters.X(2.0)) < 1e-9
+
+
 def test_limits_that_cannot_be_met_are_a_result_with_the_smallest_possible_value():
     filters = simple(objective="mixed", hinf_limit=1.0, order=10)
     assert not filters.holds and filters.outcome.code == "infeasible"

@@ -96,17 +96,22 @@ def inverse_times(plant: Zpk, Z: Zpk, where: str, plant_name: str) -> Zpk:
             continue
         near = min(zeros, key=lambda z: abs(z - zero), default=complex("inf"))
         if not abs(near - zero) <= _SAME_ZERO * abs(zero):
-            raise InputError(f"{plant_name}⁻¹Z is unstable: Z lacks the zero of {plant_name} at {zero:.6g}",
+            also = "" if Z.excess >= plant.excess else f", and improper: {_degrees(plant, Z, plant_name)}"
+            raise InputError(f"{plant_name}⁻¹Z is unstable: Z lacks the zero of {plant_name} at {zero:.6g}{also}",
                              where=where, expected=f"a Z with every wrong-side zero of {plant_name}",
                              remedy="Leave Z out: then it is constructed.")
         zeros.remove(near)
         held.append(zero)
     if Z.excess < plant.excess:
-        raise InputError(f"{plant_name}⁻¹Z is improper: Z has relative degree {Z.excess}, {plant_name} has "
-                         f"{plant.excess}", where=where, expected=f"at least {plant.excess}",
+        raise InputError(f"{plant_name}⁻¹Z is improper: {_degrees(plant, Z, plant_name)}", where=where,
+                         expected=f"a relative degree of Z of at least {plant.excess}",
                          remedy="Add delay (discrete) or a low-pass filter (continuous) to Z, or leave Z out.")
     exact = Zpk(np.concatenate([np.array(zeros, dtype=complex), np.array(held, dtype=complex)]), Z.poles, Z.gain, Z.dt)
     return exact.times(plant.inverse())
+
+
+def _degrees(plant: Zpk, Z: Zpk, plant_name: str) -> str:
+    return f"Z has relative degree {Z.excess}, {plant_name} has {plant.excess}"
 
 
 def expect_invertible(plant: Zpk, where: str) -> None:

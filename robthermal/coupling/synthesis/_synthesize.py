@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...errors import InputError, Outcome
 from .._outcomes import CouplingCode
 from ..evaluation import Filters, finish, refused
 from ..factors import Uncertainty
-from ..problem import NORMS, prepare
+from ..problem import NORMS, Problem, prepare
 from ..systems import LTI
 from ._basis import make_basis
 from ._design import Design, Limits, default_pole
@@ -23,6 +24,8 @@ from ._program import solve
 _FIELDS = {key: norm.limit for key, norm in NORMS.items() if norm.limit} | {"msd": "msd"}  # of `Limits`
 _MARGINS = {key: norm.proof_margin for key, norm in NORMS.items()}
 _ATTEMPTS = 6
+_WIDER = 1000.0  # cut-off of Z over the fastest corner, where the peak in continuous time is what counts
+_DECADES = (1.0, 10.0, 100.0)  # of the default pole: a flat spectrum needs filters that act far above the bandwidth
 _SPARE = 2e-3  # taken off beyond what a bound was missed by
 _BARELY = CouplingCode.NOT_PROVEN.outcome(
     "Filters meet the limits on a grid of frequencies, but too barely for a proof between them.",
@@ -83,12 +86,14 @@ def synthesize(
     order : int
         Coefficients of each filter; ignored by "poles".
     pole : float or sequence of complex, optional
-        Laguerre pole (default: from the bandwidth), or the list of "poles". Continuous: negative real part [rad/s].
+        Laguerre pole (default: from the bandwidth; "hinf" in continuous time: the best of it, 10 and 100 times it), or
+        the list of "poles". Continuous: negative real part [rad/s].
     couple : sequence of str
         Filters that may be nonzero: ("X",) and ("Y",) are master-slave. With both allowed, one is still left out where
         the uncertainty is so large that the other alone does more.
     cutoff : float, optional
-        Continuous time: corner of the low-pass in Z [rad/s].
+        Continuous time: corner of the low-pass in Z [rad/s]. Default: ten times the fastest pole or zero of the plant;
+        with "hinf" a thousand times the fastest corner of either loop, since every roll-off below costs peak.
 
     Returns
     -------
@@ -110,31 +115,49 @@ def synthesize(
     (True, True)
     """
     started = time.perf_counter()
-    problem = prepare(P1, P2, C1, C2, uncertainty=uncertainty, disturbances=disturbances, weight=weight, window=window,
-                      cutoff=cutoff)
+    prepared = partial(prepare, P1, P2, C1, C2, uncertainty=uncertainty, disturbances=disturbances, weight=weight,
+                       window=window)
+    problem = prepared(cutoff=cutoff)
     _check_goal(objective, hinf_limit, window, msd_limit)
     _check_numbers(margin=margin, order=order, msd_limit=msd_limit, hinf_limit=hinf_limit,
                    improvement_limit=improvement_limit)
     _check_choice("basis", basis, ("laguerre", "fir", "poles"))
-    if basis == "laguerre" and pole is None:
-        pole = default_pole(problem)
-    family = make_basis(basis, order, pole, problem.dt)
+    flat = objective == "hinf" and not problem.dt
+    if flat and cutoff is None:
+        problem = prepared(cutoff=_WIDER * _fastest(problem))
     limits = Limits(msd=msd_limit, hinf=hinf_limit, improvement=improvement_limit,
                     robust=None if problem.uncertainty is None else 1 - margin,
                     product=1.0 if stable_controller else None)
-    design = Design(problem, family, "hinf" if objective == "hinf" else "h2", _read_couple(couple))
-    return _prove_or_back_off(*_most_effective(design, limits), limits, started)
+    designs = [Design(problem, make_basis(basis, order, each, problem.dt), "hinf" if objective == "hinf" else "h2",
+                      _read_couple(couple)) for each in _poles(problem, basis, pole, flat)]
+    return _prove_or_back_off(*_most_effective(designs, limits), limits, started)
 
 
-def _most_effective(design: Design, limits: Limits) -> tuple[Design, Array | None]:
-    """Both ways or one way, with coefficients to start from: against a large uncertainty one filter alone does more."""
-    ways = [design]
-    if all(design.free) and (limits.robust is not None or limits.product is not None):
-        ways += [replace(design, free=free) for free in ((True, False), (False, True))]
+def _fastest(problem: Problem) -> float:
+    """Largest corner of both loops [rad/s]."""
+    return float(np.max([np.abs(half.S.poles).max(initial=0.0) for half in (problem.one, problem.two)])) or 1.0
+
+
+def _poles(problem: Problem, basis: str, pole: complex | Sequence[complex] | None, flat: bool) -> list[Any]:
+    """What `make_basis` is asked for: the pole given, or the default ones of a Laguerre basis."""
+    if basis != "laguerre" or pole is not None:
+        return [pole]
+    own = default_pole(problem)
+    return [own * factor for factor in _DECADES] if flat else [own]
+
+
+def _most_effective(designs: list[Design], limits: Limits) -> tuple[Design, Array | None]:
+    """The best basis, both ways or one way, with coefficients to start from.
+
+    Against a large uncertainty one filter alone does more.
+    """
+    ways = list(designs)
+    if all(designs[0].free) and (limits.robust is not None or limits.product is not None):
+        ways += [replace(design, free=free) for design in designs for free in ((True, False), (False, True))]
     found = [(solve(way.responses, way.demands(limits)), way) for way in ways]
     solved = [(solution, way) for solution, way in found if solution.solved]
     if not solved:
-        return design, None
+        return designs[0], None
     solution, way = min(solved, key=lambda pair: pair[0].value)
     return way, solution.coefficients
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import acb, fmpq, fmpq_mat, fmpq_poly
 
 from ..._arrays import Array
 from ._zpk import Zpk
@@ -27,13 +27,15 @@ def roots_of(polynomial: fmpq_poly) -> Array:
     -------
     ndarray of complex
     """
-    pairs, reals = [], []
-    for root, times in polynomial.numer().complex_roots():
+    pairs: list[complex] = []
+    reals: list[complex] = []
+    found: list[tuple[acb, int]] = polynomial.numer().complex_roots()  # type: ignore[assignment]  # stub: no multiplicity
+    for root, multiplicity in found:
         value = complex(root)
         if root.imag.is_zero():
-            reals += [complex(value.real)] * times
+            reals += [complex(value.real)] * multiplicity
         elif value.imag > 0:
-            pairs += [value] * times
+            pairs += [value] * multiplicity
     return np.array([*pairs, *(root.conjugate() for root in pairs), *reals], dtype=complex)
 
 
@@ -67,7 +69,7 @@ def truncated(polynomial: fmpq_poly, degree: int) -> fmpq_poly:
     Parameters
     ----------
     polynomial : fmpq_poly
-        Rational coefficients.
+        Rational coefficients of a numerator.
     degree : int
         Highest power that is kept.
     """
