@@ -127,6 +127,10 @@ class Integrator:
         k, level = 0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
             while k < n - 1:
+                if not self.nq and (windows := _whole(plan, k)):
+                    self._advance_linear(z, w, k, windows)
+                    k += windows * WINDOW
+                    continue
                 whole = level == 0 and n - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
                 if whole and self._advance_window(z, w, k):
                     k += WINDOW
@@ -145,6 +149,16 @@ class Integrator:
             return False
         z[k + 1:k + 1 + WINDOW] = (base[rows:] + matrices.M[rows:] @ q.ravel()).reshape(WINDOW, self.nz)
         return True
+
+    def _advance_linear(self, z: Array, w: Array, k: int, windows: int) -> None:
+        """Several windows without nonlinear heats: only their last samples follow each other, the rest is a product."""
+        matrices, many = self.window()[0], windows * WINDOW
+        driven = w[k:k + many].reshape(windows, -1) @ matrices.Ku.T
+        starts = np.empty((windows, self.nz))
+        starts[0], last = z[k], matrices.K[-self.nz:]
+        for j in range(windows - 1):
+            starts[j + 1] = last @ starts[j] + driven[j, -self.nz:]
+        z[k + 1:k + 1 + many] = (starts @ matrices.K.T + driven).reshape(many, self.nz)
 
     def _advance_segment(self, z: Array, plan: Schedule, k: int, level: int, refined: dict[int, Array]) -> int:
         """One segment in 2**level steps, refined as needed; return the level to start the next one with."""
@@ -186,6 +200,12 @@ class Integrator:
         raise Diverged(f"the simulation runs away at {time:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
                        "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
                        "limit the current to what rt.certify.usable_current gives.", time=time)
+
+
+def _whole(plan: Schedule, k: int) -> int:
+    """Number of windows of whole samples from segment k on."""
+    other = np.flatnonzero(plan.kind[k:-1])
+    return int(other[0] if other.size else len(plan.kind) - 1 - k) // WINDOW
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:

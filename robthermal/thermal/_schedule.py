@@ -98,6 +98,6 @@ def _distinct(at: Array, n: int) -> Array:
 
 def _kinds(lengths: Array) -> tuple[list[float], NDArray[np.intp]]:
     """Distinct lengths [samples], a whole sample first, and which one each segment has."""
-    rounded = np.round(lengths, 9)
-    different = [1.0, *(float(value) for value in np.unique(rounded) if value != 1.0)]
-    return different, np.array([different.index(float(value)) for value in rounded], np.intp)
+    values, number = np.unique(np.round(lengths, 9), return_inverse=True)
+    different = [1.0, *(float(value) for value in values if value != 1.0)]
+    return different, np.array([different.index(float(value)) for value in values], np.intp)[number]

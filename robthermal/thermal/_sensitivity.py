@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._recursion import recursion
 from ._augmented import Augmented, slope, without_meters
 from ._collocation import DEGREE, Step, step_matrices
 from ._exponential import Integrator, Path
@@ -94,17 +95,17 @@ class Sensitivity:
         """
         out = np.empty((len(plan.w), self.n_free, len(self.names)))
         out[0] = now = start[:self.n_free]
-        jumps = {self.names.index(name): jump for name, jump in self.jumps.items()}
+        ends = np.append(path.segment[1:] != path.segment[:-1], True)  # of the last step of every segment
         for first in range(0, len(path.segment), _CHUNK):
             chunk = slice(first, first + _CHUNK)
-            maps = self.transitions(path, plan, chunk)
-            for i, k in enumerate(path.segment[chunk], start=first):
-                if jumps and (i == 0 or path.segment[i - 1] != k):
-                    now = now.copy()
-                    for column, jump in jumps.items():
-                        now[:, column] += jump[k]
-                now = maps.F[i - first] @ now + maps.P[i - first]
-                out[k + 1] = now
+            maps, segment = self.transitions(path, plan, chunk), path.segment[chunk]
+            begins = np.flatnonzero(np.concatenate([[True], ends[:-1]])[chunk]) if self.jumps else []
+            for name, jump in self.jumps.items():
+                moved = jump[segment[begins], :, None]
+                maps.P[begins, :, self.names.index(name)] += (maps.F[begins] @ moved)[..., 0]
+            states = recursion(maps.F, maps.P, now)
+            out[segment[ends[chunk]] + 1] = states[1:][ends[chunk]]
+            now = states[-1]
         return out
 
     def transitions(self, path: Path, plan: Schedule, chunk: slice) -> Transitions:
@@ -113,7 +114,7 @@ class Sensitivity:
         kind = plan.kind[segment]
         F, P = np.empty((len(segment), n, n)), np.zeros((len(segment), n, len(self.names)))
         acting = np.array([self.names.index(name) for name in self._acting], np.intp)
-        for which, depth in {(int(a), int(b)) for a, b in zip(kind, level, strict=True)}:
+        for which, depth in set(zip(kind.tolist(), level.tolist(), strict=True)):
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
             F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)

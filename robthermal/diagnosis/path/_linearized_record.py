@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from ..._recursion import recursion
 from ...errors import InputError
 from ...fitting import residual
 from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
@@ -28,7 +29,8 @@ from ._whitening import Whitener, whitener
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 N_SPLINES = 16
-_BLOCK = 32  # signatures at once: they stay in the cache
+_BLOCK = 32  # signatures at once, over so many samples: they stay in the cache
+_SAMPLES = 512
 _SAME = 1e-4  # change of a rate times the sample time [-]
 
 
@@ -345,13 +347,16 @@ class LinearizedRecord:
             [K].
         """
         A, by_start, by_end = self.steps
-        push = by_start @ start
-        push += by_end @ end
-        state = np.zeros(push.shape)
-        for k in range(len(push) - 1):
-            np.matmul(A[k], state[k], out=state[k + 1])
-            state[k + 1] += push[k]
-        return self.C @ state
+        out = np.empty((*self.one.readings.shape, start.shape[2]))
+        state = np.zeros((A.shape[1], start.shape[2]))
+        for first in range(0, len(out), _SAMPLES):
+            some = slice(first, first + _SAMPLES)
+            push = by_start[some] @ start[some]
+            push += by_end[some] @ end[some]
+            states = recursion(A[some], push, state)
+            np.matmul(self.C[some], states[:-1], out=out[some])
+            state = states[-1]
+        return out
 
 
 def heat_splines(time: Array, count: int = N_SPLINES) -> Array:

@@ -1,0 +1,36 @@
+"""Linear recursions in blocks, against a loop over the steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robthermal._recursion import recursion
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 7, 50, 1025])
+@pytest.mark.parametrize("columns", [1, 5])
+def test_is_what_a_loop_gives(n: int, columns: int) -> None:
+    rng = np.random.default_rng(n)
+    A = 0.5 * np.eye(3) + 0.2 * rng.standard_normal((n, 3, 3))
+    b = rng.standard_normal((n, 3, columns))
+    start = rng.standard_normal((3, columns))
+    expected = [start]
+    for k in range(n):
+        expected.append(A[k] @ expected[-1] + b[k])
+    found = recursion(A, b, start)
+    assert found.shape == (n + 1, 3, columns)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_starts_from_nothing_by_default_and_leaves_its_arguments_alone() -> None:
+    A, b = np.full((9, 1, 1), 0.5), np.ones((9, 1, 2))
+    found = recursion(A, b)
+    np.testing.assert_allclose(found[:, 0, 1], 2.0 * (1.0 - 0.5 ** np.arange(10.0)), rtol=1e-15)
+    assert np.all(b == 1.0) and np.all(A == 0.5)
+
+
+def test_a_stiff_step_that_forgets_its_start() -> None:
+    """Transitions whose products underflow to 0."""
+    A, b = np.full((2000, 1, 1), 1e-30), np.ones((2000, 1, 1))
+    np.testing.assert_allclose(recursion(A, b, np.array([[1e20]]))[2:, 0, 0], 1.0, rtol=1e-9)
