@@ -99,7 +99,7 @@ class Sensitivity:
         for first in range(0, len(path.segment), _CHUNK):
             chunk = slice(first, first + _CHUNK)
             maps, segment = self.transitions(path, plan, chunk), path.segment[chunk]
-            begins = np.flatnonzero(np.concatenate([[True], ends[:-1]])[chunk]) if self.jumps else []
+            begins = np.flatnonzero(np.concatenate([[True], ends[:-1]])[chunk])
             for name, jump in self.jumps.items():
                 moved = jump[segment[begins], :, None]
                 maps.P[begins, :, self.names.index(name)] += (maps.F[begins] @ moved)[..., 0]
