@@ -46,6 +46,25 @@ class LocalBasis:
             x = offsets / self.half_width
         return np.stack([x**s for s in range(self.size)], axis=-1)
 
+    def real_functions(self) -> Array:
+        """Real functions phi_s of the offsets -l ... l, (R+1, m), that span the powers up to a common phase."""
+        sine, cosine = self._sine_cosine()
+        return np.stack([sine**s * cosine ** (self.degree - s) for s in range(self.size)])
+
+    def real_products(self) -> Array:
+        """psi_p with phi_s phi_t = psi_(s+t), p = 0 ... 2R, (2R+1, m)."""
+        sine, cosine = self._sine_cosine()
+        return np.stack([sine**p * cosine ** (2 * self.degree - p) for p in range(2 * self.degree + 1)])
+
+    def _sine_cosine(self) -> tuple[Array, Array]:
+        """Without poles r/l and 1; else 2 sin(r delta/2)/(l delta) and cos(r delta/2), whose products of degree R span
+        exp(-j r delta R/2) x^s."""
+        offsets = np.arange(-self.half_width, self.half_width + 1.0)
+        if not self.poles.size:
+            return offsets / self.half_width, np.ones_like(offsets)
+        half = 0.5 * self.step * offsets
+        return np.sin(half) / (0.5 * self.step * self.half_width), np.cos(half)
+
     def denominator(self, bins: Array) -> Array:
         """D = prod(z - gamma_i) at (fractional) bins; one when there are no poles."""
         D = np.ones(np.shape(bins), dtype=complex)

@@ -71,9 +71,7 @@ class Kernel:
                 _residual_power(columns[n_k:], noise[..., part])
                 remains[:, part] /= self._energy_of_columns(a, b)
             doubtful = np.logical_not((remains > _DOUBTFUL).all(axis=0))
-            inverse = _invert_triangle(triangle[:, : self.n_u])
-            response = np.einsum("ijb,job->oib", inverse, triangle[:, self.n_u :])
-            gram = np.einsum("iab,jab->ijb", inverse, inverse.conj())
+            response, gram = fit_of_triangle(triangle)
         noise /= self.degrees_of_freedom
         return BlockFit(response, gram, noise, doubtful)
 
@@ -209,6 +207,16 @@ def _products(column: Array, columns: Array) -> Array:
 def _subtract(column: Array, coefficients: Array, others: Array) -> None:
     """Take `coefficients` (n, B) times `column` (rows, B) from `others` (n, rows, B), in place."""
     others -= np.multiply(column, coefficients[:, None], out=_buffer("work", others.shape))
+
+
+def fit_of_triangle(triangle: Array) -> tuple[Array, Array]:
+    """Response (n_y, n_u, B) and gram block from the last rows (n_u, n_u + n_y, B) of the triangular factor."""
+    n_u = triangle.shape[0]
+    inverse = _invert_triangle(triangle[:, :n_u])
+    if n_u == 1:
+        return (inverse * triangle[:, 1:]).swapaxes(0, 1), inverse * inverse.conj()
+    response = np.einsum("ijb,job->oib", inverse, triangle[:, n_u:])
+    return response, np.einsum("iab,jab->ijb", inverse, inverse.conj())
 
 
 def _invert_triangle(triangle: Array) -> Array:

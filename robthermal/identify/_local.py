@@ -14,6 +14,7 @@ from robthermal.errors import InputError
 
 from ._basis import LocalBasis
 from ._kernel import Kernel
+from ._normal import NormalKernel
 from ._records import Spectrum
 from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
@@ -21,6 +22,7 @@ from ._windows import points_per_record, regression, rows_of, solve_windows
 _CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
 _CHUNKS = 4  # that share the small computations at the end
 _CHUNK_MOST = 4096  # and not so many bins that threads would wait for each other
+_FEW_WEAK = 1 / 32  # part of the bins that are rather solved exactly one by one than all of them orthogonalized
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
 _FULL_NOISE_BYTES = 2**29  # above this the full noise covariance is computed only for the bins asked for
 
@@ -145,21 +147,26 @@ class LocalEstimate:
         return found
 
     def _solve_interior(self, kernel: Kernel, found: LocalArrays, exact: Array, start: int) -> None:
-        first = max(start, self.basis.half_width + 1)
-        last = min(start + exact.size, self.n_bins - self.basis.half_width + 1)
+        first, last = self.basis.half_width + 1, self.n_bins - self.basis.half_width + 1
         points = len(self.spectra) * self.basis.n_points
         chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
-        block = chunk * _CHUNKS
+        normal = None if self.basis.poles.size else NormalKernel(self.spectra, self.basis)
+        block = normal.chunk if normal else chunk * _CHUNKS
+        full = found.noise is not None
 
-        def solve(a: int) -> None:
+        def solve(a: int) -> None:  # always whole blocks of the record: a bin has the same digits in every request
             b = min(a + block, last)
-            fit = kernel.solve(a, b, chunk=chunk, full_noise=found.noise is not None)
-            part = slice(a - start, b - start)
-            found.response[..., part], found.gram[..., part] = fit.response, fit.gram
-            _store_noise(found, part, fit.noise)
-            exact[part] = fit.doubtful
+            fit = normal.solve(a, b, full_noise=full) if normal else None
+            if fit is None or fit.doubtful.mean() > _FEW_WEAK:
+                fit = kernel.solve(a, b, chunk=chunk, full_noise=full)
+            low, high = max(a, start), min(b, start + exact.size)
+            part, mine = slice(low - start, high - start), slice(low - a, high - a)
+            found.response[..., part], found.gram[..., part] = fit.response[..., mine], fit.gram[..., mine]
+            _store_noise(found, part, fit.noise[..., mine])
+            exact[part] = fit.doubtful[mine]
 
-        starts = range(first, last, block)
+        before = max(0, start - first) // block * block
+        starts = range(first + before, min(last, start + exact.size), block)
         run_all(solve, starts, worth=len(starts) >= 4)
 
     def _solve_exactly(self, found: LocalArrays, bins: Array, place: Array) -> None:

@@ -30,8 +30,10 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     q = np.maximum(degrees_of_freedom, 1)
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
-    values, place = np.unique(q, return_inverse=True)
-    limit = np.array([scipy.stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent) for v in values])[place]
+    limits = np.empty(int(q.max()) + 1)
+    for v in np.flatnonzero(np.bincount(q)):
+        limits[v] = scipy.stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent)
+    limit = limits[q]
     by_output = np.zeros((n_y, n_f), dtype=bool)
 
     def compare(o: int) -> None:
@@ -47,13 +49,20 @@ def _median_ratio(q: Array) -> Array:
     return (1.0 - 1.0 / (9.0 * q)) ** 3
 
 
+def _medians(rows: Array) -> Array:
+    """Medians of rows; a sort of short rows is several times faster than np.median."""
+    n = rows.shape[1]
+    increasing = np.sort(rows, axis=1)  # not-a-number comes last
+    medians = 0.5 * (increasing[:, (n - 1) // 2] + increasing[:, n // 2])
+    return np.where(np.isnan(increasing[:, -1]), np.nan, medians)
+
+
 def _reference(row: Array, gap: int, reach: int) -> Array:
     """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
     # Medians at half-overlapping windows only: the reference then moves by less than half its own width.
     n, stride = row.size, max(1, reach // 2)
     view = sliding_window_view(row, reach)[::stride]
-    parts = [np.median(view[first : first + 2**13], axis=1) for first in range(0, len(view), 2**13)]
-    medians = np.concatenate(parts)
+    medians = np.concatenate([_medians(view[first : first + 2**13]) for first in range(0, len(view), 2**13)])
     place = np.arange(n)
     right, left = -(-(place + gap) // stride), (place - gap - reach + 1) // stride
     on_right = np.where(right < len(view), medians[np.minimum(right, len(view) - 1)], np.inf)

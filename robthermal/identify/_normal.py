@@ -1,0 +1,207 @@
+"""Interior windows of equal records through their normal equations, from moments of a few sequences.
+
+With real functions phi_s(r) whose products phi_s phi_t = psi_(s+t) depend on s + t alone, the normal equations of
+every window are sums over it of |U|^2, U_i* U_j, U_i* Y_o, |Y|^2, U and Y times fixed functions (`Moments`). What the
+transient explains is taken away by its constant orthonormal functions; the regressors are eliminated for all bins of
+a chunk at a time.
+
+Normal equations square the condition number. What that costs is known bin by bin, from the energy that is left of
+each regressor and of each output: where it is too much, `_kernel` orthogonalizes instead.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._arrays import Array
+from ._basis import LocalBasis
+from ._kernel import BlockFit, fit_of_triangle
+from ._moments import BLOCK, Moments, in_blocks, ordered
+from ._records import Spectrum
+
+_WEAK_PIVOT = 1e-6  # energy left of a regressor, relative to its input: rounding costs 1e-16/1e-6 of G
+_WEAK_RESIDUAL = 1e-8  # energy left of an output, relative to it: rounding costs 1e-15/1e-8 of the noise variance
+_WIDEST, _BYTES = 4096, 2**22  # bins of a chunk, and bytes of its normal equations: calls are long, memory is near
+
+
+class _Work:
+    """Arrays of one chunk, used again for the next: fresh memory costs more than what is computed in it."""
+
+    def __init__(self, n_u: int, n_y: int, size: int, m: int, width: int):
+        n = n_u * size + n_y
+        self.H = np.empty((n, n, width), dtype=complex)
+        self.energy = np.empty((n_u + n_y, width))
+        self.product = np.empty(width + m - 1, dtype=complex)
+        self.squares, self.power = np.empty(2 * (width + m - 1)), np.empty(width + m - 1)
+        self.blocks = np.empty((BLOCK + m - 1, width // BLOCK), dtype=complex)
+        self.real_blocks = np.empty(self.blocks.shape)
+        self.real_sums, self.sums = np.empty((2 * size - 1, width)), np.empty((2 * size - 1, width), dtype=complex)
+        self.transient, self.conjugate = np.empty((2, n, size, width), dtype=complex)
+        self.term, self.scaled = np.empty((2, n, width), dtype=complex)
+        self.inverse = np.empty(width, dtype=complex)
+        self.triangle = np.empty((n_u, n_u + n_y, width), dtype=complex)
+
+    def power_of(self, sequence: Array) -> Array:
+        """|.|^2 of a sequence, in blocks."""
+        pairs = sequence.view(float)
+        np.multiply(pairs, pairs, out=self.squares)
+        np.add(self.squares[0::2], self.squares[1::2], out=self.power)
+        return in_blocks(self.power, self.real_blocks)
+
+    def product_of(self, first: Array, second: Array) -> Array:
+        """Product of two sequences, in blocks."""
+        return in_blocks(np.multiply(first, second, out=self.product), self.blocks)
+
+
+class NormalKernel:
+    """Solver of chunks of interior windows.
+
+    Parameters
+    ----------
+    spectra : sequence of Spectrum
+        Records of equal length.
+    basis : LocalBasis
+        Functions of plant and transient.
+    """
+
+    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis):
+        self.spectra, self.basis = spectra, basis
+        self.n_u, self.n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
+        self._n_k = self.n_u * basis.size
+        functions = basis.real_functions()
+        transient = np.linalg.qr(functions.T)[0].T
+        self._products, self._functions = Moments(basis.real_products()), Moments(functions)
+        self._one, self._transient = Moments(np.ones((1, basis.n_points))), Moments(transient)
+        self._transient_of_powers = Moments((functions[:0:-1, None] * transient).reshape(-1, basis.n_points))
+        self.degrees_of_freedom = len(spectra) * (basis.n_points - basis.size) - self._n_k
+        self._local = threading.local()
+
+    @property
+    def chunk(self) -> int:
+        """Bins to solve at a time."""
+        return max(256, min(_WIDEST, _BYTES // (16 * (self._n_k + self.n_y) ** 2) // BLOCK * BLOCK))
+
+    def solve(self, start: int, stop: int, *, full_noise: bool) -> BlockFit:
+        """Windows centered at bins start ... stop-1, counted from 1; all of them must fit between the edges.
+
+        `doubtful` are the bins where the squared condition number costs too much.
+        """
+        count = stop - start
+        width, n_k = -(-count // BLOCK) * BLOCK, self._n_k
+        work = self._work(width)
+        part = slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
+        for place, spectrum in enumerate(self.spectra):
+            U, Y = _padded(spectrum.U[:, part], width - count), _padded(spectrum.Y[:, part], width - count)
+            if place:
+                before = work.H.copy(), work.energy.copy()
+            self._multiply(U, Y, work, full_noise)
+            self._remove_transient(U, Y, work, full_noise)
+            if place:
+                work.H += before[0]
+                work.energy += before[1]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            weak = self._eliminate(work, full_noise)
+            response, gram = fit_of_triangle(ordered(work.triangle, count))
+        return BlockFit(response, gram, self._noise(work.H[n_k:, n_k:], count, full_noise), ordered(weak, count))
+
+    def _noise(self, left: Array, count: int, full: bool) -> Array:
+        """E[V_o V_p*] from the upper triangle of what is left of the products Y_o* Y_p, or its diagonal."""
+        if not full:
+            return ordered(np.einsum("oob->ob", left).real, count) / self.degrees_of_freedom
+        noise = np.empty((self.n_y, self.n_y, count), dtype=complex)
+        for o in range(self.n_y):
+            for p in range(o, self.n_y):
+                noise[p, o] = ordered(left[o, p], count)
+                noise[o, p] = noise[p, o].conj()
+            noise[o, o].imag = 0.0
+        noise /= self.degrees_of_freedom
+        return noise
+
+    def _work(self, width: int) -> _Work:
+        kept: _Work | None = getattr(self._local, "work", None)
+        if kept is None or kept.inverse.size != width:
+            kept = self._local.work = _Work(self.n_u, self.n_y, self.basis.size, self.basis.n_points, width)
+        return kept
+
+    def _multiply(self, U: Array, Y: Array, work: _Work, full_noise: bool) -> None:
+        """Upper triangle of the products of all columns of the windows of one record."""
+        n_u, n_y, n_k, degree, H = self.n_u, self.n_y, self._n_k, self.basis.degree, work.H
+        conjugate = U.conj()
+        for i in range(n_u):
+            own = self._products(work.power_of(U[i]), work.real_sums)
+            work.energy[i] = own[0]
+            for s in range(degree + 1):
+                row, first = self._column(i, s), i * degree + degree - s
+                H[row, first : first + s] = own[2 * s : s : -1]
+                H[row, n_u * degree + i] = own[s]
+            for j in range(i + 1, n_u):
+                cross = self._products(work.product_of(conjugate[i], U[j]), work.sums)
+                for s, t in ((s, t) for s in range(degree + 1) for t in range(degree + 1)):
+                    row, column = self._column(i, s), self._column(j, t)
+                    if row < column:
+                        H[row, column] = cross[s + t]
+                    else:
+                        np.conjugate(cross[s + t], out=H[column, row])
+            for o in range(n_y):
+                cross = self._functions(work.product_of(conjugate[i], Y[o]), work.sums[: degree + 1])
+                H[i * degree : (i + 1) * degree, n_k + o] = cross[:0:-1]
+                H[n_u * degree + i, n_k + o] = cross[0]
+        for o in range(n_y):
+            own = self._one(work.power_of(Y[o]), work.real_sums[:1])[0]
+            H[n_k + o, n_k + o] = work.energy[n_u + o] = own
+            for p in range(o + 1, n_y if full_noise else 0):
+                self._one(work.product_of(Y[o].conj(), Y[p]), H[n_k + o, n_k + p, None])
+
+    def _remove_transient(self, U: Array, Y: Array, work: _Work, full_noise: bool) -> None:
+        """Take away what the orthonormal functions of the transient explain."""
+        n_u, n_k, size, H, found = self.n_u, self._n_k, self.basis.size, work.H, work.transient
+        degree, (n, width) = size - 1, H.shape[1:]
+        for i in range(n_u):
+            blocks = in_blocks(U[i], work.blocks)
+            if degree:
+                part = found[i * degree : (i + 1) * degree]
+                self._transient_of_powers(blocks, part.reshape(degree * size, width))
+            self._transient(blocks, found[n_u * degree + i])
+        for o, output in enumerate(Y):
+            self._transient(in_blocks(output, work.blocks), found[n_k + o])
+        np.conjugate(found, out=work.conjugate)
+        for c in range(n):
+            stop = n if full_noise or c < n_k else c + 1
+            row, term = H[c, c:stop], work.term[c:stop]
+            for a in range(size):
+                np.subtract(row, np.multiply(work.conjugate[c, a], found[c:stop, a], out=term), out=row)
+
+    def _eliminate(self, work: _Work, full_noise: bool) -> Array:
+        """Eliminate the regressors from the upper triangle, in place; which bins are weak."""
+        n_u, n_k, H, degree, n = self.n_u, self._n_k, work.H, self.basis.degree, len(work.H)
+        weak, conjugates = np.zeros(H.shape[-1], dtype=bool), work.conjugate[:, 0]
+        for c in range(n_k):
+            pivot, constant = H[c, c].real, c - n_u * degree
+            weak |= ~(pivot > _WEAK_PIVOT * work.energy[constant if constant >= 0 else c // degree])
+            np.divide(1.0, H[c, c], out=work.inverse)
+            row = H[c, c + 1 :]
+            scaled = np.multiply(row, work.inverse, out=work.scaled[c + 1 :])
+            conjugate = np.conjugate(row, out=work.term[c + 1 :])
+            conjugates[c + 1 :] = conjugate
+            for d in range(c + 1, n):
+                stop = n if full_noise or d < n_k else d + 1
+                own = H[d, d:stop]
+                np.subtract(own, np.multiply(conjugates[d], scaled[d - c - 1 : stop - c - 1], out=work.term[d:stop]),
+                            out=own)
+            if constant >= 0:
+                np.multiply(H[c, c:], np.sqrt(work.inverse), out=work.triangle[constant, constant:])
+        for o in range(self.n_y):
+            weak |= ~(H[n_k + o, n_k + o].real > _WEAK_RESIDUAL * work.energy[n_u + o])
+        return weak
+
+    def _column(self, i: int, s: int) -> int:
+        """Place of the regressor phi_s U_i: the constants of G come last."""
+        degree = self.basis.degree
+        return i * degree + degree - s if s else self.n_u * degree + i
+
+
+def _padded(sequences: Array, more: int) -> Array:
+    return np.pad(sequences, ((0, 0), (0, more))) if more else np.ascontiguousarray(sequences)
