@@ -128,7 +128,7 @@ _ON_FIRST_USE = ("control", "matplotlib.pyplot", "scipy.signal", "scipy.stats", 
 
 
 def test_slow_libraries_are_imported_on_first_use() -> None:
-    """`import scipy`, then `scipy.signal.lfilter(...)`, which scipy loads when asked; `from .._control import control`."""
+    """`import scipy`, then `scipy.signal.lfilter(...)`, loaded when asked; `from .._control import control`."""
     found = [f"{relative(path)}:{node.lineno} {name}" for path in FILES if path.name != "conftest.py"
              for node in ast.parse(path.read_text(encoding="utf-8")).body for name in _imported(node)
              if any(f"{name}.".startswith(f"{slow}.") for slow in _ON_FIRST_USE)]

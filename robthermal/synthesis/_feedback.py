@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
 from .._checks import finite_number, quoted
+from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, made_by, read_plant
 from ..verification import Certificate, establish

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from .._arrays import Array
 from ._vertices import Vertices
@@ -59,5 +59,6 @@ def reached(v: Vertices, F: Array, P: Array, objective: str) -> Reached:
 
     logs = np.linspace(-12, 12, 49)
     near = float(logs[int(np.argmin([squared(one) for one in logs]))])
-    best = minimize_scalar(squared, bounds=(near - 0.6, near + 0.6), method="bounded", options={"xatol": 1e-6})
+    best = scipy.optimize.minimize_scalar(squared, bounds=(near - 0.6, near + 0.6), method="bounded",
+                                          options={"xatol": 1e-6})
     return Reached((least * (1 + np.exp(best.x)) + 1e-300) * P, rate, float(np.sqrt(max(best.fun, 0.0))))

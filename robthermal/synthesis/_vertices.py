@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
-import control
 import numpy as np
 
 from .._arrays import Array
 from .._checks import quoted
+from .._control import control
 from ..errors import InputError
 from ..linear import read_plant
 from ._plant import GeneralizedPlant, hidden_mode, say_mode
