@@ -275,7 +275,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            sensors: Annotated[str | None, typer.Option(
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
-               help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, frf-pid: a synthesis for "
+               help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, frf-pid: a synthesis for "
                "PLANT.toml (docs/command_line.md), without the other options.")] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",

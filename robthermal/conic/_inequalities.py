@@ -60,7 +60,7 @@ def inside(inequalities: Sequence[Inequality], cost: Array | None = None) -> Poi
         columns, offset = columns[:, :n], offset + columns[:, n].toarray().ravel()
     linear = np.eye(n + 1)[n] * -1.0 if cost is None else cost
     cones = [semidefinite(len(one.constant)) for one in inequalities]
-    found = solved(linear, -columns, offset, cones, tolerance=LOOSE)
+    found = solved(linear, -columns, offset, cones, tolerance=LOOSE, decompose=False)
     y = found.x
     if not np.isfinite(y).all():
         return Point(np.zeros(n), np.nan, found.status, False)

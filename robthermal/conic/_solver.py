@@ -53,7 +53,7 @@ def semidefinite(side: int) -> Any:
 
 
 def solved(cost: Array, A: csc_matrix, offset: Array, cones: Sequence[Any], *, quadratic: Array | None = None,
-           tolerance: float | None = None) -> Point:
+           tolerance: float | None = None, decompose: bool = True) -> Point:
     """Minimize y'Py/2 + cost'y with offset - A y in the cones.
 
     Parameters
@@ -70,6 +70,8 @@ def solved(cost: Array, A: csc_matrix, offset: Array, cones: Sequence[Any], *, q
         Quadratic part P of the objective, symmetric.
     tolerance : float, optional
         Of gap and feasibility; default the solver's own.
+    decompose : bool
+        Whether semidefinite cones may be split along their sparsity, in which Clarabel 0.11 may abort.
 
     Returns
     -------
@@ -79,6 +81,7 @@ def solved(cost: Array, A: csc_matrix, offset: Array, cones: Sequence[Any], *, q
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1
+    settings.chordal_decomposition_enable = decompose
     if tolerance is not None:
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     n = len(cost)

@@ -11,7 +11,8 @@ from ._frf_pid import FrfDesign as FrfDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
+from ._mixed import mixed as mixed
 from ._outcomes import SynthesisCode as SynthesisCode
 
 __all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf",
-           "polytopic_feedback"]
+           "mixed", "polytopic_feedback"]

@@ -13,7 +13,7 @@ import numpy as np
 from .._arrays import Array
 from ..linear import Plant
 from ._arithmetic import Arithmetic, floats
-from ._plant import GeneralizedPlant
+from ._plant import GeneralizedPlant, with_direct_path
 
 _NEGATIVE = 1e-6  # relative to the largest: an eigenvalue of X this far below zero counts as zero
 _SCALED = 1e-4  # the same with the diagonal of X scaled to one, but for entries below
@@ -148,17 +148,9 @@ def controller(plant: Regular, found: Solutions, arithmetic: Arithmetic) -> Plan
     A = plant.A + B @ F + B1h @ arithmetic.inv(D21h) @ C2h
     parts = A, B1h @ plant.to_y, plant.from_u @ C1h, plant.from_u @ D11h @ plant.to_y
     A, B, C, D = (floats(part) for part in parts)
-    return _with_direct_path(Plant(A, B, C, D, 0.0), plant.D22)
+    return with_direct_path(Plant(A, B, C, D, 0.0), plant.D22)
 
 
 def _root(matrix: Array) -> Array:
     """Lower triangular L with L L' = matrix, in floats: any square root of these two is allowed, to rounding."""
     return np.linalg.cholesky(floats(matrix)) if matrix.size else floats(matrix)
-
-
-def _with_direct_path(K: Plant, D22: Array) -> Plant:
-    """K (1 + D22 K)⁻¹: what u = K (y - D22 u) is from y to u."""
-    if not np.any(D22):
-        return K
-    E = np.linalg.inv(np.eye(len(D22)) + D22 @ K.D)
-    return Plant(K.A - K.B @ E @ D22 @ K.C, K.B @ E, K.C - K.D @ E @ D22 @ K.C, K.D @ E, 0.0)

@@ -18,12 +18,13 @@ from ._arguments import sampled, state_space
 from ._arithmetic import Arithmetic, Balls, Floats, floats
 from ._design import Design, RobustAgainst, named, zero_controller
 from ._outcomes import SynthesisCode
-from ._plant import GeneralizedPlant, balanced, read_generalized
+from ._plant import GeneralizedPlant, balanced, read_generalized, with_direct_path
 from ._regularize import lacks_control_weight, lacks_noise, with_channels
 
 _SLACKS = (1e-5, 1e-4, 1e-3, 1e-2)  # of the bound above the norm in floats, in turn
 _CHANNELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 _ENOUGH = 1e-3  # relative gain below which smaller channels are not tried
+Reached = tuple[float, Plant, Certificate, str, float]  # value, controller, proof, precision, channels
 _DIRECT = 1e-12  # relative: a direct path below it is rounding
 
 
@@ -68,9 +69,29 @@ def h2(P: control.StateSpace, n_meas: int, n_ctrl: int, *, sample_time: float | 
     """
     start = time.perf_counter()
     plant = sampled(read_generalized(P, n_meas, n_ctrl), sample_time)
-    direct = np.zeros((plant.B2.shape[1], len(plant.C2))) if plant.dt else cancelling(plant)
+    direct = direct_gain(plant)
+    best, lower, count = best_of(plant, direct)
+    if best is None:
+        controller, loop = named(state_space(P), plant, zero_controller(plant))
+        return Design(controller, np.inf, lower, loop, [], _nothing_proven(), _not_proven(direct),
+                      "Riccati equations (H2)", "none", time.perf_counter() - start, count, plant)
+    value, K, certificate, precision, size = best
+    controller, loop = named(state_space(P), plant, K)
+    method = "Riccati equations (H2)" + (f", channels of size {size:g} added" if size else "")
+    said = f"Certified for the numbers of the controller as returned: H2 norm below {value:.7g}."
+    return Design(controller, value, lower, loop, [certificate], RobustAgainst("Proven for the plant as given, alone."),
+                  SynthesisCode.CERTIFIED.outcome(said), method, precision, time.perf_counter() - start, count, plant)
+
+
+def direct_gain(plant: GeneralizedPlant) -> Array:
+    """Direct gain of an H2 controller that its equations do not give: what cancels D11 in continuous time."""
+    return np.zeros((plant.B2.shape[1], len(plant.C2))) if plant.dt else cancelling(plant)
+
+
+def best_of(plant: GeneralizedPlant, direct: Array) -> tuple[Reached | None, float, int]:
+    """The controller with the smallest proven norm, the smallest norm in floats, and how many channels were tried."""
     control_weight, noise = lacks(plant)
-    best: tuple[float, Plant, Certificate, str, float] | None = None
+    best: Reached | None = None
     lower, count = np.inf, 0
     for size in _CHANNELS if control_weight or noise else (0.0,):
         extended = with_channels(balanced(plant), size, control_weight, noise) if size else plant
@@ -85,16 +106,7 @@ def h2(P: control.StateSpace, n_meas: int, n_ctrl: int, *, sample_time: float | 
             best = value, K, certificate, precision, size
         if not gained:
             break
-    if best is None:
-        controller, loop = named(state_space(P), plant, zero_controller(plant))
-        return Design(controller, np.inf, lower, loop, [], _nothing_proven(), _not_proven(direct),
-                      "Riccati equations (H2)", "none", time.perf_counter() - start, count, plant)
-    value, K, certificate, precision, size = best
-    controller, loop = named(state_space(P), plant, K)
-    method = "Riccati equations (H2)" + (f", channels of size {size:g} added" if size else "")
-    said = f"Certified for the numbers of the controller as returned: H2 norm below {value:.7g}."
-    return Design(controller, value, lower, loop, [certificate], RobustAgainst("Proven for the plant as given, alone."),
-                  SynthesisCode.CERTIFIED.outcome(said), method, precision, time.perf_counter() - start, count, plant)
+    return best, lower, count
 
 
 def _not_proven(direct: Array) -> Outcome:
@@ -137,7 +149,7 @@ def _reach(plant: GeneralizedPlant, work: GeneralizedPlant, direct: Array
             K = _sampled(work) if work.dt else _continuous(work, direct, arithmetic)
         if K is None:
             continue
-        K = _with_direct_path(K, plant.D22)
+        K = with_direct_path(K, plant.D22)
         loop = close(plant.joined, K)
         norm = h2_norm(Plant(loop.A, loop.B, loop.C, loop.D if plant.dt else 0 * loop.D, loop.dt))
         if not np.isfinite(norm):
@@ -209,11 +221,3 @@ def _sampled(plant: GeneralizedPlant) -> Plant | None:
     except np.linalg.LinAlgError:
         return None
     return Plant(A + B2 @ F + L @ C2 - B2 @ L0 @ C2, -(L - B2 @ L0), F - L0 @ C2, L0, own.dt)
-
-
-def _with_direct_path(K: Plant, D22: Array) -> Plant:
-    """K (1 + D22 K)⁻¹: what u = K (y - D22 u) is from y to u."""
-    if not np.any(D22):
-        return K
-    E = np.linalg.inv(np.eye(len(D22)) + D22 @ K.D)
-    return Plant(K.A - K.B @ E @ D22 @ K.C, K.B @ E, K.C - K.D @ E @ D22 @ K.C, K.D @ E, K.dt)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -17,7 +17,8 @@ from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate
 from ._arguments import choice, read_poles, sampled, state_space
 from ._design import Design, named, small_gain, zero_controller
-from ._level import Candidate, candidates
+from ._inequalities import MOST_STATES, Aims, solved_for
+from ._level import Candidate, candidates, central
 from ._outcomes import SynthesisCode
 from ._plant import GeneralizedPlant, balanced, read_generalized, to_continuous, to_sampled
 from ._reduce import shortened
@@ -66,7 +67,8 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
         Allowed excess of the proven value over the optimum, relative [-].
     region : mapping, optional
         Where the closed-loop eigenvalues have to lie: "decay" [1/s], "damping" [-], "radius" [1/s]; sampled "radius"
-        [-]. Decay (sampled: radius) is designed for, exactly; the others are checked.
+        [-]. Decay (sampled: radius) is designed for by a shift of the plant; the others, of at most 12 states, by
+        matrix inequalities where the central controller does not keep them already.
     order : int, optional
         Number of states the controller is reduced to, and certified with.
     max_gain : float, optional
@@ -114,7 +116,25 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     if found is None:
         return _design(P, plant, None, [], _nothing(best, max_gain), lower, start, best)
     K, certificates = found
-    return _design(P, plant, K, certificates, _judge(certificates, asked, lower, poles), lower, start, best)
+    outcome = _judge(certificates, asked, lower, poles)
+    if best is not None and poles and order is None and max_gain is None and not certificates[-1].holds:
+        other = _by_inequalities(plant, best, asked, poles)
+        if other is not None and (judged := _judge(other[1], asked, lower, poles)).ok:
+            made = _design(P, plant, *other, judged, lower, start, best)
+            return replace(made, method="matrix inequalities (Chilali and Gahinet)")
+    return _design(P, plant, K, certificates, outcome, lower, start, best)
+
+
+def _by_inequalities(plant: GeneralizedPlant, best: Reached, asked: float | None,
+                     poles: Mapping[str, float]) -> tuple[Plant, list[Certificate]] | None:
+    """Controller with eigenvalues in the region, and its certificates: one Lyapunov matrix for norm and region."""
+    if len(plant.A) > MOST_STATES:
+        return None
+    K = solved_for(plant, Aims(None, plant, asked, poles), best.K)
+    certificate = None if K is None else certified_norm(plant, K)
+    if K is None or certificate is None:
+        return None
+    return K, [certificate, prove_closed_loop(plant.joined, K, measure="region", poles=poles)]
 
 
 def _reference(P: Any, plant: GeneralizedPlant, tolerance: float, start: float) -> Design:
@@ -157,6 +177,18 @@ def best_of(plant: GeneralizedPlant, tolerance: float, asked: float | None, pole
         if not gained or (asked is not None and best.value <= asked and max_gain is None):
             break
     return best, lower
+
+
+def central_family(plant: GeneralizedPlant, size: float, levels: Sequence[float],
+                   poles: Mapping[str, float]) -> Iterator[Plant]:
+    """Central controllers of the plant at several levels, with channels of the size that the best one needed."""
+    work, side = to_continuous(_shifted(plant, poles)) if plant.dt else (_shifted(plant, poles), 1.0)
+    if size:
+        work = with_channels(balanced(work), size, lacks_control_weight(work), lacks_noise(work))
+    for made in central(work, levels):
+        K = _of_plant(made, plant, side, poles)
+        if K is not None:
+            yield K
 
 
 def _reach(plant: GeneralizedPlant, work: GeneralizedPlant, side: float, tolerance: float, asked: float | None,

@@ -5,7 +5,7 @@ Floats first; where the loop they give does not reach what they say, balls with 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
@@ -47,6 +47,17 @@ def candidates(plant: GeneralizedPlant, tolerance: float, asked: float | None = 
     for arithmetic in _PRECISIONS:
         with arithmetic.working() if isinstance(arithmetic, Balls) else nullcontext():
             yield from _in(plant, arithmetic, tolerance, asked, _FURTHER if limited else ())
+
+
+def central(plant: GeneralizedPlant, levels: Sequence[float]) -> Iterator[Plant]:
+    """Central controllers in floats, at levels of a continuous plant with D12, D21 of full rank."""
+    try:
+        own = regular(balanced(plant), Floats())
+    except np.linalg.LinAlgError:
+        return
+    for level in levels:
+        if level > least_level(own) and (made := _made(own, level, Floats())) is not None:
+            yield made
 
 
 def _in(plant: GeneralizedPlant, arithmetic: Arithmetic, tolerance: float, asked: float | None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -143,3 +144,18 @@ def to_sampled(controller: Plant, side: float, dt: float) -> Plant:
     A, B = (np.eye(n) + controller.A) @ inverse, root * inverse @ controller.B
     return Plant(side * A, side * B, root * controller.C @ inverse,
                  controller.D + controller.C @ inverse @ controller.B, dt)
+
+
+def with_direct_path(K: Plant, D22: Array) -> Plant:
+    """K (1 + D22 K)⁻¹: what u = K (y - D22 u) is from y to u."""
+    if not np.any(D22):
+        return K
+    E = np.linalg.inv(np.eye(len(D22)) + D22 @ K.D)
+    return Plant(K.A - K.B @ E @ D22 @ K.C, K.B @ E, K.C - K.D @ E @ D22 @ K.C, K.D @ E, K.dt)
+
+
+def chosen(plant: GeneralizedPlant, outputs: Sequence[int], inputs: Sequence[int]) -> GeneralizedPlant:
+    """The plant with some of its performance outputs and disturbances."""
+    z, w = list(outputs), list(inputs)
+    return replace(plant, B1=plant.B1[:, w], C1=plant.C1[z], D11=plant.D11[np.ix_(z, w)], D12=plant.D12[z],
+                   D21=plant.D21[:, w])

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..._checks import quoted
-from ...design import Design, frf_pid, h2, hinf
+from ...design import Design, frf_pid, h2, hinf, mixed
 from ...errors import InputError
 from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "frf-pid")
-_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "frf-pid": frf_pid}
+METHODS = ("hinf", "h2", "mixed", "frf-pid")
+_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed,
+                                           "frf-pid": frf_pid}
 _TITLES = {"hinf": "H-infinity norm", "h2": "H2 norm", "region": "Region of the eigenvalues",
            "stability": "Stability", "peak": "Peak gain"}
 
@@ -50,7 +51,7 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     job : SynthesisJob
         Plant or response and arguments, as `read_plant_file` returns them.
     method : str
-        "hinf", "h2" or "frf-pid".
+        One of `METHODS`.
 
     Returns
     -------
@@ -77,6 +78,11 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     unknown = [name for name in job.arguments if name not in allowed]
     if unknown:
         raise InputError(f"unknown key {quoted(unknown[0])}", where=f"{job.files[0]} [design]",
+                         expected=f"arguments of {method}: {', '.join(allowed)}")
+    missing = [name for name, one in inspect.signature(verb).parameters.items()
+               if one.kind is one.KEYWORD_ONLY and one.default is one.empty and name not in job.arguments]
+    if missing:
+        raise InputError(f"key design.{missing[0]} is missing", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")
     design = verb(*_first(job, method), **job.arguments)
     return Synthesis(job, method, design, tuple(_check(k, one) for k, one in enumerate(design.certificates)))
