@@ -6,10 +6,10 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-import control
 import numpy as np
 
 from .._checks import positive_number, quoted
+from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, h2_norm, plant_norm, prove_closed_loop
 from ..verification import Certificate
