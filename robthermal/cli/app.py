@@ -14,14 +14,16 @@ import typer
 import robthermal as rt  # the whole package, so that every command loads only the parts it needs
 
 from ..errors import Diverged, InputError
-from . import frequency, learn, results
+from . import diagnosing, frequency, learn, results
 from .terminal import (
     AmbientRange,
     Box,
     ColumnMap,
     Json,
+    OperatingPoint,
     Out,
     ReadOption,
+    SeveralFiles,
     SystemFile,
     answer,
     exit_unless,
@@ -41,9 +43,6 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
 
-OperatingPoint = Annotated[list[str] | None, typer.Option(
-    help="Of frequency responses: mean of an input [unit, A] or ambient [unit of the file], may repeat.",
-    metavar="NAME=VALUE")]
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
 
 
@@ -182,40 +181,7 @@ def calibrate(system: SystemFile,
     exit_unless(bool(fit.outcome))
 
 
-@app.command()
-def diagnose(system: SystemFile,
-             records: Annotated[list[Path], typer.Argument(
-                 help="Training records, or frequency responses from `robthermal frf`.",
-                 metavar="TRAIN.csv...")],
-             validation: Annotated[list[Path] | None, typer.Option(
-                 "--validation", help="Record or response that no fit sees, may repeat.")] = None,
-             session_gain: Annotated[bool, typer.Option(
-                 "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
-             operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
-             out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
-    """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
-
-    Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
-    """
-    found = rt.read_system(system)
-    tables = reading(record, column)
-    point = rt.jobs.request.point_from_text(found, operating_point or [])
-    rt.jobs.folder.check_free(out)
-    with progress() as stage:
-        stage("reading measured files")
-        train, held_out = (rt.jobs.measured.read_measured(paths, found, tables=tables)
-                           for paths in (records, validation or []))
-        result = rt.jobs.diagnose_records(found, (system, *records, *(validation or [])), train, held_out, stage,
-                                          operating_point=point, session_gain=session_gain)
-        stage("writing the report")
-        rt.jobs.write_diagnosis(result, out)
-    summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),
-               "report": str(out / "report.html")}
-    answer(summary, as_json, lambda: say(str(result.diagnosis), f"augmented system: {out / 'augmented.toml'}",
-                                         f"report: {out / 'report.html'}"))
-    exit_unless(result.holds)
-
-
+app.command(cls=SeveralFiles)(diagnosing.diagnose)
 app.command()(frequency.frf)
 app.command()(frequency.excitation)
 

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+from typer.core import TyperCommand
 
 import robthermal as rt
 
@@ -32,6 +33,36 @@ Box = Annotated[tuple[float, float] | None, typer.Option(
     "--temperature", help="Box of all lumps, in the unit of the file; default 5 to 85 °C.", metavar="LO HI")]
 AmbientRange = Annotated[list[str] | None, typer.Option(
     "--ambient", help="Range of one ambient, in the unit of the file.", metavar="NAME=LO:HI")]
+
+OperatingPoint = Annotated[list[str] | None, typer.Option(
+    help="Of frequency responses: mean of an input [unit, A] or ambient [unit of the file], may repeat.",
+    metavar="NAME=VALUE")]
+
+
+class SeveralFiles(TyperCommand):
+    """A command whose option --reference takes all that follows it up to the next option, and may be repeated."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Arguments with the option before each of its files.
+
+        Parameters
+        ----------
+        ctx : click.Context
+            Of the command line.
+        args : list of str
+            As they were typed.
+        """
+        out: list[str] = []
+        taking = False
+        for arg in args:
+            if taking and not arg.startswith("-"):
+                out += ["--reference", arg]
+                continue
+            taking = arg == "--reference"
+            out += [] if taking else [arg]
+        if args and args[-1] == "--reference":
+            out.append("--reference")  # nothing follows: say so
+        return list(super().parse_args(ctx, out))
 
 
 def reading(record: list[str] | None, column: list[str] | None) -> tuple[Any, ...]:

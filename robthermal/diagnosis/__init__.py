@@ -1,5 +1,6 @@
 """Where model and data differ: locate it, name the missing effect, add it, and validate."""
 
+from ._changed import Compared as Compared
 from ._outcomes import DiagnosisCode as DiagnosisCode
 from .data import NoiseEstimate as NoiseEstimate
 from .data import noise_floor as noise_floor
@@ -47,8 +48,8 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Candidate", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet", "Entry",
-           "Evidence", "Found", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left", "LinearizedRecord",
+__all__ = ["Adequacy", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet",
+           "Entry", "Evidence", "Found", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left", "LinearizedRecord",
            "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refit",
            "Remainder", "Response", "Scores", "ShortList", "Stability", "UnknownHeat", "ValidationResiduals",
            "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",

@@ -7,11 +7,14 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
+from ._changed import changed
 from ._graded import evidence_of, graded
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from ._searching import searched
+from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor
 from .diagnosis import Diagnosis, Found
 from .effects import candidates
@@ -39,7 +42,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
              validation: Measured | Sequence[Measured] | None = None,
              parameters: Choice = None, effects: Iterable[str] | None = None,
              noise: Mapping[str, float] | float | None = None, operating_point: Mapping[str, float] | None = None,
-             session_gain: SessionGain = False,
+             session_gain: SessionGain = False, reference: Measured | Sequence[Measured] | None = None,
              progress: Progress = lambda stage: None) -> Diagnosis:
     """Find where records and simulation part, name the missing effect, add it, and test it on validation records.
 
@@ -64,6 +67,10 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     session_gain : bool or mapping
         Records from several days: every record has a gain of its own of every heater and module. True: with a prior of
         5 %; a mapping from input to the standard deviation of its gain [-].
+    reference : Record or list of them, optional
+        Of the healthy machine, on days of their own. Then the question is what has changed since: every parameter of
+        the fit table may have another value (`parameter_change`), and a change counts beyond the scatter among these
+        records.
     progress : callable, optional
         Called with a sentence before every stage.
 
@@ -98,6 +105,13 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     checked = Validation(validation, operating_point)
     if validation is not None:
         refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
+    if reference is not None:
+        if operating_point is not None:
+            raise InputError("operating_point is given with reference records", where="argument operating_point",
+                             remedy="Leave it out: a record brings its own inputs.")
+        judged, compared = changed(system, records, reference, validation=checked, parameters=parameters, names=names,
+                                   noise=noise, session_gain=session_gain, progress=progress)
+        return replace(concluded(judged), reference=compared)
     progress("reading the noise off the records")
     floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
     progress("refitting the nominal system")
@@ -173,9 +187,10 @@ def _found(fit: Refit, place: int, round_: Accepted, evidence: Evidence | None, 
     if rest:
         values = _with_remainder(fit, place, values)
     units = {q.name: q.unit for q in best.candidate.effect.quantities}
-    return Found(best.candidate.effect.name, best.candidate.where,
-                 {name: (value, std, units[name]) for name, (value, std) in values.items()}, best.p_value,
-                 best.delta_bic, evidence)
+    said = {name: (value, std, units[name]) for name, (value, std) in values.items()}
+    if best.candidate.effect.name == NAME:
+        said = relative(said)
+    return Found(best.candidate.effect.name, best.candidate.where, said, best.p_value, best.delta_bic, evidence)
 
 
 def _with_remainder(fit: Refit, place: int, values: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

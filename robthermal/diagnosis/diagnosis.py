@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .._html import short_table
 from ..errors import Outcome
 from ..thermal import System
+from ._changed import Compared
 from ._file import write_json
 from ._judge import Name, Verdict
 from .data import NoiseEstimate
@@ -90,6 +91,8 @@ class Diagnosis:
         If nothing known explains the records: the heat into the most suspect lump that would; None otherwise.
     remainder : Remainder or None
         What is left beyond the noise; None if nothing is.
+    reference : Compared or None
+        What the records of the healthy machine say; None without any.
     """
 
     verdict: Verdict
@@ -112,6 +115,7 @@ class Diagnosis:
     joint: JointCheck | None = None
     unknown_heat: UnknownHeat | None = None
     remainder: Remainder | None = None
+    reference: Compared | None = None
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
@@ -179,6 +183,7 @@ class Diagnosis:
             "provisional": [_plain(found) for found in self.provisional],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "outcome": vars(self.outcome),
+            **({} if self.reference is None else {"reference": vars(self.reference)}),
             **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
         }
 

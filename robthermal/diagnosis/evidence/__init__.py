@@ -23,6 +23,7 @@ from ._remainder import Left as Left
 from ._remainder import Remainder as Remainder
 from ._remainder import left as left
 from ._remainder import remainder as remainder
+from ._score import ALIAS as ALIAS
 from ._score import ALPHA as ALPHA
 from ._score import BIC_GAP as BIC_GAP
 from ._score import Scores as Scores
@@ -34,8 +35,8 @@ from ._score import score_candidates as score_candidates
 from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
-__all__ = ["ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED", "Remainder",
-           "SURE", "Scores", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "expected_rms", "explains",
-           "hold_out", "left", "locate", "negative_log_predictive_density", "promised", "promising", "refuse_seen",
-           "remainder", "reproducible", "sandwich", "score", "score_candidates", "stability", "unknown_heat",
-           "validation_data"]
+__all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
+           "Remainder", "SURE", "Scores", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "expected_rms",
+           "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised", "promising",
+           "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates", "stability",
+           "unknown_heat", "validation_data"]

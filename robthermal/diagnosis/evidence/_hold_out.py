@@ -311,8 +311,8 @@ class _Validation:
     def _kept(self) -> Places:
         """All rows but the priors of what is common, which are in R already."""
         structure = self.of.structure
-        n, n_known = structure.n_readings, int(np.isfinite(structure.ranges.sigma).sum())
-        own = n + n_known + structure.n_coarse
+        n = structure.n_readings
+        own = n + structure.n_priors + structure.n_coarse
         return np.r_[0:n, own:own + structure.n_own]
 
     def residual(self, v: Array) -> Array:

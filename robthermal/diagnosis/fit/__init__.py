@@ -17,9 +17,13 @@ from ._refitting import fitted as fitted
 from ._refitting import refit as refit
 from ._refitting import relinearized as relinearized
 from ._sessions import SessionGain as SessionGain
+from ._sessions import Sessions as Sessions
+from ._sessions import sessions_of as sessions_of
 from ._structure import Structure as Structure
+from ._structure import structure_of as structure_of
+from ._unknown_ambients import with_unknown_ambients as with_unknown_ambients
 from ._whitened import Whitened as Whitened
 
-__all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain", "Structure", "WIDE",
-           "Whitened", "coarsened", "descend", "exact", "extended", "filters", "fitted", "refit", "relinearized",
-           "with_slow_part"]
+__all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain", "Sessions",
+           "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters", "fitted", "refit",
+           "relinearized", "sessions_of", "structure_of", "with_slow_part", "with_unknown_ambients"]

@@ -17,20 +17,21 @@ Array = NDArray[np.float64]
 SessionGain = bool | Mapping[str, float]
 SIGMA = 0.05  # relative
 _FARTHEST = 0.9  # relative: an input never vanishes
+_WARMEST = 30.0  # K: a room is never farther from what the system says
 
 
 @dataclass(frozen=True)
 class Sessions:
-    """Nuisance gains of every record, with their priors; unknowns in units of the prior.
+    """Nuisance gains and ambients of every record, with their priors; unknowns in units of the prior.
 
     Parameters
     ----------
     inputs : tuple of str
-        Heaters and modules whose gain may differ from record to record.
+        Heaters and modules whose gain may differ from record to record, then ambients that were not recorded.
     numbers : tuple of str
         The system's number behind each.
     sigma : tuple of float
-        Prior standard deviation of each gain [-].
+        Prior standard deviation of each gain [-] or ambient [K].
     """
 
     inputs: tuple[str, ...] = ()
@@ -45,7 +46,8 @@ class Sessions:
     @property
     def reach(self) -> Array:
         """Bound of every unknown, in units of its prior."""
-        return np.array([min(20.0, _FARTHEST / sigma) for sigma in self.sigma])
+        return np.array([_WARMEST / sigma if _is_ambient(number) else min(20.0, _FARTHEST / sigma)
+                         for number, sigma in zip(self.numbers, self.sigma, strict=True)])
 
     def applied(self, system: System, g: Array) -> System:
         """System as it was in one session.
@@ -102,6 +104,15 @@ def sessions_of(system: System, session_gain: SessionGain) -> Sessions:
 
 def session_table(sessions: Sessions, labels: Sequence[str], gains: Sequence[Array]) -> list[str]:
     """Estimated gains of every record, in words."""
-    return [f"session {label}: " + ", ".join(f"{name} × {1.0 + sigma * float(value):.4g}" for name, sigma, value in
-                                             zip(sessions.inputs, sessions.sigma, g, strict=True))
+    return [f"session {label}: " + ", ".join(_moved(number, name, sigma * float(value)) for number, name, sigma, value
+                                             in zip(sessions.numbers, sessions.inputs, sessions.sigma, g, strict=True))
             for label, g in zip(labels, gains, strict=True)] if sessions.inputs else []
+
+
+def _is_ambient(number: str) -> bool:
+    return number.startswith("ambients.")
+
+
+def _moved(number: str, name: str, by: float) -> str:
+    """An ambient by kelvins, a gain by a factor."""
+    return f"{name} {by:+.4g} K" if _is_ambient(number) else f"{name} × {1.0 + by:.4g}"

@@ -93,6 +93,11 @@ class Structure:
         return self.n_parameters + self.n_effects + self.n_coarse
 
     @property
+    def n_priors(self) -> int:
+        """Number of rows that priors of nominal parameters add to the residuals."""
+        return int(np.isfinite(self.ranges.sigma).sum())
+
+    @property
     def n_readings(self) -> int:
         """Readings in all records; a frequency response counts two per complex number."""
         return sum(one.readings.size for one in self.data)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...diagnosis import Diagnosis
+from ...diagnosis import Diagnosis, Found
+from ._change_words import change_in_words, nothing_changed, parameter_in_words
 
 _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",
           "radiation": "radiation from {0} to {1}", "natural_convection": "natural convection from {0} to {1}",
@@ -16,7 +17,7 @@ _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_li
 
 
 def answer_sentence(found: Diagnosis) -> str:
-    """What the model lacks, what adding it does to the error, and what is left.
+    """What the model lacks or what has changed, what adding it does to the error, and what is left.
 
     Parameters
     ----------
@@ -24,21 +25,37 @@ def answer_sentence(found: Diagnosis) -> str:
         What was found.
     """
     kind = "validation" if "validation" in found.gap else "train"
-    gap, records = found.gap[kind], "validation data" if kind == "validation" else "the training data"
+    gap = found.gap[kind]
+    records = "validation data" if kind == "validation" else "the new records" if found.reference else (
+        "the training data")
     parts = []
     if found.effects:
-        sets = [[(effect.effect, effect.where), *others]
-                for effect, others in zip(found.effects, found.alternatives, strict=True)]
-        lacks = ", and ".join(" or ".join(in_words(name, where) for name, where in names) for names in sets)
-        parts.append(f"The model lacks {lacks}. With it the error on {records} falls from {gap.before:.2g} to "
+        parts.append(f"{_sets(found)} With it the error on {records} falls from {gap.before:.2g} to "
                      f"{gap.after:.2g} {gap.unit}.")
     elif found.verdict == "consistent":
-        parts.append(f"The model explains the records: the error on {records} is {gap.before:.2g} {gap.unit}, noise "
+        parts.append(nothing_changed(found) if found.reference else
+                     f"The model explains the records: the error on {records} is {gap.before:.2g} {gap.unit}, noise "
                      f"alone would give {gap.noise:.2g} {gap.unit}.")
     else:
-        parts.append(f"Something is missing that no effect of the catalog explains: the error on {records} is "
-                     f"{gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} {gap.unit}.")
+        what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
+                "Something is missing that no effect of the catalog explains")
+        parts.append(f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
+                     f"{gap.noise:.2g} {gap.unit}.")
     return " ".join([*parts, *([] if found.remainder is None else [str(found.remainder)])])
+
+
+def _sets(found: Diagnosis) -> str:
+    """What was accepted, each with what the records cannot distinguish from it."""
+    sets = [[_accepted(effect, bool(found.reference)), *(in_words(name, where) for name, where in others)]
+            for effect, others in zip(found.effects, found.alternatives, strict=True)]
+    listed = ", and ".join(" or ".join(names) for names in sets)
+    return f"Since the reference records: {listed}." if found.reference else f"The model lacks {listed}."
+
+
+def _accepted(effect: Found, changed: bool) -> str:
+    if changed and effect.effect == "parameter_change":
+        return change_in_words(effect)
+    return in_words(effect.effect, effect.where)
 
 
 def in_words(name: str, where: tuple[str, ...]) -> str:
@@ -51,6 +68,8 @@ def in_words(name: str, where: tuple[str, ...]) -> str:
     where : tuple of str
         Parts of the system it acts on.
     """
+    if name == "parameter_change":
+        return f"a change of {' and '.join(map(parameter_in_words, where))}"
     if name in _PATHS:
         return _PATHS[name].format(*where)
     return f"{name.replace('_', ' ')} at {', '.join(where)}"

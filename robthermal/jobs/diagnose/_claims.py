@@ -16,6 +16,16 @@ _SENTENCE = {
     "consistent": "The system as it is explains the records; nothing is missing that they could show.",
     "unexplained": "None of the known effects explains the records.",
 }
+_CHANGED = {
+    "named": "One change explains the new records: {names}.",
+    "named_with_remainder": "One change explains what is outside the scatter of the reference records: {names}. What "
+                            "is left beyond the noise is stated, and has no name.",
+    "ambiguous": "Changes explain the new records, but other ones do as well: {names}.",
+    "consistent": "The new records are within the scatter of the reference records: nothing has changed.",
+    "unexplained": "Something has changed, and neither a parameter nor a known effect explains it.",
+}
+_HOW_CHANGED = ("A change is accepted where healthy records exceed it with a chance below 0.03 for all parameters "
+                "together, 0.01 for the effects of the catalog (F test with the scatter among the reference records).")
 
 
 def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
@@ -29,12 +39,16 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
     found = result.diagnosis
     names = ", ".join(effect.label for effect in found.effects)
     ruled_out = ", ".join(candidate.label for candidate in found.ruled_out)
-    yield _claim(f"Verdict: {found.verdict}", _SENTENCE[found.verdict].format(names=names), found.outcome.ok,
+    said = _SENTENCE if found.reference is None else _CHANGED
+    yield _claim(f"Verdict: {found.verdict}", said[found.verdict].format(names=names), found.outcome.ok,
                  found.outcome.text, _records(result, "train"), _margin(found),
+                 _HOW_CHANGED if found.reference else
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "
                  "within ΔBIC 10 of it are alternatives"
                  + (f", but {ruled_out}: more than 10 behind with the density of the validation records added."
                     if ruled_out else "."))
+    if found.reference is not None:
+        return
     yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
                  "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),
                  f"p = {found.adequacy.p_value:.2g}, must be above 0.001",
@@ -58,6 +72,11 @@ def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
         What was found.
     """
     yield "A name is the best explanation among the effects of the catalog; a cause outside it has no name here."
+    if found.reference is not None:
+        yield (f"The {found.reference.records} reference records are of a healthy machine, and scatter as healthy days "
+               "do; before any record is seen the scatter of a parameter is taken to be 3 %, which counts as much as "
+               "four records.")
+        yield "An ambient that a record does not hold, and initial temperatures, are unknowns of each record."
     yield "Nothing is proven: all numbers are estimates, and all answers are tests on these records."
     units = found.system.sensor_units
     yield ("Noise of the sensors and random heats are white and Gaussian, with levels near the declared ones: "

@@ -111,7 +111,8 @@ class Diagnosed:
 def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Record | FrequencyResponse],
                      validation: Sequence[Record | FrequencyResponse] = (),
                      progress: Callable[[str], None] = lambda stage: None, *,
-                     operating_point: Mapping[str, float] | None = None, session_gain: bool = False) -> Diagnosed:
+                     operating_point: Mapping[str, float] | None = None, session_gain: bool = False,
+                     reference: Sequence[Record | FrequencyResponse] = ()) -> Diagnosed:
     """Diagnose a system on records and frequency responses.
 
     Parameters
@@ -126,6 +127,8 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
         Called with a sentence before every stage.
     operating_point, session_gain
         As in `rt.diagnose`.
+    reference : sequence of Record
+        Records of the healthy machine; then the question is what has changed since.
 
     Returns
     -------
@@ -152,9 +155,11 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     """
     try:
         found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
-                         operating_point=operating_point or None, session_gain=session_gain)
+                         operating_point=operating_point or None, session_gain=session_gain,
+                         reference=list(reference) or None)
     except InputError as error:
-        where = error.where.replace("argument records", "training records")
+        where = error.where.replace("argument records", "new records" if reference else "training records")
+        where = where.replace("argument reference", "--reference")
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
         raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
     progress("running both models freely")

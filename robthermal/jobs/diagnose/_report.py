@@ -19,6 +19,7 @@ from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance, subtitle
 from ._answer import answer_sentence
+from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._ranking import NOT_NEEDED, ranking
@@ -122,6 +123,8 @@ def _shown_first(result: Diagnosed) -> list[Residuals]:
 def _sections(result: Diagnosed) -> Iterator[Section]:
     found = result.diagnosis
     yield _effect_section(found)
+    if found.reference is not None:
+        yield change_section(found, found.reference)
     yield _gap_section(result)
     yield Section("Candidates", "Every effect of the catalog at every place of the system, ranked by what it "
                   "explains after the nominal parameters were refitted. The limit is the size that would have been "
@@ -174,6 +177,9 @@ def _gap_section(result: Diagnosed) -> Section:
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
             "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
             "records have gains of their own, those, from the whole record).")
+    if found.reference is not None:
+        text = ("Before: the model fitted to the reference records. After: with the change. Initial temperatures, and "
+                "ambients that a record does not hold, are refitted in both.")
     if found.provisional:
         text += " The effects are provisional, not names."
     figures = [_figure(one, found) for one in result.residuals if one not in _shown_first(result)]

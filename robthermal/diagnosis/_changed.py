@@ -1,0 +1,147 @@
+"""What changed between two days: stages and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError, Outcome
+from ..fitting import Choice
+from ..thermal import System
+from ._judge import Judged, Progress, Validation, Verdict, alternatives
+from ._outcomes import DiagnosisCode
+from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched
+from .data import DataSet, Measured, as_measured, noise_floor, records_of, without_outliers
+from .evidence import Gap, adequacy, expected_rms, left
+from .fit import Refit, SessionGain, exact
+from .search import SearchState, ShortList
+
+_NOISE_ONLY = 1.5  # whitened variance
+_SHARE = 0.5  # of the excess mean square, that a change must explain where something else has changed too
+_CLOSED = 0.3  # of the excess rms of the validation records
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What the reference records say, as in ``diagnosis.json``.
+
+    Parameters
+    ----------
+    records : int
+        Number of reference records.
+    rms : float
+        Free-run residual of the common fit to them [K].
+    remainder : float
+        Part of it that is not noise [K].
+    scatter : dict
+        Standard deviation of every parameter of the fit from record to record, relative to it [-].
+    deviation : dict
+        How far every parameter of the new records is from the mean of the reference records, relative to it [-].
+    """
+
+    records: int
+    rms: float
+    remainder: float
+    scatter: dict[str, float]
+    deviation: dict[str, float]
+
+
+def changed(system: System, records: Measured | Sequence[Measured], reference: Measured | Sequence[Measured], *,
+            validation: Validation, parameters: Choice, names: Iterable[str] | None,
+            noise: Mapping[str, float] | float | None, session_gain: SessionGain, progress: Progress
+            ) -> tuple[Judged, Compared]:
+    """Compare new records with those of a healthy machine.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system.
+    records, reference : Record or list of them
+        The new ones, and those of the healthy machine.
+    validation : Validation
+        Data of the new day that no fit has seen.
+    parameters, noise, session_gain
+        As in `rt.diagnose`.
+    names : iterable of str, optional
+        Effects of the catalog to try; default all.
+    progress : callable
+        Called with a sentence before every stage.
+    """
+    later = as_measured(system, records, "records")
+    _refuse_same(as_measured(system, reference, "reference"), later)
+    progress("fitting the reference records, and measuring how they differ")
+    healthy = reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
+                           noise=noise, session_gain=session_gain)
+    progress("comparing the new records with them")
+    floor = noise_floor(system, records, noise=noise)
+    new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
+    progress("trying every change of a parameter, and every effect of the catalog")
+    found = searched(new, healthy, names)
+    return _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+
+
+def _compared(healthy: Reference, new: Refit) -> Compared:
+    fit, ranges = exact(healthy.fit), healthy.fit.structure.ranges
+    beyond = max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
+    moved = new.v[:new.structure.n_parameters] - healthy.scatter.center
+    for candidate, values in zip(new.structure.effects, new.structure.quantities(new.v), strict=True):
+        if candidate.effect.name == NAME:
+            moved[ranges.members.index(candidate.where)] += values[SIZE]
+    deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / ranges.unit)
+    return Compared(len(healthy.each), fit.rms, float(np.sqrt(beyond)), healthy.relative,
+                    dict(zip(ranges.names, map(float, deviation), strict=True)))
+
+
+def _judged(found: Search, new: Refit, healthy: Reference, validation: Validation) -> Judged:
+    before, fit = pinned(new), found.fit
+    state = SearchState(nominal=before, names=None, scores=found.scores, fit=fit if found.rounds else exact(before),
+                        current=found.scores, short=ShortList(fit, (), {}), rounds=found.rounds, complete=True)
+    held_out = validation.predicted(before, state.fit)
+    excess = excess_of(fit, healthy)
+    gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
+    verdict, outcome = _verdict(found, excess, gaps, _bare(fit, healthy))
+    rest = verdict in ("named_with_remainder", "ambiguous")
+    return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
+                  plain=exact(fit) if rest else None)
+
+
+def _refuse_same(reference: Sequence[DataSet], new: Sequence[DataSet]) -> None:
+    for one in new:
+        if any(np.array_equal(one.readings, old.readings) for old in reference):
+            raise InputError(f"the new record {one.label!r} is among the reference records", where="argument reference",
+                             expected="records of the healthy machine, from other days",
+                             remedy="Leave it out there: it would be compared with itself.")
+
+
+def _bare(fit: Refit, healthy: Reference) -> bool:
+    """Whether the noise alone is left, on the reference records and on the new ones."""
+    return (healthy.scatter.inflation < _NOISE_ONLY and fit.variance < _NOISE_ONLY and adequacy(fit).outcome.ok
+            and all(one.variance < _NOISE_ONLY for one in healthy.each))
+
+
+def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], bare: bool) -> tuple[Verdict, Outcome]:
+    reasons = " ".join(excess.reasons)
+    if not found.rounds and not reasons:
+        text = "Nothing has changed: the new records are within the scatter of the reference records."
+        return "consistent", DiagnosisCode.CONSISTENT.outcome(text)
+    if not found.rounds or not _explains(gaps, bool(reasons)):
+        helped = "; ".join(map(str, found.rounds))
+        text = f"Something has changed; no change of a parameter and no effect of the catalog explains it. {reasons}"
+        text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else "")
+        return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
+    if any(map(alternatives, found.rounds)):
+        return "ambiguous", DiagnosisCode.AMBIGUOUS.outcome("The new records cannot distinguish some changes.")
+    if reasons or not bare:
+        return "named_with_remainder", DiagnosisCode.NAMED_WITH_REMAINDER.outcome(
+            "One change explains what is outside the scatter of the reference records; what is left beyond the noise "
+            f"is stated, and has no name. {reasons}".rstrip())
+    return "named", DiagnosisCode.NAMED.outcome("One change explains the new records.")
+
+
+def _explains(gaps: Sequence[Gap], more: bool) -> bool:
+    """Whether enough of the gap is gone on validation records and, where something else changed too, on all."""
+    if more and left(gaps[0]).share_explained < _SHARE:
+        return False
+    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in gaps[1:])

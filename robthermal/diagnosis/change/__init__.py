@@ -1,0 +1,19 @@
+"""What changed between two days: the scatter of healthy records, changes of parameters, and their yardstick."""
+
+from ._excess import Excess as Excess
+from ._excess import excess_of as excess_of
+from ._held import Held as Held
+from ._parameter_change import NAME as NAME
+from ._parameter_change import SIZE as SIZE
+from ._parameter_change import parameter_changes as parameter_changes
+from ._parameter_change import relative as relative
+from ._reference import Reference as Reference
+from ._reference import held as held
+from ._reference import pinned as pinned
+from ._reference import reference_of as reference_of
+from ._scatter import random_effects as random_effects
+from ._search import Search as Search
+from ._search import searched as searched
+
+__all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "excess_of", "held", "parameter_changes", "pinned",
+           "random_effects", "reference_of", "relative", "searched"]

@@ -1,0 +1,73 @@
+"""Candidate changes of parameters: each of the fit table by a factor, from one day to another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ...fitting import Ranges
+from ...thermal import System
+from ..effects import Candidate, Effect, Quantity
+
+NAME = "parameter_change"
+SIZE = "log_ratio"  # the coordinate in which a factor is linear; said to the user as a relative change
+_FARTHEST = 3.5  # a factor of 33: what has broken off altogether
+
+
+def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
+    """One candidate per parameter of the fit that may change; tied parameters change together.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system.
+    ranges : Ranges
+        Parameters that were fitted.
+    """
+    return [Candidate(_effect(members), members) for members in ranges.members
+            if all(system.parameter(name) for name in members)]
+
+
+def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
+    factor = math.exp(values[SIZE])
+    return system.with_parameters({name: system.parameter(name) * factor for name in where})
+
+
+def _effect(members: tuple[str, ...]) -> Effect:
+    return Effect(name=NAME, meaning="A parameter has another value than on the reference records, by a factor.",
+                  places=lambda system: [members],
+                  quantities=(Quantity(SIZE, "", -_FARTHEST, _FARTHEST),), add=_add)
+
+
+def relative(values: Mapping[str, tuple[float, float, str]]) -> dict[str, tuple[float, float, str]]:
+    """The relative change with its standard deviation, from the coordinate of the search.
+
+    Parameters
+    ----------
+    values : mapping
+        Quantities of a `parameter_change` with standard deviation and unit.
+    """
+    value, std, unit = values[SIZE]
+    return {"relative": (math.expm1(value), std * math.exp(value), unit)}
+
+
+def says_again(candidate: Candidate, system: System, ranges: Ranges) -> bool:
+    """Whether an effect of the catalog only changes numbers that one parameter of the fit changes.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect at a place.
+    system : System
+        Nominal system.
+    ranges : Ranges
+        Parameters that were fitted.
+    """
+    shaped = {q.name: next(iter(q.grid), 1.0) for q in candidate.effect.quantities if not callable(q.grid)}
+    if len(shaped) < len(candidate.effect.quantities):  # its trial values depend on the record: more than a number
+        return False
+    size = candidate.effect.size
+    before, after = system.parameters, candidate.effect.add(system, candidate.where,
+                                                            {**shaped, size.name: size.typical}).parameters
+    moved = {name for name, value in after.items() if before.get(name) != value}
+    return any(moved <= set(members) for members in ranges.members)

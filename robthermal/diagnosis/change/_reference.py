@@ -1,0 +1,165 @@
+"""The reference: the model fitted to the records of a healthy machine, and what the next healthy record would show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import Diverged, InputError
+from ...fitting import NONE, Choice, Ranges, chosen_ranges
+from ...thermal import System
+from ..data import (
+    DataSet,
+    Measured,
+    NoiseEstimate,
+    as_measured,
+    noise_floor,
+    records_of,
+    responses_of,
+    without_outliers,
+)
+from ..fit import (
+    NoiseScaling,
+    Refit,
+    SessionGain,
+    extended,
+    filters,
+    fitted,
+    relinearized,
+    sessions_of,
+    structure_of,
+    with_unknown_ambients,
+)
+from ._held import Held, root_of
+from ._scatter import Scatter, scatter_of
+
+Array = NDArray[np.float64]
+_FILTERS = 2  # rounds: a filter is that of the estimate
+_PINNED = 1e3  # times as certain as the scatter says: fixed, with the same unknowns
+_OF_RECORD = (".temperature", ".initial")  # numbers that are each record's own
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Common fit to the reference records with the scatter of their parameters.
+
+    Parameters
+    ----------
+    fit : Refit
+        All reference records, one set of parameters.
+    scatter : Scatter
+        What differs from record to record.
+    each : tuple of Refit
+        Every reference record as if it were new: parameters held near those of a healthy day.
+    """
+
+    fit: Refit
+    scatter: Scatter
+    each: tuple[Refit, ...]
+
+    @property
+    def relative(self) -> dict[str, float]:
+        """Scatter of every parameter from record to record, relative to it; to its range, if it may be negative."""
+        ranges = self.fit.structure.ranges
+        return dict(zip(ranges.names, map(float, self.scatter.std / ranges.unit), strict=True))
+
+
+def reference_of(system: System, records: Measured | Sequence[Measured], new: Sequence[Measured], *,
+                 parameters: Choice = None, noise: Mapping[str, float] | float | None = None,
+                 session_gain: SessionGain = False) -> Reference:
+    """Fit the reference records, and measure how they differ.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system.
+    records : Record or list of them
+        Of the healthy machine.
+    new : sequence of Record
+        Of the day in question; only which ambients they hold is looked at.
+    parameters, noise, session_gain
+        As in `rt.diagnose`.
+    """
+    floor = noise_floor(system, records, noise=noise)
+    data = without_outliers(system, as_measured(system, records, "reference"), floor.noise)
+    later = as_measured(system, new, "records")
+    if responses_of([*data, *later]):
+        raise InputError("a frequency response is compared between two days", where="argument reference",
+                         expected="records", remedy="Give the records themselves.")
+    ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
+    sessions = with_unknown_ambients(sessions_of(system, session_gain), system, records_of([*data, *later]))
+    starts = [one.initial(system, "free") for one in data]
+    structure = structure_of(system, _lasting(ranges), data, starts, sessions)
+    try:
+        fit = fitted(structure, structure.start(structure.ranges.start, []), floor, NoiseScaling(1.0, {}))
+    except Diverged as error:
+        raise InputError(f"the nominal model runs away: {error}", where="argument system",
+                         remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
+    fit = _declared(fit)
+    scatter = scatter_of(fit)
+    return Reference(fit, scatter, tuple(held(fit, scatter, [one], floor) for one in data))
+
+
+def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEstimate) -> Refit:
+    """Fit to other records with the parameters held near those of a healthy day; noise levels of the reference.
+
+    Parameters
+    ----------
+    fit : Refit
+        Common fit to the reference records.
+    scatter : Scatter
+        What differs between them.
+    data : sequence of DataSet
+        Records to fit.
+    floor : NoiseEstimate
+        Noise of these records.
+    """
+    nominal = fit.structure
+    values = np.clip(nominal.ranges.values(scatter.center), nominal.ranges.lower, nominal.ranges.upper)
+    ranges = replace(nominal.ranges, start=values, sigma=np.full(values.size, np.inf))
+    structure = Held(base=nominal.base.with_parameters(ranges.assigned(values)), ranges=ranges, data=tuple(data),
+                     starts=tuple(one.initial(nominal.base, "free") for one in data), tolerance=nominal.tolerance,
+                     sessions=nominal.sessions, center=ranges.coordinates(values), root=root_of(scatter.next_one))
+    wider = float(np.sqrt(scatter.inflation))
+    levels = NoiseScaling(wider, dict.fromkeys(floor.noise, wider))
+    v = structure.start(values, [])
+    for _ in range(_FILTERS):
+        paths, whiteners = filters(structure, v, floor, levels)
+        fitted_once = extended(Refit(structure, v, floor, levels, paths, whiteners, np.zeros(0), fit.outcome),
+                               structure, v)
+        v = fitted_once.v
+    return relinearized(fitted_once)
+
+
+def pinned(new: Refit) -> Refit:
+    """The same records with the parameters of a healthy day as they are: what the unchanged model leaves of them.
+
+    Parameters
+    ----------
+    new : Refit
+        From `held`.
+    """
+    structure = new.structure
+    if not isinstance(structure, Held) or not structure.n_parameters:
+        return new
+    fixed = replace(structure, root=_PINNED * structure.root)
+    v = np.concatenate([structure.center, new.v[structure.n_parameters:]])
+    return relinearized(extended(new, fixed, v))
+
+
+def _declared(fit: Refit) -> Refit:
+    """The same fit with the noise as declared: what differs between the records has raised it."""
+    levels = NoiseScaling(1.0, {})
+    _, whiteners = filters(fit.structure, fit.v, fit.floor, levels)
+    return relinearized(replace(extended(replace(fit, whiteners=whiteners), fit.structure, fit.v), levels=levels))
+
+
+def _lasting(ranges: Ranges) -> Ranges:
+    """Parameters of the machine: temperatures of the room and of the start belong to each record."""
+    kept = [i for i, group in enumerate(ranges.members) if not any(name.endswith(_OF_RECORD) for name in group)]
+    return Ranges(tuple(ranges.names[i] for i in kept), tuple(ranges.members[i] for i in kept), ranges.start[kept],
+                  ranges.lower[kept], ranges.upper[kept], ranges.sigma[kept], ranges.logarithmic[kept])
+

@@ -1,0 +1,145 @@
+"""The search for changes: parameters first in the list, then the catalog, each against its own yardstick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import Candidate, candidates
+from ..evidence import ALIAS, Scores, score_candidates
+from ..fit import Refit, relinearized
+from ..search import Accepted, Entry, refit_short_list
+from ._parameter_change import NAME, parameter_changes, says_again
+from ._reference import Reference
+from ._yardstick import chance, inflation, squares, within_scatter
+
+MOST_CHANGES = 2
+_ALPHA_PARAMETERS, _ALPHA_CATALOG = 0.03, 0.01  # family-wise
+_HOPE = 2.0  # times what the linearization promises: a refit may gain over it
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search for changes found.
+
+    Parameters
+    ----------
+    fit : Refit
+        The new records with all changes accepted.
+    rounds : tuple of Accepted
+        In order of acceptance.
+    scores : Scores
+        Scores of all candidates where nothing has changed.
+    """
+
+    fit: Refit
+    rounds: tuple[Accepted, ...]
+    scores: Scores
+
+
+def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> Search:
+    """Accept changes while any is beyond the scatter of the reference records.
+
+    Parameters
+    ----------
+    new : Refit
+        The new records, parameters held near those of a healthy day.
+    reference : Reference
+        What healthy records show.
+    names : iterable of str, optional
+        Effects of the catalog to try; default all.
+    """
+    catalog = None if names is None else list(names)
+    tested = _tested(new, catalog)
+    first = scores = score_candidates(new, tested)
+    fit, rounds = new, list[Accepted]()
+    while True:
+        found = _one(fit, scores, reference)
+        if found is None:
+            break
+        rounds.append(found)
+        fit = found.best.fit
+        if len(rounds) == MOST_CHANGES:
+            break
+        taken = {candidate.key for candidate in fit.structure.effects}
+        scores = score_candidates(fit, [candidate for candidate in _tested(fit, catalog) if candidate.key not in taken])
+    return Search(fit, tuple(rounds), first)
+
+
+def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
+    """Changes of parameters, and what the catalog adds to them."""
+    ranges, system = fit.structure.ranges, fit.system
+    listed = [one for one in fit.testable(candidates(system, names)) if not says_again(one, system, ranges)]
+    return [*parameter_changes(system, ranges), *listed]
+
+
+def _one(fit: Refit, scores: Scores, reference: Reference) -> Accepted | None:
+    """The best candidate beyond the scatter, with those that the records cannot tell from it."""
+    own = np.array([candidate.effect.name == NAME for candidate in scores.candidates], bool)
+    n_own = int(own.sum())
+    parameters, catalog = _part(scores, own, n_own), _part(scores, ~own, max(scores.n_trials - n_own, 1))
+    tried = [*_refitted(fit, parameters, reference, _ALPHA_PARAMETERS),
+             *_refitted(fit, _without_repeats(catalog, parameters), reference, _ALPHA_CATALOG)]
+    sure = [one for one in tried if one.sure]
+    if not sure:
+        return None
+    best = max(sure, key=lambda one: one.entry.delta_bic)
+    rivals = (one for one in tried if one is not best and not _more_general(one.entry, best.entry)
+              and within_scatter(best.entry.delta_bic - one.entry.delta_bic, best.kappa, len(reference.each)))
+    accepted = replace(best.entry, fit=relinearized(best.entry.fit))
+    return Accepted(fit, best=accepted, contenders=tuple(sorted((one.entry for one in rivals),
+                                                                  key=lambda entry: -entry.delta_bic)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A candidate refitted, its yardstick, and whether it is beyond the scatter."""
+
+    entry: Entry
+    kappa: float
+    sure: bool
+
+
+def _refitted(fit: Refit, scores: Scores, reference: Reference, alpha: float) -> Iterator[_Tried]:
+    """Candidates refitted, with the chance that healthy records give, for the family; none where none is promising."""
+    n, trials = len(reference.each), max(scores.n_trials, 1)
+    if not any(trials * chance(_HOPE * squares(fit, scores, i), 1, 1.0, n) < alpha for i in scores.order):
+        return
+    for entry in refit_short_list(fit, scores).entries:
+        kappa = inflation(entry.candidate, reference.each, fit.n_readings)
+        dimension, decrease = len(entry.candidate.effect.free), fit.rss - entry.fit.rss
+        p = min(trials * chance(decrease, dimension, kappa, n), 1.0)
+        bic = decrease - dimension * math.log(fit.n_readings)  # the noise is known: no logarithm of the sum of squares
+        yield _Tried(replace(entry, p_value=p, delta_bic=bic), kappa, p < alpha)
+
+
+def _part(scores: Scores, some: NDArray[np.bool_], n_trials: int) -> Scores:
+    """Some of the candidates."""
+    at = np.flatnonzero(some)
+    return Scores(tuple(scores.candidates[i] for i in at), scores.size[at], scores.std[at], scores.statistic[at],
+                  scores.p_value[at], scores.possible[at], scores.identifiability[at], scores.limit[at],
+                  scores.signatures[:, at], n_trials)
+
+
+def _without_repeats(catalog: Scores, parameters: Scores) -> Scores:
+    """Without effects that act on a parameter's own part exactly as a change of it does."""
+    alike = 1.0 - (parameters.signatures.T @ catalog.signatures) ** 2 < ALIAS**2
+    repeats = [any(alike[i, j] and _same_part(candidate, change) for i, change in enumerate(parameters.candidates))
+               for j, candidate in enumerate(catalog.candidates)]
+    return _part(catalog, ~np.array(repeats, bool), catalog.n_trials)
+
+
+def _same_part(candidate: Candidate, change: Candidate) -> bool:
+    """Whether an effect names the part whose parameter changes."""
+    parts = {name.split(".", 1)[1].rpartition(".")[0] for name in change.where}
+    return any(part == name or part.startswith(f"{name}.") for part in parts for name in candidate.where)
+
+
+def _more_general(entry: Entry, best: Entry) -> bool:
+    """Whether a rival says the same as the change of a parameter, with more quantities: a step at any time."""
+    return (best.candidate.effect.name == NAME and len(entry.candidate.effect.free) > 1
+            and _same_part(entry.candidate, best.candidate))

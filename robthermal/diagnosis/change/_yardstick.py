@@ -1,0 +1,74 @@
+"""The yardstick of a change: what the same candidate makes of the reference records, where nothing has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from scipy.stats import f as f_distribution
+
+from ..effects import Candidate
+from ..evidence import Scores, score_candidates
+from ..fit import Refit
+from ._scatter import COUNTS
+
+_TIED = 0.01  # chance below which the difference of two candidates is no scatter
+_LEAST = 10.0  # of the sum of squares, as ΔBIC elsewhere
+
+
+def squares(fit: Refit, scores: Scores, i: int) -> float:
+    """Decrease of the sum of squares that candidate i promises, in units of the declared noise."""
+    statistic, power = float(scores.statistic[i]), float(fit.rest @ fit.rest)
+    return statistic * power / (max(fit.degrees_of_freedom - 1, 1) + statistic)
+
+
+def inflation(candidate: Candidate, each: Sequence[Refit], n_new: int) -> float:
+    """By how much the squares of a candidate exceed those of white noise and scatter on the reference records.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        With its time constants, which are held.
+    each : sequence of Refit
+        Every reference record as if it were new.
+    n_new : int
+        Readings of the new records: the squares of a misfit grow with them, those of noise do not.
+    """
+    tried, total = _held(candidate), 0.0
+    for fit in each:
+        scores = score_candidates(fit, [tried])
+        if scores.candidates:
+            own = squares(fit, scores, 0)
+            total += own + max(own - 1.0, 0.0) * max(n_new / fit.n_readings - 1.0, 0.0)
+    n = len(each)
+    return max(1.0, (COUNTS + (n + 1) / n * total) / (COUNTS + n - 1))
+
+
+def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> float:
+    """Chance of such a decrease if nothing has changed.
+
+    Parameters
+    ----------
+    decrease : float
+        Of the sum of squares, in units of the declared noise.
+    dimension : int
+        Quantities of the candidate.
+    kappa : float
+        Its `inflation`.
+    n_reference : int
+        Number of reference records.
+    """
+    return float(f_distribution.sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
+
+
+def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
+    """Whether two candidates differ by no more than the scatter may make."""
+    return bool(difference < max(_LEAST, kappa * f_distribution.isf(_TIED, 1, COUNTS + n_reference - 1)))
+
+
+def _held(candidate: Candidate) -> Candidate:
+    """With the only trial value of every shape that it has; a phase is chosen by each record."""
+    effect = candidate.effect
+    quantities = tuple(replace(q, grid=(candidate.shape[q.name],)) if q.grid and q.name in candidate.shape
+                       and q.name != effect.paired and q is not effect.size else q for q in effect.quantities)
+    return Candidate(replace(effect, quantities=quantities), candidate.where)

@@ -1,0 +1,144 @@
+"""What changed between two days: truth from scipy alone (two_days.py), every parameter of every day off by 3 %."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from two_days import SYSTEM, Day, record
+
+import robthermal as rt
+from robthermal.diagnosis.change import parameter_changes, random_effects
+from robthermal.fitting import chosen_ranges
+
+SIZES: dict[str, Any] = {"length": 300}
+FEW = ["sensor_offset", "missing_ambient_link", "input_gain", "heat_source"]
+FAN = "links.sink-room.conductance"
+
+
+@pytest.fixture(scope="module")
+def rig() -> rt.System:
+    return rt.thermal.parse_system(SYSTEM)
+
+
+@pytest.fixture(scope="module")
+def old() -> list[rt.Record]:
+    return [record(seed, **SIZES) for seed in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def fan(rig: rt.System, old: list[rt.Record]) -> rt.diagnosis.Diagnosis:
+    """The fan stands still: half the conductance to the room; held out is another record of that day."""
+    new, unseen = (record(seed, Day({"fan": 0.5}), **SIZES) for seed in (11, 12))
+    return rt.diagnose(rig, new, reference=old, validation=unseen, effects=FEW)
+
+
+def test_a_fan_that_stands_still_is_named(fan: rt.diagnosis.Diagnosis) -> None:
+    assert fan.verdict in ("named", "named_with_remainder") and fan.outcome.ok
+    (found,) = fan.effects
+    value, std, unit = found.values["relative"]
+    assert (found.effect, found.where, unit) == ("parameter_change", (FAN,), "")
+    assert abs(value + 0.5) < 3 * std and 0.01 < std < 0.05  # the scatter of 3 % of half the conductance is in it
+    assert fan.system.parameter(FAN) == pytest.approx(0.4, rel=0.1)
+    assert fan.gap["validation"].after < 0.4 * fan.gap["validation"].before
+
+
+def test_the_reference_is_in_the_file(fan: rt.diagnosis.Diagnosis) -> None:
+    block = fan.to_dict()["reference"]
+    assert set(block) >= {"records", "rms", "remainder", "scatter"} and block["records"] == 3
+    assert list(block["scatter"]) == list(rt.thermal.parse_system(SYSTEM).fit)
+    assert all(0.01 < scatter < 0.08 for scatter in block["scatter"].values())
+    assert block["deviation"][FAN] == pytest.approx(-0.5, abs=0.1) and block["remainder"] <= block["rms"]
+
+
+def test_a_healthy_day_is_consistent(rig: rt.System, old: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(22, **SIZES), reference=old)  # with the whole catalog
+    assert found.verdict == "consistent" and found.effects == () and found.outcome.ok
+    assert found.remainder is None and "Nothing has changed" in found.outcome.text
+
+
+def test_a_loose_contact_is_named(rig: rt.System, old: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(31, Day({"contact": 0.6}), **SIZES), reference=old, effects=FEW)
+    assert [one.where for one in found.effects] == [("links.block-plate.conductance",)]
+    value, std, _ = found.effects[0].values["relative"]
+    assert abs(value + 0.4) < 3 * std
+
+
+def test_a_sensor_that_has_drifted_is_named(rig: rt.System, old: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(41, Day(offset=1.5), **SIZES), reference=old, effects=FEW)
+    (one,) = found.effects
+    assert (one.effect, one.where) == ("sensor_offset", ("T_block",))
+    assert one.values["offset"][0] == pytest.approx(1.5, abs=0.15)
+
+
+def test_a_room_that_is_not_recorded_is_no_change(rig: rt.System) -> None:
+    """Four kelvins warmer than the file says, and seven than on the first day: refitted, record by record."""
+    rooms = {1: -3.0, 2: 0.0, 3: 2.0, 51: 4.0}
+    days = [record(seed, Day(room=room), room=False, **SIZES) for seed, room in rooms.items()]
+    found = rt.diagnose(rig, days[3], reference=days[:3], effects=FEW)
+    assert found.verdict == "consistent"
+    sessions = found.fit.structure.sessions
+    assert sessions.inputs == ("room",)
+    assert float(sessions.sigma[0] * found.fit.structure.gains(found.fit.v)[0][0]) == pytest.approx(4.0, abs=0.5)
+
+
+def test_a_room_warmer_than_recorded_is_no_change_of_a_parameter(rig: rt.System, old: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(61, Day(room=5.0), **SIZES), reference=old, effects=["ambient_gradient", *FEW])
+    names = {(one.effect, one.where) for one in found.effects}
+    names |= {name for others in found.alternatives for name in others}
+    assert ("ambient_gradient", ("sink",)) in names and "parameter_change" not in {effect for effect, _ in names}
+
+
+def test_what_is_in_no_catalog_is_unexplained(rig: rt.System, old: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(71, Day(draught=6.0), **SIZES), reference=old, effects=FEW)
+    assert found.verdict == "unexplained" and found.effects == () and not found.outcome.ok
+    assert "Something has changed" in found.outcome.text
+
+
+def test_what_was_missing_on_all_days_is_no_change(rig: rt.System) -> None:
+    """A path that no file has makes every fit worse; it is a remainder of the reference, not a change."""
+    lossy = Day(loss=0.15)
+    found = rt.diagnose(rig, record(84, lossy, **SIZES), reference=[record(s, lossy, **SIZES) for s in (81, 82, 83)],
+                        effects=FEW)
+    assert found.verdict == "consistent" and found.reference is not None
+    assert found.reference.remainder > 0.05
+
+
+def test_random_effects_are_those_of_exact_records() -> None:
+    """With records that tell everything the scatter is the sample variance, with the prior as four more records."""
+    rng = np.random.default_rng(0)
+    shifts = rng.normal([0.2, -0.1], [0.05, 0.2], (9, 2))
+    M = [np.array([[1e8, 2e7], [2e7, 3e8]])] * 9
+    std, mean, covariance = random_effects(M, [one @ shift for one, shift in zip(M, shifts, strict=True)],
+                                           np.array([0.03, 0.03]), np.array([1e3, 1e3]))
+    expected = (4 * 0.03**2 + np.sum((shifts - shifts.mean(axis=0)) ** 2, axis=0)) / (4 + 8)
+    assert std**2 == pytest.approx(expected, rel=1e-2) and mean == pytest.approx(shifts.mean(axis=0), abs=1e-4)
+    assert np.diag(covariance) == pytest.approx(expected / 9, rel=1e-2)
+
+
+def test_random_effects_of_records_that_tell_nothing_are_the_assumption() -> None:
+    std, mean, _ = random_effects([np.zeros((1, 1))] * 5, [np.zeros(1)] * 5, np.array([0.03]), np.array([2.0]))
+    assert (std[0], mean[0]) == (pytest.approx(0.03, rel=1e-2), 0.0)
+
+
+def test_tied_parameters_change_together(rig: rt.System) -> None:
+    key = ("links.block-plate.conductance", "links.plate-sink.conductance")
+    tied = rig.with_parameters(dict.fromkeys(key, 1.5))
+    (candidate,) = parameter_changes(tied, chosen_ranges(tied, {key: (0.1, 10.0)}))
+    after = candidate.add(tied, float(np.log(0.5)))
+    assert [after.parameter(name) for name in key] == [pytest.approx(0.75)] * 2
+
+
+@pytest.mark.parametrize(("what", "message"), [
+    ("seen", "among the reference records"), ("response", "Expected records"),
+    ("operating point", "operating_point is given")])
+def test_bad_input(rig: rt.System, old: list[rt.Record], what: str, message: str) -> None:
+    new: Any = record(91, **SIZES)
+    more: dict[str, Any] = {"reference": [*old, new]} if what == "seen" else {"reference": old}
+    if what == "operating point":
+        more["operating_point"] = {"heater": 10.0}
+    if what == "response":
+        more["reference"] = rt.identify.lpm(record(92, room=False, **SIZES))
+    with pytest.raises(rt.InputError, match=message):
+        rt.diagnose(rig, new, **more)
