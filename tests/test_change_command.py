@@ -1,4 +1,4 @@
-"""robthermal diagnose --reference: files of two days, exit status, report; the records come from scipy (two_days.py)."""
+"""robthermal diagnose --reference: files of two days, exit status, report; records from scipy (two_days.py)."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ def test_a_fan_that_stands_still(run: Run, folder: Path) -> None:
     assert json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))["reference"] == found["reference"]
     assert rt.read_system(out / "augmented.toml").parameter(FAN) == pytest.approx(0.4, rel=0.1)
     page = (out / "report.html").read_text(encoding="utf-8")
-    for words in ("Since the reference records: the conductance of link sink-room is", "% lower", "the new records falls",
-                  "scatter of healthy records", "Before: the model fitted to the reference records", "old3.csv"):
+    for words in ("Since the reference records: the conductance of link sink-room is", "% lower",
+                  "the new records falls", "scatter of healthy records",
+                  "Before: the model fitted to the reference records", "old3.csv"):
         assert words in page, words
     assert "The model lacks" not in page
 

@@ -45,7 +45,7 @@ SURFACE = {
         Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf mixed polytopic_feedback
     """,
     "diagnosis": """
-        Adequacy Candidate Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
+        Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
         JointCheck JointSelection Left
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder
         Response Scores ShortList Stability UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects

@@ -57,7 +57,7 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     Parameters
     ----------
     system : System
-        Nominal system.
+        Nominal system of all records.
     records, reference : Record or list of them
         The new ones, and those of the healthy machine.
     validation : Validation

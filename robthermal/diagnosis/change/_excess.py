@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
-from scipy.stats import t as t_distribution
+import scipy
 
 from ..fit import Refit
 from ._held import Held
@@ -64,14 +63,14 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
     logs = np.log([max(_variance(fit), _FREE / reference.scatter.inflation) for fit in each])
     freedom = COUNTS + n - 1
     spread = math.sqrt((COUNTS * _ASSUMED**2 + float(np.sum((logs - logs.mean()) ** 2))) / freedom * (1.0 + 1.0 / n))
-    limit = math.exp(float(t_distribution.isf(_SURE, freedom)) * spread)
+    limit = math.exp(float(scipy.stats.t.isf(_SURE, freedom)) * spread)
     structure = new.structure
     if not isinstance(structure, Held) or not structure.n_parameters:
         return Excess(_variance(new) / math.exp(float(logs.mean())), limit, 1.0)
     rows = slice(new.n_readings, new.n_readings + structure.n_priors)
     far = float(np.sum(new.z[rows] ** 2))
     return Excess(_variance(new) / math.exp(float(logs.mean())), limit,
-                  float(f_distribution.sf(far / structure.n_priors, structure.n_priors, freedom)))
+                  float(scipy.stats.f.sf(far / structure.n_priors, structure.n_priors, freedom)))
 
 
 def _variance(fit: Refit) -> float:

@@ -20,7 +20,7 @@ def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
     Parameters
     ----------
     system : System
-        Nominal system.
+        Nominal system of all records.
     ranges : Ranges
         Parameters that were fitted.
     """
@@ -59,7 +59,7 @@ def says_again(candidate: Candidate, system: System, ranges: Ranges) -> bool:
     candidate : Candidate
         Effect at a place.
     system : System
-        Nominal system.
+        Nominal system of all records.
     ranges : Ranges
         Parameters that were fitted.
     """

@@ -75,7 +75,7 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
     Parameters
     ----------
     system : System
-        Nominal system.
+        Nominal system of all records.
     records : Record or list of them
         Of the healthy machine.
     new : sequence of Record
@@ -140,7 +140,7 @@ def pinned(new: Refit) -> Refit:
     Parameters
     ----------
     new : Refit
-        From `held`.
+        Fit from `held`, without any change.
     """
     structure = new.structure
     if not isinstance(structure, Held) or not structure.n_parameters:

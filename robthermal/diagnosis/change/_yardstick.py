@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scipy.stats import f as f_distribution
+import scipy
 
 from ..effects import Candidate
 from ..evidence import Scores, score_candidates
@@ -54,16 +54,16 @@ def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> f
     dimension : int
         Quantities of the candidate.
     kappa : float
-        Its `inflation`.
+        Its `inflation` on reference records.
     n_reference : int
         Number of reference records.
     """
-    return float(f_distribution.sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
+    return float(scipy.stats.f.sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
 
 
 def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
     """Whether two candidates differ by no more than the scatter may make."""
-    return bool(difference < max(_LEAST, kappa * f_distribution.isf(_TIED, 1, COUNTS + n_reference - 1)))
+    return bool(difference < max(_LEAST, kappa * scipy.stats.f.isf(_TIED, 1, COUNTS + n_reference - 1)))
 
 
 def _held(candidate: Candidate) -> Candidate:

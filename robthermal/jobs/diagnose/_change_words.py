@@ -33,7 +33,7 @@ def change_in_words(found: Found) -> str:
     Parameters
     ----------
     found : Found
-        Accepted `parameter_change`.
+        An accepted `parameter_change`.
     """
     value, std, _ = found.values["relative"]
     names = " and ".join(map(parameter_in_words, found.where))
