@@ -15,10 +15,18 @@ from ._outcomes import DiagnosisCode
 from ._searching import coarsely_searched, validated
 from .evidence import NEEDED, SURE, Evidence, Gap, Stability, expected_rms, left, reproducible, score, stability
 from .fit import Refit, coarsened, exact
-from .search import Accepted, SearchState, ShortList, refit_short_list, revise, without
+from .search import (
+    ALIKE,
+    Accepted,
+    SearchState,
+    ShortList,
+    refit_short_list,
+    revise,
+    with_neighbors,
+    without,
+)
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
-_ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -122,10 +130,10 @@ def _with_rivals(state: SearchState, finer: Refit) -> SearchState:
     """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
 
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
-    was accepted.
+    was accepted; the same effect at neighboring lumps is added there.
     """
     if finer.structure.n_coarse:
-        return state
+        return replace(state, rounds=tuple(map(with_neighbors, state.rounds)))
     rounds = []
     for place, round_ in enumerate(state.rounds):
         less = without(state.fit, place, finer, round_.before)
@@ -139,7 +147,7 @@ def _with_rivals(state: SearchState, finer: Refit) -> SearchState:
 
 def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
     """Whether a rival does nearly all that the effect does: the model error decides between them, not the records."""
-    return less is not None and less.rss - rival.rss > _ALIKE * (less.rss - fit.rss)
+    return less is not None and less.rss - rival.rss > ALIKE * (less.rss - fit.rss)
 
 
 def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:

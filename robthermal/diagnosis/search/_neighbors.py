@@ -1,0 +1,67 @@
+"""A heat path that attaches to the neighboring lump: where a lump ends is the model's choice; both are one answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ...errors import Diverged, InputError
+from ...thermal import System
+from ..effects import Candidate, candidates
+from ..evidence import score_candidates
+from ..fit import Refit
+from ._decide import Accepted
+from ._short_list import Entry, refit_short_list
+
+ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
+
+
+def with_neighbors(round_: Accepted) -> Accepted:
+    """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
+
+    A path from the middle of a lump looks in a coarse network as if it came from between that lump and the next; the
+    sum of squares decides for one of them beyond every statistical doubt, and can be wrong.
+
+    Parameters
+    ----------
+    round_ : Accepted
+        Effect accepted beside a network that may be too coarse.
+    """
+    best, before = round_.best, round_.before
+    known = {entry.candidate.key for entry in round_.contenders}
+    near = [one for one in before.testable(candidates(before.structure.base, [best.candidate.effect.name]))
+            if one.key not in known and neighboring(before.structure.base, one, best.candidate)]
+    if not near:
+        return round_
+    own = next((one for one in candidates(before.structure.base, [best.candidate.effect.name])
+                if one.key == best.candidate.key), best.candidate)
+    try:
+        short = refit_short_list(before, score_candidates(before, [own, *near]))
+    except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
+        return round_
+    alike = [entry for entry in _nearly_best(before, short.entries) if entry.candidate.key != best.candidate.key]
+    return replace(round_, contenders=(*round_.contenders, *alike))
+
+
+def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
+    """Whether a heat path is another one with a single lump exchanged for a neighbor of it.
+
+    Parameters
+    ----------
+    system : System
+        Network with the links that make neighbors.
+    one, other : Candidate
+        Candidates of the same effect.
+    """
+    nodes = {*system.lumps, *system.ambients}
+    if one.effect.name != other.effect.name or not all(len(at.where) == 2 and nodes >= set(at.where)
+                                                       for at in (one, other)):
+        return False
+    exchanged = set(one.where) ^ set(other.where)
+    return exchanged <= set(system.lumps) and any(set(link.between) == exchanged for link in system.links)
+
+
+def _nearly_best(before: Refit, entries: Sequence[Entry]) -> list[Entry]:
+    """Entries that reach most of the decrease that the best of them reaches."""
+    most = before.rss - min((entry.fit.rss for entry in entries), default=before.rss)
+    return [entry for entry in entries if before.rss - entry.fit.rss > ALIKE * most]

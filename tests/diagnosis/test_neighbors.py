@@ -1,0 +1,97 @@
+"""The same effect at a neighboring lump: a bar of 60 cells, by scipy's matrix exponential, against five lumps."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import robthermal as rt
+from robthermal.diagnosis.fit import Refit, coarsened
+from robthermal.diagnosis.search import Accepted, decide, refit_short_list, with_neighbors
+from robthermal.diagnosis.search._neighbors import neighboring
+
+H, N, CELLS, LUMPS, ROOM = 10.0, 400, 60, 5, 296.0
+
+
+def bar() -> rt.System:
+    """What a user draws: lumps of 30 J/K, 0.8 W/K between them, 0.05 W/K to the room."""
+    links = [{"between": (f"x{i}", f"x{i + 1}"), "conductance": 0.8} for i in range(1, LUMPS)]
+    links += [{"between": (f"x{i}", "room"), "conductance": 0.05} for i in range(1, LUMPS + 1)]
+    values = {f"links.{'-'.join(one['between'])}.conductance": one["conductance"] for one in links}
+    return rt.System(ambients={"room": {"temperature": ROOM}}, links=links,
+                     lumps={f"x{i}": {"capacity": 30.0} for i in range(1, LUMPS + 1)}, inputs={"q": {"lump": "x1"}},
+                     sensors={f"T{i}": {"lump": f"x{i}", "noise": 0.005} for i in (1, 2, 4, 5)},
+                     fit={name: {"lower": G / 5, "upper": 5 * G, "sigma": 0.2 * G} for name, G in values.items()})
+
+
+@cache
+def measured(cell: int) -> rt.Record:
+    """The bar of 60 cells with a path of 0.2 W/K from a cell to the middle of the last lump."""
+    C, K = 30.0 * LUMPS / CELLS, np.zeros((CELLS, CELLS))
+    pairs = [(i, i + 1, 0.8 * CELLS / LUMPS) for i in range(CELLS - 1)] + [(cell, 53, 0.2)]
+    for i, j, G in pairs:
+        K[[i, j], [i, j]] -= G
+        K[[i, j], [j, i]] += G
+    K -= np.eye(CELLS) * 0.05 * LUMPS / CELLS
+    heated = np.zeros((CELLS, 1))
+    heated[:12] = 1.0 / 12
+    M = expm(H / C * np.block([[K, heated], [np.zeros((1, CELLS + 1))]]))
+    rng = np.random.default_rng(1)
+    q = np.repeat(rng.uniform(0.0, 6.0, N // 20), 20)
+    T, rows = np.zeros(CELLS), []
+    for k in range(N):
+        rows.append([T[12 * i - 7:12 * i - 5].mean() for i in (1, 2, 4, 5)])
+        T = M[:CELLS, :CELLS] @ T + M[:CELLS, CELLS] * q[k]
+    return rt.Record(sample_time=H, inputs=q, outputs=ROOM + np.array(rows) + 0.005 * rng.standard_normal((N, 4)),
+                     input_names=["q"], output_names=["T1", "T2", "T4", "T5"])
+
+
+@cache
+def finer(cell: int) -> Refit:
+    return coarsened(rt.diagnosis.refit(bar(), measured(cell)))
+
+
+def found(cell: int) -> Accepted:
+    before = finer(cell)
+    decision = decide(refit_short_list(before, rt.diagnosis.score(before, ["missing_link"])))
+    assert isinstance(decision, Accepted)
+    return decision
+
+
+def names(round_: Accepted) -> set[frozenset[str]]:
+    return {frozenset(entry.candidate.where) for entry in (round_.best, *round_.contenders)}
+
+
+def test_a_path_from_between_two_lumps_has_two_names():
+    """From cell 16, between the middles of the first lump (6) and of the second (18)."""
+    one = found(16)
+    both = with_neighbors(one)
+    assert {frozenset({"x1", "x5"}), frozenset({"x2", "x5"})} <= names(both)
+    assert both.best is one.best and names(one) == {frozenset(one.best.candidate.where)}
+    assert all(neighboring(bar(), entry.candidate, one.best.candidate) for entry in both.contenders)
+
+
+def test_a_path_from_the_middle_of_a_lump_keeps_its_name():
+    assert names(with_neighbors(found(18))) == {frozenset({"x2", "x5"})}
+
+
+@pytest.mark.parametrize(("one", "other", "answer"), [
+    (("x1", "x5"), ("x2", "x5"), True), (("x1", "x5"), ("x5", "x2"), True), (("x1", "x5"), ("x3", "x5"), False),
+    (("x1", "x5"), ("x2", "x4"), False), (("x1", "x5"), ("x1", "x5"), False), (("x1", "x5"), ("x1", "room"), False)])
+def test_neighbors_differ_by_one_link(one: tuple[str, str], other: tuple[str, str], answer: bool):
+    places = {key: candidate for candidate in rt.diagnosis.candidates(bar(), ["missing_link"])
+              for key in (candidate.where, candidate.where[::-1])}
+    link = next(iter(places.values()))
+    a, b = (places.get(where) or type(link)(link.effect, where) for where in (one, other))
+    assert neighboring(bar(), a, b) is answer
+
+
+@pytest.mark.parametrize("effect", ["sensor_lag", "hidden_mass"])
+def test_only_heat_paths_have_neighbors(effect: str):
+    """A mass or a sensor acts at one place."""
+    places = rt.diagnosis.candidates(bar(), [effect])
+    assert len(places) >= 4
+    assert not any(neighboring(bar(), a, b) for a in places for b in places)
