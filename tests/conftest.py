@@ -19,6 +19,8 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]  # what
 
 from commands import Run, command  # noqa: E402
 
+DRAW = vars(rt.report.Figure)["draw"]
+
 
 @pytest.fixture(autouse=True)
 def _close_figures() -> Iterator[None]:
@@ -47,6 +49,12 @@ def sketched() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rt.report.Figure, "draw", classmethod(frame))
         yield
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are turned into SVG, in a test of a file whose figures are `sketched`."""
+    monkeypatch.setattr(rt.report.Figure, "draw", DRAW)
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ from rich.console import Console
 import robthermal as rt
 from robthermal.cli.terminal import duration, progress, progress_bar
 
+pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
 CHILD = "import robthermal.cli; print('ready', flush=True); robthermal.cli.main()"
 COMMANDS = ["demo", "run", "check", "simulate", "calibrate", "frf", "excitation", "design", "map", "certify",

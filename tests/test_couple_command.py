@@ -169,6 +169,7 @@ class TestYes:
         assert frf.response[0, 1, 0] == 102 + 103j and frf.response[1, 0, 1] == 204 + 205j
 
 
+@pytest.mark.usefixtures("sketched")
 def test_measured_in_closed_loop_is_said_to_be_a_statement(tmp_path: Path) -> None:
     """Without the statement nothing of it is said."""
     said = {}
@@ -180,6 +181,7 @@ def test_measured_in_closed_loop_is_said_to_be_a_statement(tmp_path: Path) -> No
     assert "measured_in_closed_loop" not in said["false"]
 
 
+@pytest.mark.usefixtures("sketched")
 class TestNo:
     def test_a_limit_that_cannot_be_met(self, run: Any, tmp_path: Path) -> None:
         out = tmp_path / "out"

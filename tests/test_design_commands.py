@@ -21,6 +21,7 @@ from robthermal.errors import InputError
 from robthermal.jobs.design._file import design_numbers
 from robthermal.jobs.design._limits import check_given, contain, worst_runaway
 
+pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
 
 BENCH = """
@@ -369,6 +370,7 @@ def test_design_needs_modules(run: Run, tmp_path: Path) -> None:
         assert said.status == 2 and "no thermoelectric module" in said.err
 
 
+@pytest.mark.usefixtures("drawn")
 def test_map_writes_data_plot_and_certificate(run: Run, file: Path, bench: rt.System, tmp_path: Path,
                                               fold: rt.thermal.LoadCurve) -> None:
     said = run("map", file, "--ambient", "22", "--load", "0,9,2", "--setpoint", "12", "--json", "--out",

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 import robthermal as rt
 
+pytestmark = pytest.mark.usefixtures("sketched")
 H, DWELL = 5.0, 20
 FILES = ["augmented.toml", "diagnosis.json", "junit.xml", "report.html", "report.json", "summary.json"]
 SYSTEM = """
@@ -160,6 +161,7 @@ class TestNamed:
         assert "ertified" not in page and "CERTIFIED" not in page and "robthermal verify" not in page
 
 
+@pytest.mark.usefixtures("drawn")
 def test_consistent_is_yes(run: Run, files: Any, tmp_path: Path) -> None:
     system, train, validation = files(nothing)
     out = tmp_path / "out"

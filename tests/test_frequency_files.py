@@ -12,6 +12,8 @@ from commands import Run, Said
 
 import robthermal as rt
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.fixture
 def run(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:

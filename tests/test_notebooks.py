@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
@@ -40,12 +41,25 @@ def test_stored_without_outputs_for_any_python(path: Path) -> None:
     assert any(line.startswith("assert ") for cell in code for line in cell.source.splitlines())
 
 
+@pytest.fixture(scope="module")
+def kernel() -> Iterator[NotebookClient]:
+    """One process for all notebooks, so that what they import is loaded once."""
+    with pytest.MonkeyPatch.context() as patch:
+        # The kernel is a process of its own: it must find this checkout, and draw into the notebook.
+        patch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])))
+        patch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+        # python3 is the kernel of the running interpreter, whatever the notebook was last edited with.
+        client = NotebookClient(nbformat.v4.new_notebook(), kernel_name="python3", timeout=PATIENCE)
+        with client.setup_kernel():
+            yield client
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=by_name)
-def test_runs_and_its_assertions_hold(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # The kernel is a process of its own: it must find this checkout, and draw into the notebook.
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])))
-    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
-    # python3 is the kernel of the running interpreter, whatever the notebook was last edited with.
-    here = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(read(path), kernel_name="python3", timeout=PATIENCE, resources=here).execute()
+def test_runs_and_its_assertions_hold(path: Path, kernel: NotebookClient, tmp_path: Path) -> None:
+    afresh = f"%reset -f\nimport os\nos.chdir({str(tmp_path)!r})\ndel os"  # no name of an earlier notebook is left
+    kernel.nb = read(path)
+    kernel.nb.cells.insert(0, nbformat.v4.new_code_cell(afresh))
+    kernel.reset_execution_trackers()
+    for index, cell in enumerate(kernel.nb.cells):
+        kernel.execute_cell(cell, index)  # raises what the cell raises
     assert not list(tmp_path.iterdir()), "a tutorial leaves no files behind"

@@ -133,8 +133,10 @@ def test_former_name_of_the_jobs_has_the_same_objects() -> None:
 
 
 def test_former_name_of_the_jobs_is_imported_as_before() -> None:
+    """In a process that has imported nothing; the second checker is not among what is then loaded."""
     code = "import robthermal.project as p, robthermal as rt; from robthermal.project import run_job; " \
-           "assert rt.project is p and run_job is rt.jobs.run_job"
+           "assert rt.project is p and run_job is rt.jobs.run_job; " \
+           "import sys, robthermal.verification; assert 'recheck' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -16,6 +16,7 @@ import robthermal as rt
 from robthermal.jobs.claims._assumptions import KIND_ASSUMPTIONS
 from robthermal.verification._kinds import KINDS
 
+pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
 MADE_AGAIN = ("report.html", "junit.xml", "summary.json")
 DATE = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")

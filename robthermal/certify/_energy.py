@@ -12,6 +12,7 @@ from scipy.sparse.linalg import ArpackError, eigsh
 from ._jacobian import BoxJacobian
 
 _DENSE = 300
+_ENTRIES = 1_000_000  # of the matrices whose eigenvalues are computed at once
 _EVERY = 4096  # joint vertices; beyond, the worst one is searched block by block
 
 
@@ -35,7 +36,7 @@ def energy_rate(box: BoxJacobian) -> float:
         return _sparse_rate(csc_array(base), [nodes for nodes, _ in blocks], options)
     dense = base.toarray()
     if np.prod([len(o) for o in options], dtype=float) <= _EVERY:
-        worst = max(_top(dense, blocks, choice) for choice in product(*options))
+        worst = _largest(dense, blocks, list(product(*options)))
     else:
         worst = _search(dense, blocks, options)
     return -worst
@@ -59,6 +60,18 @@ def _undominated(values: np.ndarray) -> list[np.ndarray]:
         if not len(others) or np.linalg.eigvalsh(others - M)[:, 0].max() < 0:
             keep.append(M)
     return keep
+
+
+def _largest(dense: np.ndarray, blocks: list, choices: list) -> float:
+    """Largest eigenvalue of all choices of vertices, many matrices at a time."""
+    worst, many = -np.inf, max(1, _ENTRIES // dense.size)
+    for first in range(0, len(choices), many):
+        some = choices[first:first + many]
+        M = np.repeat(dense[None], len(some), axis=0)
+        for k, (nodes, _) in enumerate(blocks):
+            M[(slice(None), *np.ix_(nodes, nodes))] += np.array([choice[k] for choice in some])
+        worst = max(worst, float(np.linalg.eigvalsh(M)[:, -1].max()))
+    return worst
 
 
 def _top(dense: np.ndarray, blocks: list, choice: tuple) -> float:

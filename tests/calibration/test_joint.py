@@ -83,7 +83,7 @@ def test_information_of_the_record_is_that_of_own_derivatives() -> None:
 def test_ranges_cover_the_truth_and_the_estimates_are_those_of_least_variance() -> None:
     """95 % ranges of both kinds together, 40 repetitions, bound at a chance of 0.1 %; scatter as stated."""
     count, truth = 40, np.array(list(TRUTH.values()))
-    fits = [rt.calibrate(system(), [record(2 * k, 120), response(2 * k + 1, 300)], parameters=RANGES)
+    fits = [rt.calibrate(system(**TRUTH), [record(2 * k, 120), response(2 * k + 1, 300)], parameters=RANGES)
             for k in range(count)]
     inside = sum(all(low <= TRUTH[name] <= high for name, (low, high) in fit.ranges(0.95).items()) for fit in fits)
     assert inside >= binom.ppf(1e-3, count, 0.95)

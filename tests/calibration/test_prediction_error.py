@@ -48,8 +48,9 @@ def start(**options: float) -> rt.System:
 
 def test_prediction_error_scatters_less_and_its_intervals_cover() -> None:
     estimates, deviations = {}, {}
+    records = runs(40)
     for method in ("output_error", "prediction_error"):
-        fits = [rt.calibrate(start(), run, parameters=RANGES, method=method) for run in runs(40)]
+        fits = [rt.calibrate(plant(), run, parameters=RANGES, method=method) for run in records]
         assert all(fit.outcome.ok for fit in fits)
         estimates[method] = np.array([list(fit.parameters.values()) for fit in fits])
         deviations[method] = np.array([list(fit.std.values()) for fit in fits])

@@ -79,7 +79,7 @@ def test_pom_conductivity_is_recovered_within_its_uncertainty() -> None:
 
 
 def test_intervals_cover_although_bins_share_data() -> None:
-    fits = [rt.calibrate(started(), rt.identify.lrmp(record(seed, 500), poles=pole_list()), parameters=RANGES)
+    fits = [rt.calibrate(bar(), rt.identify.lrmp(record(seed, 500), poles=pole_list()), parameters=RANGES)
             for seed in range(30)]
     truth = np.array([bar().parameter(POM[0]), bar().parameter(FILMS[0])])
     estimates = np.array([list(fit.parameters.values()) for fit in fits])

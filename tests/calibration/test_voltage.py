@@ -41,10 +41,9 @@ def test_the_rig_of_algorithm_1_gives_its_module(clean: np.ndarray) -> None:
 
 def test_ranges_cover_the_truth(clean: np.ndarray) -> None:
     """60 logs: a 95 % interval of every parameter covers as a 95 % interval does (two-sided test, 1 in 1000)."""
-    start = system().with_parameters(START)
     inside = dict.fromkeys(NAMES, 0)
     for seed in range(60):
-        fit = rt.calibrate(start, measured(clean, seed), parameters=RANGES)
+        fit = rt.calibrate(system(), measured(clean, seed), parameters=RANGES)
         for name, (true, _, _) in NAMES.items():
             inside[name] += abs(fit.parameters[name] - TRUE[true]) < 1.96 * fit.std[name]
     assert {name: binomtest(count, 60, 0.95).pvalue > 1e-3 for name, count in inside.items()} == dict.fromkeys(

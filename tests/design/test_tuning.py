@@ -48,7 +48,7 @@ def test_ranges_cost_bandwidth(law):
 
 
 @pytest.mark.parametrize(("lag", "delay", "sample_time", "regulate", "words"), [
-    (400.0, 0.0, 1.0, REGULATE, "the lag of T_plate"), (0.0, 120.0, 1.0, REGULATE, "the delay of T_plate"),
+    (400.0, 0.0, 1.0, REGULATE, "the lag of T_plate"), (0.0, 120.0, 5.0, REGULATE, "the delay of T_plate"),
     (0.0, 0.0, 1.0, {"m1": "plate"}, "the network between stage and plate"),
     (20.0, 0.0, 20.0, None, "the sample time")])
 def test_what_limits_the_loop_is_named(lag, delay, sample_time, regulate, words):

@@ -18,6 +18,8 @@ from robthermal import cli
 from robthermal._digits import inward, outward
 from robthermal.jobs.run._misfit import misfit
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 def bar(folder: Path, *, off: float = 0.0, project: str = PROJECT, system: str = SYSTEM) -> rt.jobs.run.JobResult:
     """The main job on a bar in a room, in closed form; the validation record is `off` kelvin too warm [K]."""

@@ -81,8 +81,3 @@ def test_certificates_in_memory_and_files_are_judged_alike(files):
     by_file, in_memory = rt.jobs.verify.second_verdicts([files["good"], certificate])
     assert by_file and in_memory and by_file == in_memory
     assert not rt.jobs.verify.second_verdicts([files["bad"]])[0]
-
-
-def test_robthermal_does_not_import_it():
-    code = "import sys, robthermal, robthermal.jobs, robthermal.verification; sys.exit('recheck' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
