@@ -103,7 +103,13 @@ def file(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def nonlinear() -> rt.jobs.design.ControllerDesign:
+def without_linearity(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The steps that show how linear a loop is take half of a small design: computed where they are looked at."""
+    monkeypatch.setattr("robthermal.jobs.design._design._collapse", lambda *given: None)
+
+
+@pytest.fixture
+def nonlinear(without_linearity: None) -> rt.jobs.design.ControllerDesign:
     """With natural convection, heater, offset and gain of a sensor: everything that design.json can hold."""
     text = BENCH.replace('between = ["stage", "part"]',
                          'between = ["stage", "part"]\nnatural = { gain = 0.01, exponent = 0.25 }\nradiation = 1e-10')
@@ -160,6 +166,7 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -
     assert page.count("<svg") >= 4 and "How linear the loop is" in page
 
 
+@pytest.mark.usefixtures("without_linearity")
 def test_a_distant_sensor_is_regulated(run: Run, file: Path, tmp_path: Path) -> None:
     """The set-point is what the lagging sensor on the part reads; the report and the file say what is regulated."""
     said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--bandwidth", "0.01", "--sample-time",
@@ -298,6 +305,7 @@ def test_the_worst_ambient_counts(bench: rt.System) -> None:
     assert [float(value) for value in ambient] == [288.15, 308.15]
 
 
+@pytest.mark.usefixtures("without_linearity")
 def test_a_set_point_that_needs_more_than_the_usable_current_is_not_certified(bench: rt.System, tmp_path: Path) -> None:
     """60 °C needs more heating than the box that is never left allows: the design is written, its claim fails."""
     request = rt.jobs.design.design_from_text(bench, setpoint=["m1=60"], bandwidth=0.05, sample_time=2.0)
@@ -315,6 +323,7 @@ def test_currents_beyond_the_usable_one_are_refused_with_it(bench: rt.System) ->
         rt.jobs.design_system(bench, request)
 
 
+@pytest.mark.usefixtures("without_linearity")
 def test_not_certified_is_an_answer(run: Run, tmp_path: Path) -> None:
     """A conductance that would be negative at -20 °C: nothing contracts there. Status 1, and a folder that says why."""
     (tmp_path / "steep.toml").write_text(BENCH.replace("slope = 0.0005", "slope = 0.01"), encoding="utf-8")
@@ -425,6 +434,7 @@ def test_request_refuses_a_module_without_set_point() -> None:
         rt.jobs.design.design_from_text(rt.systems.two_module(), setpoint=["m1=5"])
 
 
+@pytest.mark.usefixtures("without_linearity")
 def test_margins_over_parameter_ranges_are_reported(run: Run, file: Path, tmp_path: Path) -> None:
     """Tuned by margins for all corners: design.json, summary.json and report; nominal and robust side by side."""
     said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--margin", "phase=50", "--margin",
@@ -446,6 +456,7 @@ def test_margins_over_parameter_ranges_are_reported(run: Run, file: Path, tmp_pa
     assert run("verify", tmp_path / "out").status == 0
 
 
+@pytest.mark.usefixtures("without_linearity")
 def test_a_missed_margin_fails_with_the_best_bandwidth(run: Run, file: Path, tmp_path: Path) -> None:
     said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--margin", "phase=60", "--bandwidth",
                "0.04", "--sample-time", "2", "--out", tmp_path / "out")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -196,6 +197,14 @@ def test_a_coupling_takes_identified_responses(tmp_path: Path, run: Run) -> None
     project.write_text(text.replace('frf_2 = ["identify.one"]', 'frf_2 = ["identify.two"]'))
     said = run("run", project, "--out", out)
     assert said.status == 2 and "there is no response 'identify.two'" in said.err and "identify.one" in said.err
+
+
+@pytest.fixture(scope="module", autouse=True)
+def without_linearity() -> Iterator[None]:
+    """The steps that show how linear a loop is take half of a small design; tests/test_design_commands.py has them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robthermal.jobs.design._design._collapse", lambda *given: None)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -34,14 +34,14 @@ def test_one_lump_is_the_exponential():
 @pytest.mark.parametrize("make", [lambda full: full, lambda full: rt.systems.two_module()])
 def test_agrees_with_a_tight_integrator(full, drive, make):
     system = make(full)
-    record = drive(60, system=system)
+    record = drive(30, system=system)
     start = np.linspace(295, 300, len(system.lumps))
     run = rt.thermal.trajectory(system, record, initial=start)
     assert np.abs(run.lumps - reference(system, record, start)).max() < 1e-5
 
 
 def test_long_samples_are_refined_until_the_tolerance_is_met(full, drive):
-    record = drive(12, sample_time=300.0)
+    record = drive(6, sample_time=300.0)
     run = rt.thermal.trajectory(full, record)
     assert np.abs(run.lumps - reference(full, record, run.lumps[0])).max() < 1e-3
 
@@ -97,7 +97,7 @@ offset = -0.2
 
 
 def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
-    record = drive(24)
+    record = drive(14)
     full = full.with_parameters({"lumps.plate.initial": 296.0})
     names = [name for name in full.parameter_names if not name.endswith((".noise", ".disturbance"))
              and not (name.endswith((".time_constant", ".delay")) and full.parameter(name) == 0)]  # one-sided below
