@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis.evidence._hold_out import (
-    _filters,
-    _own_unknowns,
-    negative_log_predictive_density,
-    validation_data,
-)
+from robthermal.diagnosis.evidence import negative_log_predictive_density, validation_data
+from robthermal.diagnosis.evidence._hold_out import _filters, _own_unknowns
 from robthermal.diagnosis.fit import Refit
 from robthermal.diagnosis.search import without_contradicted
 

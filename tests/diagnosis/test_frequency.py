@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import robthermal as rt
-from robthermal.diagnosis.data._frequency_data import response_data
+from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.evidence._frequency_tails import inflation, relative_degrees_of_freedom, tail
 from robthermal.diagnosis.path._linearized_response import slope
 from robthermal.fitting import as_complex, as_real
@@ -139,7 +139,7 @@ def test_whitener_makes_the_errors_of_the_estimate_white(plant: rt.System, recor
     smooth, rough = [], []
     for _ in range(80):
         G = rt.identify.lpm(record.with_outputs(rng.standard_normal((240, 2))), degree=1, half_width=10)
-        data = response_data(plant, G, "records", {})
+        data = as_measured(plant, G, "records")[0]
         n = len(data.index)
         law = np.cos(np.pi * np.outer(np.arange(n) + 0.5, np.arange(n)) / n) * np.sqrt(2.0 / n)  # of unit length
         part = np.einsum("kf,pkm->pfm", law, data.white(data.readings).reshape(2, n, -1)) ** 2
@@ -150,7 +150,7 @@ def test_whitener_makes_the_errors_of_the_estimate_white(plant: rt.System, recor
 
 
 def test_whitening_of_known_noise_is_exact(plain: rt.identify.FrequencyResponse, plant: rt.System) -> None:
-    data = response_data(plant, plain, "records", {})
+    data = as_measured(plant, plain, "records")[0]
     n, m = data.white.roots.shape[:2]
     index, factor = kept_bins(plain, np.flatnonzero(~plain.suspect)[20:], np.array([0, 1]))
     s = factor @ factor.conj().T
