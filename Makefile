@@ -5,7 +5,8 @@ PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-# Tests run in two processes; one BLAS thread each keeps them from fighting for the cores.
+# Tests run in two processes, each file in one of them, so that what a file shares is made once; one BLAS thread each
+# keeps them from fighting for the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
 .DELETE_ON_ERROR:
@@ -35,13 +36,13 @@ demo: $(VENV)/.installed
 	$(BIN)/robthermal demo --out build/demo
 
 test: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist worksteal
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile
 
 quick: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal $(QUICK)
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist loadfile $(QUICK)
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -265,24 +265,33 @@ class Equations:
             [W/K], [W/unit, W/A, W/K].
         """
         x, u = np.asarray(x), np.asarray(u)
-        n, n_u = self._dense[1].shape
-        at = [np.tile(part, (*x.shape[:-1], 1, 1)) for part in self._dense]
-        to_column = self.drives.ambients.start - n
-        for term in self.terms:
+        n = len(self.capacity)
+        both = np.tile(self._linear.ravel(), (*x.shape[:-1], 1))
+        for term, (kept, into) in zip(self.terms, self._entries, strict=True):
             s = term.slopes(*self.ends(term, x, u))
-            for own, other, slope in ((term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
-                                      (term.b, term.b, s.bb)):
-                for k in np.flatnonzero(own < n):
-                    into, column = (0, other[k]) if other[k] < n else (1, other[k] + to_column)
-                    at[into][..., own[k], column] += slope[..., k]
-            for own, slope in ((term.a, s.a_drive), (term.b, s.b_drive)) if term.drive.size else ():
-                for k in np.flatnonzero((own < n) & (term.drive < n_u)):
-                    at[1][..., own[k], term.drive[k]] += slope[..., k]
-        return at[0], at[1] * self.drives.slopes(u)[..., None, :]
+            slopes = [s.aa, s.ab, s.ba, s.bb, *((s.a_drive, s.b_drive) if term.drive.size else ())]
+            np.add.at(both, (..., into), np.concatenate(slopes, axis=-1)[..., kept])
+        both = both.reshape(*x.shape[:-1], *self._linear.shape)
+        return both[..., :n], both[..., n:] * self.drives.slopes(u)[..., None, :]
 
     @cached_property
-    def _dense(self) -> tuple[Array, Array]:
-        return self.A.toarray(), self.B.toarray()
+    def _linear(self) -> Array:
+        """[A B] as a dense array, (n, n + n_u)."""
+        return np.hstack([self.A.toarray(), self.B.toarray()])
+
+    @cached_property
+    def _entries(self) -> list[tuple[Indices, Indices]]:
+        """For every term: which of its slopes, in the order of `jacobians`, lie in [∂f/∂x ∂f/∂u], and where, flat."""
+        n, width = self._linear.shape
+        ambient, found = self.drives.ambients.start, []  # a node from n on is an ambient; column n of both is u's first
+        for t in self.terms:
+            rows = [t.a, t.a, t.b, t.b, *([t.a, t.b] if t.drive.size else [])]
+            nodes = [np.where(node < n, node, node + ambient) for node in (t.a, t.b, t.a, t.b)]
+            columns = [*nodes, *([t.drive + n, t.drive + n] if t.drive.size else [])]
+            row, column = np.concatenate(rows), np.concatenate(columns)
+            kept = np.flatnonzero((row < n) & (column < width))
+            found.append((kept, row[kept] * width + column[kept]))
+        return found
 
     def rate(self, x: ArrayLike, u: ArrayLike) -> Array:
         """ẋ = E⁻¹ f(x, u).
