@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -270,7 +270,8 @@ class Equations:
         for term, (kept, into) in zip(self.terms, self._entries, strict=True):
             s = term.slopes(*self.ends(term, x, u))
             slopes = [s.aa, s.ab, s.ba, s.bb, *((s.a_drive, s.b_drive) if term.drive.size else ())]
-            np.add.at(both, (..., into), np.concatenate(slopes, axis=-1)[..., kept])
+            place: Any = (..., into)
+            np.add.at(both, place, np.concatenate(slopes, axis=-1)[..., kept])
         both = both.reshape(*x.shape[:-1], *self._linear.shape)
         return both[..., :n], both[..., n:] * self.drives.slopes(u)[..., None, :]
 
