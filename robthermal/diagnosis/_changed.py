@@ -102,9 +102,9 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     excess = excess_of(fit, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
     verdict, outcome = _verdict(found, excess, gaps, _bare(fit, healthy))
-    rest = verdict in ("named_with_remainder", "ambiguous")
+    found_some = verdict in ("named", "named_with_remainder", "ambiguous")
     return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
-                  plain=exact(fit) if rest else None)
+                  plain=exact(fit) if found_some else None)
 
 
 def _refuse_same(reference: Sequence[DataSet], new: Sequence[DataSet]) -> None:
@@ -133,7 +133,7 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], bare: bool) -> 
         return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
     if any(map(alternatives, found.rounds)):
         return "ambiguous", DiagnosisCode.AMBIGUOUS.outcome("The new records cannot distinguish some changes.")
-    if reasons or not bare:
+    if (reasons or not bare) and any(left(gap).rms for gap in gaps):
         return "named_with_remainder", DiagnosisCode.NAMED_WITH_REMAINDER.outcome(
             "One change explains what is outside the scatter of the reference records; what is left beyond the noise "
             f"is stated, and has no name. {reasons}".rstrip())

@@ -140,7 +140,8 @@ def concluded(judged: Judged) -> Diagnosis:
     if judged.hold_out is not None:
         gap["validation"] = judged.hold_out.gap
     where = locate(nominal)
-    rest = _beyond_noise(fit, gap) if unexplained or judged.plain is not None else None
+    with_rest = unexplained or (judged.plain is not None and judged.verdict != "named")
+    rest = _beyond_noise(fit, gap) if with_rest else None
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),

@@ -36,6 +36,8 @@ def fan(rig: rt.System, old: list[rt.Record]) -> rt.diagnosis.Diagnosis:
 
 def test_a_fan_that_stands_still_is_named(fan: rt.diagnosis.Diagnosis) -> None:
     assert fan.verdict in ("named", "named_with_remainder") and fan.outcome.ok
+    assert (fan.remainder is None) == (fan.verdict == "named")
+    assert fan.gap["train"].noise == pytest.approx(0.05, rel=0.02)  # what the scatter allows for is not in it
     (found,) = fan.effects
     value, std, unit = found.values["relative"]
     assert (found.effect, found.where, unit) == ("parameter_change", (FAN,), "")
@@ -63,6 +65,7 @@ def test_a_loose_contact_is_named(rig: rt.System, old: list[rt.Record]) -> None:
     assert [one.where for one in found.effects] == [("links.block-plate.conductance",)]
     value, std, _ = found.effects[0].values["relative"]
     assert abs(value + 0.4) < 3 * std
+    assert (found.remainder is None) == (found.verdict == "named")
 
 
 def test_a_sensor_that_has_drifted_is_named(rig: rt.System, old: list[rt.Record]) -> None:
