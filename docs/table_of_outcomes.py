@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from robthermal.errors import OutcomeCode
-from robthermal.jobs.explain import outcome_codes, package_of
+from robthermal.jobs.explanations import outcome_codes, package_of
 
 PAGE = Path(__file__).resolve().parent / "explanations" / "outcomes.md"
 ANSWER = {True: "yes", False: "no", None: "depends"}

@@ -20,9 +20,9 @@ from .jobs.diagnose import Residuals as Residuals
 from .jobs.diagnose import ResponseResiduals as ResponseResiduals
 from .jobs.diagnose import diagnose_records as diagnose_records
 from .jobs.diagnose import write_diagnosis as write_diagnosis
-from .jobs.explain import Explanation as Explanation
-from .jobs.explain import explain as explain
-from .jobs.explain import explainable as explainable
+from .jobs.explanations import Explanation as Explanation
+from .jobs.explanations import explain as explain
+from .jobs.explanations import explainable as explainable
 from .jobs.folder import check_free as check_free
 from .jobs.folder import output_folder as output_folder
 from .jobs.map import MapRequest as MapRequest

@@ -11,7 +11,7 @@ import pytest
 
 import robthermal as rt
 from robthermal.errors import InputError, Outcome, OutcomeCode
-from robthermal.jobs.explain import outcome_codes, package_of
+from robthermal.jobs.explanations import outcome_codes, package_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "robthermal"

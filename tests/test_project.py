@@ -179,13 +179,28 @@ def test_unknown_top_level_name_is_an_attribute_error() -> None:
 
 
 def test_type_checkers_see_the_lazy_names() -> None:
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    assert _guarded(PACKAGE) == {**rt._HOME, **dict.fromkeys((*PACKAGES, *rt._FORMER))}
+    assert _guarded(PACKAGE / "jobs") == {**rt.jobs._HOME, **dict.fromkeys(rt.jobs._PACKAGES)}
+
+
+def _guarded(package: Path) -> dict[str, str | None]:
+    """Names that a package imports for type checkers, with the package inside that each comes from."""
+    tree = ast.parse((package / "__init__.py").read_text(encoding="utf-8"))
     guard = next(node for node in tree.body if isinstance(node, ast.If))
     seen: dict[str, str | None] = {}
     for node in guard.body:
         assert isinstance(node, ast.ImportFrom)
         seen |= {alias.name: node.module and node.module.split(".")[0] for alias in node.names}
-    assert seen == {**rt._HOME, **dict.fromkeys((*PACKAGES, *rt._FORMER))}
+    return seen
+
+
+def test_every_job_loads_and_is_the_one_of_its_package() -> None:
+    inside = {path.stem for path in (PACKAGE / "jobs").iterdir() if not path.name.startswith("_")}
+    assert set(rt.jobs._PACKAGES) == inside
+    for name in (*rt.jobs._PACKAGES, *rt.jobs.__all__):
+        assert getattr(rt.jobs, name) is not None
+    for name, package in rt.jobs._HOME.items():
+        assert getattr(rt.jobs, name) is getattr(import_module(f"robthermal.jobs.{package}"), name)
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
 import robthermal as rt
+
+MACHINE = Path(rt.__file__).parent / "systems" / "two_module.toml"
 
 SURFACE = {
     "robthermal": """
@@ -124,7 +127,7 @@ def test_every_package_is_listed() -> None:
 def test_former_name_of_the_jobs_has_the_same_objects() -> None:
     inside = [getattr(rt.jobs, name) for name in ("certify", "claims", "couple", "design", "diagnose", "folder", "map",
                                                   "measured", "request", "run", "verify")]
-    explained = sys.modules["robthermal.jobs.explain"]  # rt.jobs.explain is the function
+    explained = sys.modules["robthermal.jobs.explanations"]  # rt.jobs.explain is the function
     assert len(rt.project.__all__) > 20
     for name in rt.project.__all__:
         homes = [module for module in (rt.jobs, explained, *inside) if hasattr(module, name)]
@@ -168,4 +171,15 @@ def test_packages_load_no_more_than_they_need(package: str, unused: tuple[str, .
     code = f"import sys, robthermal.{package}; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True
                                 ).stdout.split())
+    assert not loaded & set(unused)
+
+
+@pytest.mark.parametrize(("command", "unused"), [
+    (["--help"], ("numpy", "scipy", "pandas", "pydantic", "robthermal.thermal")),
+    (["check", str(MACHINE)], (*_ON_FIRST_USE, "cvxpy", "matplotlib", "robthermal.design", "robthermal.certify"))])
+def test_commands_load_no_more_than_they_need(command: list[str], unused: tuple[str, ...]) -> None:
+    run = subprocess.run([sys.executable, "-X", "importtime", "-m", "robthermal", *command], capture_output=True,
+                         text=True, check=True)
+    loaded = {line.rpartition("|")[2].strip() for line in run.stderr.splitlines() if line.startswith("import time:")}
+    assert "robthermal.cli.app" in loaded
     assert not loaded & set(unused)

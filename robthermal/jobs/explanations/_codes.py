@@ -29,7 +29,7 @@ def outcome_codes() -> dict[str, tuple[OutcomeCode, ...]]:
 
     Examples
     --------
-    >>> from robthermal.jobs.explain import outcome_codes
+    >>> from robthermal.jobs.explanations import outcome_codes
     >>> any(code.ok for code in outcome_codes()["not_certified"])
     False
     """
