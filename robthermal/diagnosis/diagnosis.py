@@ -145,7 +145,7 @@ class Diagnosis:
         return short_table("Diagnosis", rows, str(self.outcome))
 
     def plot(self) -> NDArray[Any]:
-        """Residuals of the first training record [K], or response, before and after; returns the matplotlib axes."""
+        """Residuals of the first training record [K, V], or response, before and after; returns the matplotlib axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(2, 1, sharex=True, sharey=True, layout="constrained")

@@ -14,7 +14,7 @@ from ._traces import thin, time_unit
 
 
 def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
-                           noise: float = 0.0, title: str = "") -> Any:
+                           noise: float = 0.0, title: str = "", unit: str = "K") -> Any:
     """Draw residuals of the same readings for two models, one below the other and on one scale.
 
     Parameters
@@ -22,11 +22,13 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     time : array_like
         Times of the samples [s].
     before, after : mapping
-        {sensor: measured − model} [K], of the same sensors.
+        {sensor: measured − model} [unit], of the same sensors.
     noise : float, optional
-        Band of twice this size [K]; none by default.
+        Band of twice this size [unit]; none by default.
     title : str, optional
         Heading of the drawing.
+    unit : str, optional
+        Unit of the readings: "K", or "V" of voltages.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     """
     t = np.asarray(time, dtype=float)
     _check(t, before, after, "residuals_before_after", "sensors")
-    scale, unit = time_unit(t)
+    scale, shown = time_unit(t)
     with house_style():
         figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
         for ax, residuals, what in zip(axes, (before, after), ("before", "after"), strict=True):
@@ -55,10 +57,10 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
                         linestyle=("-", "--", ":")[i // len(COLORS) % 3], linewidth=0.8, label=plain(name))
             if noise > 0:
                 ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
-            ax.set(ylabel="measured −\nmodel [K]", title=what)
+            ax.set(ylabel=f"measured −\nmodel [{unit}]", title=what)
             ax.margins(x=0.01)
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
-        axes[-1].set(xlabel=f"time [{unit}]")
+        axes[-1].set(xlabel=f"time [{shown}]")
         if title:
             figure.suptitle(plain(title), x=0.02, ha="left")
     return figure

@@ -1,5 +1,6 @@
 """Diagnosis with the voltage of a module among the readings: signatures, whitening, verdicts in volts."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from voltage_rig import drive, system
@@ -87,3 +88,25 @@ def test_a_slope_of_the_resistance_is_named() -> None:
     assert found.verdict == "named" and [one.effect for one in found.effects] == ["resistance_slope"]
     slope, std, _ = found.effects[0].values["slope"]
     assert abs(slope - 0.02) < 4 * std and std < 0.002
+
+
+def test_noise_is_said_in_the_unit_of_the_sensor() -> None:
+    machine = plain()
+    sensors = {name: {**dict(sensor), "noise": 10.0 * sensor.noise} for name, sensor in machine.sensors.items()}
+    floor = rt.diagnosis.noise_floor(rt.System(**{**dict(machine), "sensors": sensors}), logged(machine, 1))
+    assert floor.units == {"T_cold": "K", "V1": "V"}
+    rows = {line.split()[0]: line.split()[-1] for line in str(floor).splitlines()[1:3]}
+    assert rows == floor.units
+    assert "V1 (declared 0.02 V, record 0.002" in floor.outcome.text and "T_cold (declared 0.2 K" in floor.outcome.text
+    assert floor.plot().get_ylabel() == "noise [K, V]"
+
+
+def test_residuals_of_voltages_are_drawn_on_an_axis_of_volts(path: LinearizedRecord) -> None:
+    figure, ax = plt.subplots()
+    r = np.column_stack([np.full(len(path.time), 0.5), np.full(len(path.time), 0.003)])
+    path.draw(ax, r)
+    drawn = {axes.get_ylabel(): [line.get_ydata()[0] for line in axes.get_lines() if len(line.get_ydata())]
+             for axes in figure.axes}
+    plt.close(figure)
+    assert drawn == {"measured − model [K]": [0.5], "measured − model [V]": [0.003]}
+    assert [line.get_label() for line in ax.get_lines()] == ["T_cold", "V1 [V], right"]

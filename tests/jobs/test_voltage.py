@@ -6,7 +6,7 @@ from voltage_rig import drive, system
 import robthermal as rt
 from robthermal.jobs.run import Misfit
 from robthermal.jobs.run._gate import _misfits
-from robthermal.report import measured_against_model
+from robthermal.report import measured_against_model, residuals_before_after
 
 
 def test_reasons_say_volts() -> None:
@@ -22,3 +22,24 @@ def test_figures_of_voltages_have_volts_on_their_axes() -> None:
     assert [axes.get_ylabel() for axes in figure.axes] == ["voltage [V]", "measured −\nmodel [V]"]
     lines = [line for line in figure.axes[0].get_lines() if len(line.get_ydata()) == len(run)]
     assert np.allclose(lines[0].get_ydata(), run["V1"] + 0.01)  # nothing is taken off as if it were kelvin
+
+
+def test_report_of_a_diagnosis_has_volts_apart_from_kelvin() -> None:
+    """A lag of 60 s of the thermometer, which the voltage does not show."""
+    currents = np.repeat(np.random.default_rng(3).uniform(-1.0, 1.5, 20), 8)
+    machine = system()
+    run = rt.thermal.simulate(machine.with_parameters({"sensors.T_cold.time_constant": 60.0}), drive(currents, 4.0))
+    noisy = run.with_outputs(run.outputs + np.random.default_rng(1).standard_normal((160, 2)) * [0.02, 0.002])
+    result = rt.jobs.diagnose_records(machine, (), [noisy])
+    assert [(one.unit, list(one.before)) for one in result.residuals] == [("K", ["T_cold"]), ("V", ["V1"])]
+    report = rt.jobs.diagnose.diagnosis_report(result)
+    (gap,) = [section for section in report.sections if section.anchor == "gap"]
+    rows = {row["records"].rpartition(" ")[2]: row["unit"] for row in gap.tables[0].frame.to_dict("records")}
+    assert rows["T_cold"] == "K" and rows["V1"] == "V"
+    drawn = "".join(figure.svg for figure in (*report.first[0].figures, *gap.figures))
+    assert all(text in drawn for text in ("model [K]", "model [V]", "[K/√Hz]", "[V/√Hz]"))
+
+
+def test_residuals_before_and_after_in_volts() -> None:
+    figure = residuals_before_after([0.0, 1.0], {"V1": [1.0, 2.0]}, {"V1": [0.1, -0.1]}, unit="V")
+    assert [axes.get_ylabel() for axes in figure.axes] == ["measured −\nmodel [V]"] * 2

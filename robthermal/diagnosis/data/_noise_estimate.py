@@ -29,19 +29,21 @@ class NoiseEstimate:
     Parameters
     ----------
     noise : dict
-        Standard deviation of every sensor in the records [K].
+        Standard deviation of every sensor in the records, in its unit.
     estimated : tuple of str
         Sensors whose noise was not declared, and was read off third differences of the record.
     disturbance : dict
         Declared random heat of every lump [W/√Hz].
     rough : dict
-        Noise read off third differences, of every sensor [K]; for comparison.
+        Noise read off third differences, of every sensor in its unit; for comparison.
     outcome : Outcome
         Code "declared", "estimated" or "doubtful" (a declared noise far from what the record shows).
     glitches : dict
         Number of isolated outliers of every sensor that has any; no fit sees them.
     quantized : tuple of str
         Sensors whose steps are more than two standard deviations of their noise: their errors are no white noise.
+    units : dict
+        Unit of every sensor: "K", or "V" of a voltage; "-" of a frequency response, whose noise is relative.
     """
 
     noise: dict[str, float]
@@ -51,10 +53,12 @@ class NoiseEstimate:
     outcome: Outcome
     glitches: dict[str, int] = field(default_factory=dict)
     quantized: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        lines = [f"{'sensor':<12} {'noise [K]':>10} {'differences [K]':>16}"]
-        lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>16.4g}" for name, level in self.noise.items()]
+        lines = [f"{'sensor':<12} {'noise':>10} {'differences':>12}  unit"]
+        lines += [f"{name:<12} {level:>10.4g} {self.rough[name]:>12.4g}  {self.units.get(name, 'K')}"
+                  for name, level in self.noise.items()]
         lines += [f"{name}: {n} isolated outliers left out" for name, n in self.glitches.items()]
         lines += [f"{name}: quantized; its errors count as noise of step/√12, and are not tested for whiteness"
                   for name in self.quantized]
@@ -72,7 +76,10 @@ class NoiseEstimate:
         place = np.arange(len(self.noise))
         ax.bar(place - 0.2, list(self.noise.values()), 0.4, label="used")
         ax.bar(place + 0.2, list(self.rough.values()), 0.4, label="third differences")
-        ax.set(xticks=place, xticklabels=list(self.noise), ylabel="noise [K]", yscale="log")
+        units = [self.units.get(name, "K") for name in self.noise]
+        labels = [f"{name} [{unit}]" if len(set(units)) > 1 else name
+                  for name, unit in zip(self.noise, units, strict=True)]
+        ax.set(xticks=place, xticklabels=labels, ylabel=f"noise [{', '.join(dict.fromkeys(units))}]", yscale="log")
         ax.legend()
         return ax
 
@@ -90,7 +97,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
         Measured. Of a frequency response every element "output/input" is listed with its median relative standard
         deviation, as estimated with the response.
     noise : mapping or float, optional
-        Overrides the declared noise [K].
+        Overrides the declared noise [K, or V of a voltage].
     operating_point : mapping, optional
         As in `refit`.
 
@@ -125,17 +132,19 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     if not data:
         outcome = DiagnosisCode.ESTIMATED.outcome(
             "Noise of the elements as estimated with the frequency response, relative to its size.")
-        return NoiseEstimate(relative, (), {}, relative, outcome)
+        return NoiseEstimate(relative, (), {}, relative, outcome, units=dict.fromkeys(relative, "-"))
     _refuse_short(data)
     levels = declared_noise(system, data, noise)
     rough = {name: _rough(data, name) for name in levels}
     unknown = tuple(name for name, level in levels.items() if not level)
     _refuse_invisible(system, {name: rough[name] for name in unknown})
     noise_of = {name: level or rough[name] for name, level in levels.items()}
+    units = {name: system.sensors[name].unit for name in noise_of}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
     return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
-                      _outcome(noise_of, rough, unknown), glitches, _quantized(data, noise_of))
+                         _outcome(noise_of, rough, unknown, units), glitches, _quantized(data, noise_of),
+                         {**units, **dict.fromkeys(relative, "-")})
 
 
 def _refuse_short(data: Sequence[Data]) -> None:
@@ -155,10 +164,12 @@ def _refuse_invisible(system: System, rough: Mapping[str, float]) -> None:
                              remedy="Declare it, or pass noise={...}: without it no misfit can be called large.")
 
 
-def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...]) -> Outcome:
+def _outcome(noise: dict[str, float], rough: dict[str, float], unknown: tuple[str, ...], units: Mapping[str, str]
+             ) -> Outcome:
     far = [name for name in noise if rough[name] and not 1 / 3 < noise[name] / rough[name] < 3]
     if far:
-        listed = ", ".join(f"{name} (declared {noise[name]:.3g} K, record {rough[name]:.3g} K)" for name in far)
+        listed = ", ".join(f"{name} (declared {noise[name]:.3g} {units[name]}, record {rough[name]:.3g} {units[name]})"
+                           for name in far)
         return DiagnosisCode.DOUBTFUL.outcome(f"The declared noise is far from what the record shows: {listed}.")
     if unknown:
         return DiagnosisCode.ESTIMATED.outcome(f"Noise of {', '.join(unknown)} estimated from third differences.")

@@ -234,7 +234,7 @@ class Refit:
         return "\n".join([*lines, str(self.levels), *self.contradictions, str(self.outcome)])
 
     def plot(self) -> NDArray[Any]:
-        """Residuals of every record against time [K], of every response against frequency; returns the axes."""
+        """Residuals of every record against time [K, V], of every response against frequency; returns the axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(len(self.paths), 1, squeeze=False, layout="constrained")

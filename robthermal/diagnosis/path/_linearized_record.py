@@ -23,6 +23,7 @@ from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response
 from ._coarseness import coarse_responses
+from ._draw_residuals import draw_residuals
 from ._linearized import Unknowns
 from ._whitening import Whitener, whitener
 
@@ -47,7 +48,7 @@ class LinearizedRecord:
     x : ndarray, shape (n, n_lumps)
         Simulated lump temperatures [K].
     readings : ndarray, shape (n, n_sensors)
-        Simulated readings of all sensors of the system [K].
+        Simulated readings of all sensors of the system [K, V].
     u : ndarray, shape (n, n_u)
         Held inputs, in the order of `System.exogenous_names`.
     run : Trajectory
@@ -88,17 +89,16 @@ class LinearizedRecord:
         return len(self.x) * self.h
 
     def draw(self, ax: Any, r: Array) -> None:
-        """Draw residuals (n, n_sensors) [K] against time.
+        """Draw residuals (n, n_sensors) [K, V] against time; voltages on an axis at the right.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes
             Axes to draw on.
         r : ndarray, shape (n, n_sensors)
-            Residuals of the sensors [K].
+            Residuals of the sensors [K, V].
         """
-        ax.plot(self.time, r, linewidth=0.7, label=self.one.sensors)
-        ax.set(xlabel="time [s]", ylabel="measured − model [K]")
+        draw_residuals(ax, self.time, r, {name: self.system.sensors[name].unit for name in self.one.sensors})
 
     @property
     def in_time(self) -> bool:
@@ -107,7 +107,7 @@ class LinearizedRecord:
 
     @cached_property
     def residual(self) -> Array:
-        """Free-run residual, measured − modelled, (n, n_sensors) [K]; without what a finer network would change."""
+        """Free-run residual, measured − modelled, (n, n_sensors) [K, V]; without what a finer network would change."""
         free = residual(self.one.readings, self.readings[:, self.one.columns])
         return free if self.coarse is None or self.b is None else free - self.coarse @ self.b
 

@@ -33,7 +33,10 @@ class Residuals:
     time : ndarray, shape (n,)
         Times of the samples [s].
     before, after : dict
-        {sensor: measured − model (n,)} [K], nominal system refitted and with the effects; nan if the model runs away.
+        {sensor: measured − model (n,)} [unit], nominal system refitted and with the effects; nan if the model runs
+        away.
+    unit : str
+        Of all sensors: a record with temperatures and voltages has residuals in "K" and residuals in "V".
     """
 
     kind: str
@@ -41,7 +44,7 @@ class Residuals:
     time: Array
     before: dict[str, Array]
     after: dict[str, Array]
-
+    unit: str = "K"
 
     @property
     def frequency(self) -> Array:
@@ -49,7 +52,7 @@ class Residuals:
         return np.asarray(self._welch(np.zeros_like(self.time))[0])
 
     def spectra(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Amplitude spectral densities [K/√Hz] of the residuals before and after, by Welch's method."""
+        """Amplitude spectral densities [unit/√Hz] of the residuals before and after, by Welch's method."""
         before, after = ({name: np.sqrt(self._welch(values)[1]) for name, values in residuals.items()}
                          for residuals in (self.before, self.after))
         return before, after
@@ -90,7 +93,7 @@ class Diagnosed:
     diagnosis : Diagnosis
         What was found.
     residuals : tuple of Residuals
-        One per record.
+        One per record and unit.
     responses : tuple of ResponseResiduals
         One per frequency response fitted.
     files : tuple of Path
@@ -170,7 +173,8 @@ def _trained(found: Diagnosis) -> Iterator[Residuals]:
     for path, before, after in zip(found.nominal.paths, found.nominal.residuals, found.fit.residuals, strict=True):
         if isinstance(path, LinearizedRecord):
             names = path.one.sensors
-            yield Residuals("train", path.one.label, path.time, _by_name(names, before), _by_name(names, after))
+            yield from _by_unit(found, "train", path.one.label, path.time, _by_name(names, before),
+                                _by_name(names, after))
 
 
 def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
@@ -186,7 +190,16 @@ def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
 def _validation(found: Diagnosis) -> Iterator[Residuals]:
     """The free runs of the hold-out test: initial temperatures from the first tenth, the session's own gains."""
     for one in () if found.hold_out is None else found.hold_out.residuals:
-        yield Residuals("validation", one.name, one.time, one.before, one.after)
+        yield from _by_unit(found, "validation", one.name, one.time, one.before, one.after)
+
+
+def _by_unit(found: Diagnosis, kind: str, name: str, time: Array, before: dict[str, Array], after: dict[str, Array]
+             ) -> Iterator[Residuals]:
+    """Temperatures, then voltages: they are drawn on scales of their own."""
+    unit_of = {sensor: found.system.sensors[sensor].unit for sensor in before}
+    for unit in sorted(set(unit_of.values())):
+        mine = [sensor for sensor in before if unit_of[sensor] == unit]
+        yield Residuals(kind, name, time, {n: before[n] for n in mine}, {n: after[n] for n in mine}, unit)
 
 
 def _by_name(names: Sequence[str], residuals: Array) -> dict[str, Array]:

@@ -172,7 +172,7 @@ def _gap_section(result: Diagnosed) -> Section:
     rows = [{"records": kind, "before": gap.before, "after": gap.after, "noise alone": gap.noise, "unit": gap.unit}
             for kind, gap in found.gap.items()]
     rows += [{"records": f"{one.kind}: {one.name}, {name}", "before": rmse([one.before[name]]),
-              "after": rmse([one.after[name]]), "noise alone": float("nan"), "unit": "K"}
+              "after": rmse([one.after[name]]), "noise alone": float("nan"), "unit": one.unit}
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
             "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
@@ -192,17 +192,23 @@ def _gap_section(result: Diagnosed) -> Section:
 def _figure(one: Residuals, found: Diagnosis) -> Figure:
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     drawn = residuals_before_after(one.time, {n: one.before[n] for n in names}, {n: one.after[n] for n in names},
-                                   noise=found.gap[one.kind].noise, title=f"{one.kind}: {one.name}")
+                                   noise=_noise(one, found), title=f"{one.kind}: {one.name}", unit=one.unit)
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
     return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
                        caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
                        "alone would give.")
 
 
+def _noise(one: Residuals, found: Diagnosis) -> float:
+    """What noise alone would leave of the residuals drawn; the gap is about temperatures where there are any."""
+    gap = found.gap[one.kind]
+    return gap.noise if gap.unit == one.unit else rmse([found.noise_floor.noise[name] for name in one.before])
+
+
 def _spectrum(one: Residuals) -> Figure:
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     before, after = ({name: sizes[name] for name in names} for sizes in one.spectra())
-    drawn = spectra_before_after(one.frequency, before, after, unit="K/√Hz", title=f"{one.kind}: {one.name}")
+    drawn = spectra_before_after(one.frequency, before, after, unit=f"{one.unit}/√Hz", title=f"{one.kind}: {one.name}")
     return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {one.kind} record, without and with the "
                        "effects.", caption=f"The same residuals over frequency, {one.kind} record.")
 
