@@ -21,6 +21,9 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
         poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
+        reference: Annotated[list[str] | None, typer.Option(
+            "--reference", help="Of a closed loop: column of a set-point or added excitation, one per input, may "
+            "repeat.", metavar="COLUMN")] = None,
         out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=place)] = Path(
             "frf.json"),
         plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png, .pdf).",
@@ -35,7 +38,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         stage("estimating the frequency response")
         G = rt.jobs.measured.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [],
                                                method=method, half_width=half_width, degree=degree, poles=poles or [],
-                                               band=band, tables=reading(record, column))
+                                               band=band, tables=reading(record, column), reference=reference or [])
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from ...identify import FrequencyResponse
+from ...identify import FrequencyResponse, IdentifyCode
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
+from .._outcomes import JobsCode
 from ..measured import estimate_response, import_reports
 from ..request import Identification, Project
 from ._context import Context, StageJob, read_files_key
@@ -43,9 +45,21 @@ def _run(context: Context, folder: Path) -> Report:
                             "use": one.use, "notes": list(found.notes)}
         reasons += [Reason("remark", remark.code, "identify", one.name, f"{one.name}: {remark.text}")
                     for remark in found.remarks]
+        reasons += _left_out(one.name, found)
         imports += [report.to_dict() for path in one.records
                     for report in import_reports([path], model, tables=project.reading.get(path, ()))]
     return part("identify", sections, gate=reasons, data={"identify": tables, "imports": imports})
+
+
+def _left_out(name: str, found: FrequencyResponse) -> Iterator[Reason]:
+    """A remark where bins say nothing: calibration and diagnosis leave them out."""
+    unknown = np.isnan(found.response).any(axis=(0, 1)) | ~np.isfinite(found.confidence_radius(0.95)).all(axis=(0, 1))
+    if unknown.any():
+        f = found.frequencies[unknown]
+        text = (f"{name}: {f.size} of {len(found)} bins, from {f[0]:.3g} to {f[-1]:.3g} Hz, are not determined by the "
+                "data; calibration and diagnosis leave them out")
+        yield Reason("remark", JobsCode.BINS_LEFT_OUT.code, "identify", name, f"{text}.", value=float(f.size),
+                     limit=0.0, remedy=IdentifyCode.UNDETERMINED.remedy)
 
 
 def _model(system: System, one: Identification) -> System | None:
@@ -59,7 +73,8 @@ def _estimate(project: Project, one: Identification, model: System | None) -> Fr
     options = one.options
     found = estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
                               method=options.method, half_width=options.half_width, degree=options.degree,
-                              poles=options.poles, band=options.band, reading=project.reading)
+                              poles=options.poles, band=options.band, reading=project.reading,
+                              reference=one.reference)
     return found.replace(operating_point={**found.operating_point, **one.operating_point})
 
 

@@ -202,7 +202,7 @@ def _figure(one: Residuals, found: Diagnosis) -> Figure:
 def _noise(one: Residuals, found: Diagnosis) -> float:
     """What noise alone would leave of the residuals drawn; the gap is about temperatures where there are any."""
     gap = found.gap[one.kind]
-    return gap.noise if gap.unit == one.unit else rmse([found.noise_floor.noise[name] for name in one.before])
+    return gap.noise if gap.unit == one.unit else rmse([np.array([found.noise_floor.noise[n] for n in one.before])])
 
 
 def _spectrum(one: Residuals) -> Figure:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...calibration import Fit, calibrate
 from ...errors import InputError
@@ -25,6 +26,9 @@ from ...identify import (
 from ...signals import Excitation, Record, multisines
 from ...thermal import System
 from ._import import ReadTable, read_files
+from ._reference import closed_loop_response, with_reference
+
+Array = NDArray[np.float64]
 
 _METHODS = ("etfe", "spectral", "lpm", "lrm", "lrmp")
 
@@ -33,7 +37,7 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
                       outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
                       poles: Sequence[float] = (), band: tuple[float, float] | None = None,
                       operating_point: Mapping[str, float] | None = None, tables: Sequence[ReadTable] = (),
-                      reading: Mapping[Path, Sequence[ReadTable]] | None = None
+                      reading: Mapping[Path, Sequence[ReadTable]] | None = None, reference: Sequence[str] = ()
                       ) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
@@ -61,6 +65,9 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         How the files are read, from `reading_from_text`.
     reading : mapping, optional
         Tables of single files by path, besides `tables`.
+    reference : sequence of str, optional
+        Records of a closed loop: columns of set-points or of excitation added to the inputs, one per input. The plant
+        is the response from them to the outputs over that to the inputs, by local polynomials ("lpm").
 
     Returns
     -------
@@ -84,20 +91,42 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     """
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
-    parts = [part for path in paths
-             for part in _parts(path, system, inputs, outputs, (*tables, *(reading or {}).get(path, ())))]
+    if reference and method != "lpm":
+        raise InputError(f"method is {method!r} with a reference", where="--method", expected="lpm",
+                         remedy="A closed loop is estimated by local polynomials: leave method out.")
+    parts, references = _read(paths, system, inputs, outputs, tables, reading or {}, reference)
     chosen = [part.select(inputs=list(inputs or part.input_names), outputs=list(outputs or part.output_names))
               for part in parts]
     records, constant = _changing(chosen)
     given: Any = list(poles) if poles else system if system is not None else "auto"
-    G = {"etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
+    estimators = {
+         "etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
-         "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}[method]()
+         "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}
+    G = closed_loop_response(list(zip(records, references, strict=True)), reference, degree=degree,
+                             half_width=half_width) if reference else estimators[method]()
     note = (f"Left out because they never change: {', '.join(constant)} ({IdentifyCode.CONSTANT_INPUT.code}).",)
     G = G.replace(notes=G.notes + (note if constant else ()),
                   operating_point=mean_inputs(parts) | dict(operating_point or {}))
     return G.between(*band) if band else G
+
+
+def _read(paths: Sequence[Path], system: System | None, inputs: Sequence[str], outputs: Sequence[str],
+          tables: Sequence[ReadTable], reading: Mapping[Path, Sequence[ReadTable]], reference: Sequence[str]
+          ) -> tuple[list[Record], list[Array]]:
+    """Parts of all files, and their references where they are asked for."""
+    parts: list[Record] = []
+    references: list[Array] = []
+    for path in paths:
+        how = (*tables, *reading.get(path, ()))
+        found = _parts(path, system, inputs, outputs, how)
+        if reference:
+            pairs = list(with_reference(path, found, reference, how))
+            found = [record for record, _ in pairs]
+            references += [one for _, one in pairs]
+        parts += found
+    return parts, references
 
 
 def _changing(records: list[Record]) -> tuple[list[Record], list[str]]:

@@ -36,6 +36,7 @@ class IdentifyTable(Table):
     degree: Annotated[int, Field(ge=0)] = 2
     poles: list[Number] = []
     band: Pair | None = None
+    reference: str | list[str] = []
     use: Use = "train"
     operating_point: dict[str, Number] = {}
 
@@ -98,6 +99,12 @@ class Identification:
     records: tuple[Path, ...]
     options: IdentifyTable
     operating_point: Mapping[str, float]
+
+    @property
+    def reference(self) -> tuple[str, ...]:
+        """Columns of the reference of a closed loop; none of an open one."""
+        asked = self.options.reference
+        return (asked,) if isinstance(asked, str) else tuple(asked)
 
     @property
     def use(self) -> Use:
