@@ -161,6 +161,8 @@ def calibrate(system: SystemFile,
                   "--validation", help="Held-out record or response.")] = None,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
+              max_iterations: Annotated[int, typer.Option(
+                  help="After how many iterations the fit stops, as not converged.")] = 50,
               median_filter: MedianFilter = None,
               operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
               as_json: Json = False) -> None:
@@ -173,7 +175,8 @@ def calibrate(system: SystemFile,
     with progress() as stage:
         stage("calibrating")
         fit = rt.jobs.measured.calibrate_files(found, records, validation or [], median_filter=median_filter,
-                                               operating_point=point, tables=reading(record, column))
+                                               operating_point=point, tables=reading(record, column),
+                                               max_iterations=max_iterations)
     rt.thermal.write_system(fit.system, out)
     rt.jobs.request.write_calibrated(fit, (system, *records), out.with_suffix(".json"))
     answer(fit.to_dict(), as_json, lambda: say(str(fit), f"calibrated system: {out}",

@@ -93,3 +93,22 @@ def test_what_the_diagnosis_finds_decides_the_verdict_of_the_main_job(tmp_path: 
     summary = json.loads((tmp_path / "loose" / "summary.json").read_text())
     assert summary["verdict"] == "PASS WITH REMARKS" and summary["certify"]["confidence"] == 0.9
     assert "diagnosis_ambiguous" in {one["code"] for one in summary["reasons"] if one["level"] == "remark"}
+
+
+def test_a_calibration_that_did_not_converge_fails(tmp_path: Path, run: Run) -> None:
+    """Its ends are no estimates: no ranges, nominal claims, FAIL; with the iterations it asks for."""
+    project = write_bar(tmp_path, project=PROJECT.replace("[calibrate]", "[calibrate]\nmax_iterations = 1"))
+    assert run("run", project, "--out", tmp_path / "out").status == 1
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    (reason,) = [one for one in summary["reasons"] if one["code"] == "not_converged"]
+    assert summary["verdict"] == "FAIL" and summary["calibrate"]["outcome"] == "not_converged"
+    assert reason["level"] == "fail" and reason["stage"] == "calibrate" and "max_iterations" in reason["remedy"]
+    assert "after 1 iterations" in reason["text"]
+    assert not summary["certify"]["parameters"] and all(row["range"] is None for row
+                                                        in summary["calibrate"]["parameters"].values())
+    assert "nominal_only" in {one["code"] for one in summary["reasons"]}
+    assert "they are no estimates" in (tmp_path / "out" / "report.html").read_text()
+    project.write_text(project.read_text().replace("max_iterations = 1", "max_iterations = 40"))
+    assert run("run", project, "--out", tmp_path / "out").status == 0
+    assert run("calibrate", tmp_path / "bar.toml", tmp_path / "train.csv", "--max-iterations", 1, "--out",
+               tmp_path / "c.toml").status == 1

@@ -8,6 +8,7 @@ from ._currents import current_reasons as current_reasons
 from ._currents import rest_on_certificates as rest_on_certificates
 from ._currents import within_usable as within_usable
 from ._parameter_ranges import claim_ranges as claim_ranges
+from ._parameter_ranges import converged as converged
 from ._parameter_ranges import doubted as doubted
 from ._reasons import CERTIFY_GATES as CERTIFY_GATES
 from ._reasons import certification_reasons as certification_reasons
@@ -19,6 +20,6 @@ from ._write import certification_report as certification_report
 from ._write import write_certify as write_certify
 
 __all__ = ["CERTIFY_GATES", "CODES", "box_stays_inside", "certification_reasons", "certification_report",
-           "certification_sections", "certify_system", "certify_table", "claim_ranges", "claims_hold",
+           "certification_sections", "certify_system", "certify_table", "claim_ranges", "claims_hold", "converged",
            "current_reasons", "doubted", "remark", "rest_on_certificates", "stays_usable", "within_usable",
            "write_certify"]

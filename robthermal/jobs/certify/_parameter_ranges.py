@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
-from ...calibration import Estimates
+from ...calibration import CalibrationCode, Estimates
 from ...errors import InputError
 from ..request import Boxes
 
@@ -21,13 +21,24 @@ def claim_ranges(boxes: Boxes, fit: Estimates | None) -> Ranges | None:
     boxes : Boxes
         With the choice and the confidence.
     fit : Estimates or None
-        Calibration of the system; None if nothing was calibrated.
+        Calibration of the system; None if nothing was calibrated. One that did not converge has no ranges.
     """
     if not isinstance(boxes.parameters, str):
         return dict(boxes.parameters) or None
-    if boxes.parameters == "none" or fit is None:
+    if boxes.parameters == "none" or fit is None or not converged(fit):
         return None
     return dict(fit.ranges(boxes.confidence, set=boxes.set)) or None
+
+
+def converged(fit: Estimates | None) -> bool:
+    """Whether parameters are estimates: of no calibration they are given numbers.
+
+    Parameters
+    ----------
+    fit : Estimates or None
+        Calibration of the system; None if nothing was calibrated.
+    """
+    return fit is None or fit.outcome.code != CalibrationCode.NOT_CONVERGED.code
 
 
 def breaking(ranges: Ranges, holds: Callable[[Ranges], bool]) -> str:

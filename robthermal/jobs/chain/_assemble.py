@@ -18,7 +18,8 @@ from ._context import Context, Finished
 from ._inputs import input_section
 from ._parts import diagnosis_of, facts_of
 
-_DATA_GATES = (GateCode.VALIDATION_MISFIT, GateCode.TRAINING_MISFIT, GateCode.NO_VALIDATION, GateCode.SIMULATED_DATA,
+_DATA_GATES = (GateCode.NOT_CONVERGED, GateCode.VALIDATION_MISFIT, GateCode.TRAINING_MISFIT,
+               GateCode.NO_VALIDATION, GateCode.SIMULATED_DATA,
                GateCode.CONSTANT_INPUT, GateCode.RESAMPLED, GateCode.NO_NOISE_STATED, GateCode.UNDETERMINED_PARAMETER,
                GateCode.PARAMETER_AT_BOUND)
 GATES: Mapping[str, tuple[GateCode, ...]] = {  # beside those that a stage says itself

@@ -84,7 +84,8 @@ def calibration_part(stage: str, done: Calibrated, data: Data, project: Project)
     """
     kinds = [*(["train"] if has_training(project) else []), *(["validation"] if data.held_out else [])]
     # Tolerances are the gate's: whoever changes them need not calibrate again.
-    facts = data_facts(done.system, done.comparisons, [replace(one, tolerance=0.0) for one in done.misfits], kinds)
+    misfits = [replace(one, tolerance=0.0) for one in done.misfits]
+    facts = data_facts(done.system, done.comparisons, misfits, kinds, done.fit)
     tables: dict[str, Any] = {"facts": asdict(facts), "residuals": residual_table(done.misfits),
                               "imports": import_table([*data.train, *data.validation])}
     sections = [comparison_section(done.comparisons, done.fit)] if done.comparisons else []

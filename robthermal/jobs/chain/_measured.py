@@ -108,4 +108,5 @@ def data_key(project: Project) -> dict[str, Any]:
             "validation": read_files_key(project, project.validation),
             "responses": [[path.name, file_hash(path)] for path in project.responses],
             "use": {one.name: one.use for one in project.identify}, "median_filter": project.median_filter,
-            "fit": project.system.model_dump(mode="json")["fit"], "initial": project.initial, "loss": project.loss}
+            "fit": project.system.model_dump(mode="json")["fit"], "initial": project.initial, "loss": project.loss,
+            "max_iterations": project.max_iterations}

@@ -279,7 +279,7 @@ def _response(path: Path) -> FrequencyResponse:
 
 def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
                     median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
-                    tables: Sequence[ReadTable] = ()) -> Fit:
+                    tables: Sequence[ReadTable] = (), max_iterations: int = 50) -> Fit:
     """Calibrate a system with files of records and of frequency responses together.
 
     Parameters
@@ -297,6 +297,8 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
         their files.
     tables : sequence
         How the files are read, from `reading_from_text`.
+    max_iterations : int
+        After how many iterations the calibration stops.
 
     Returns
     -------
@@ -322,4 +324,5 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
     if operating_point and not any(isinstance(one, FrequencyResponse) for one in (*train, *held_out)):
         raise InputError("an operating point is given with records", where="--operating-point",
                          remedy="Leave it out: a record brings its own inputs.")
-    return calibrate(system, train, validation=held_out or None, operating_point=operating_point or None)
+    return calibrate(system, train, validation=held_out or None, operating_point=operating_point or None,
+                     max_iterations=max_iterations)

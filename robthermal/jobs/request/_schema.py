@@ -60,6 +60,7 @@ class CalibrateTable(Table):
     loss: Loss = "linear"
     parameters: dict[str, dict[str, Number]] = {}
     responses: list[str] = []
+    max_iterations: Annotated[int, Field(ge=1, le=10_000, strict=True)] = 50
 
 
 class CertifyTable(Table):
@@ -218,6 +219,8 @@ class Project:
         Subsystems to couple.
     notes : str
         What the reader of the report should know about machine and measurement, paragraphs between blank lines.
+    max_iterations : int
+        After how many iterations a calibration stops.
     """
 
     name: str
@@ -242,6 +245,7 @@ class Project:
     design: DesignTable | None = None
     couple: CoupleTable | None = None
     notes: str = ""
+    max_iterations: int = 50
 
 
 def read_project(path: str | Path) -> Project:
@@ -284,7 +288,7 @@ def read_project(path: str | Path) -> Project:
                    data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
                    (path, system_file, *measured), _gate(system, data.gate, path), data.diagnose is not None,
                    asked.session_gain, reading, path, system_file, identify, responses, asked.adopt, data.design,
-                   data.couple, head.notes.strip())
+                   data.couple, head.notes.strip(), data.calibrate.max_iterations)
 
 
 def _identification(name: str, table: IdentifyTable, system: System, path: Path, data: _File,

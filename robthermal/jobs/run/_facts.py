@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...calibration import Estimates
 from ...diagnosis import Diagnosis
 from ...signals import Record
 from ...thermal import System
+from ..certify import converged
 from ._misfit import Misfit
 from ._result import Comparison
 
@@ -34,6 +36,8 @@ class DataFacts:
         Measured sensors whose noise is not stated.
     resampled : tuple of str
         Files whose samples were not on a uniform grid.
+    stopped : str
+        What happened where the calibration ended before it converged; empty otherwise.
     """
 
     kinds: tuple[str, ...] = ()
@@ -43,6 +47,7 @@ class DataFacts:
     silent: tuple[str, ...] = ()
     resampled: tuple[str, ...] = ()
     constant: tuple[str, ...] = ()
+    stopped: str = ""
 
     def currents(self, system: System) -> dict[str, tuple[float, float]]:
         """Range of every module's current in the records [A]; empty without records.
@@ -75,7 +80,7 @@ class DiagnosisFacts:
 
 
 def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Sequence[Misfit],
-               kinds: Sequence[str] = ()) -> DataFacts:
+               kinds: Sequence[str] = (), fit: Estimates | None = None) -> DataFacts:
     """Facts about records beside a model.
 
     Parameters
@@ -88,6 +93,8 @@ def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Seque
         Of the same records.
     kinds : sequence of str
         Kinds of data that are no records.
+    fit : Estimates or None
+        Calibration of the model; None if nothing was calibrated.
     """
     records = [one.record for one in comparisons]
     names = dict.fromkeys(name for record in records for name in record.input_names)
@@ -102,7 +109,8 @@ def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Seque
         {name: _range(records, name) for name in names},
         (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None,
         tuple(name for name in sensors if name in system.sensors and not system.sensors[name].noise),
-        tuple(dict.fromkeys(file for file, what in actions if what == "resampled")), _constant(comparisons))
+        tuple(dict.fromkeys(file for file, what in actions if what == "resampled")), _constant(comparisons),
+        "" if converged(fit) else str(fit.outcome) if fit else "")
 
 
 def _constant(comparisons: Sequence[Comparison]) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ def gate_reasons(result: JobResult) -> tuple[Reason, ...]:
     result : JobResult
         Result of the main job, as `run_job` returns it.
     """
-    facts = data_facts(result.system, result.comparisons, result.misfits)
+    facts = data_facts(result.system, result.comparisons, result.misfits, fit=result.fit)
     diagnosed = diagnosis_facts(result.diagnosis.diagnosis) if result.diagnosis else None
     label = f"{result.project.label} {result.project.name}"
     found = [*data_reasons(facts, diagnosed, label), *claim_reasons(result.certification, result.doubted, facts)]
@@ -61,6 +61,9 @@ def data_reasons(facts: DataFacts, diagnosed: DiagnosisFacts | None, label: str)
     label : str
         Label and name of the project.
     """
+    if facts.stopped:
+        code = GateCode.NOT_CONVERGED
+        yield Reason("fail", code.code, "calibrate", "parameters", f"{facts.stopped} {code.meaning}", code.remedy)
     yield from _misfits(facts.misfits)
     yield from _records(facts, diagnosed is not None, "simulated" in label.lower())
     if diagnosed is not None:

@@ -113,6 +113,7 @@ def calibrated(project: Project, system: System, train: Sequence[Record], valida
         progress(f"calibrating {len(system.fit)} parameters on {' and '.join(data)}")
         fitted, compared = [*train, *responses], [*validation, *held_out]
         of_records: Any = {"initial": project.initial, "loss": project.loss} if train else {}
+        of_records["max_iterations"] = project.max_iterations
         fit = calibrate(system, fitted, validation=compared or None, **of_records)
     progress("comparing model and data")
     comparisons = _comparisons(project, system, fit, train, validation)

@@ -8,6 +8,7 @@ import pandas as pd
 
 from ...calibration import Estimates, Fit
 from ...report import Figure, Section, Table, house_style, measured_against_model
+from ..certify import converged
 from ._misfit import Misfit
 from ._result import Comparison
 
@@ -131,6 +132,8 @@ def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] 
         text += " The claims for the parameter ranges hold for all of them from lowest to highest, in any combination."
         frame.insert(2, "lowest", [ranges[name][0] if name in ranges else float("nan") for name in frame.index])
         frame.insert(3, "highest", [ranges[name][1] if name in ranges else float("nan") for name in frame.index])
+    if not converged(fit):
+        text = f"**{fit.outcome}** The numbers below are where the optimizer stopped: they are no estimates."
     if fit.undetermined:
         text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
     table = Table(frame.reset_index(names="parameter"), "Calibrated parameters.", digits=6)
