@@ -87,6 +87,8 @@ class StageJob:
         What it takes from the project: plain values and hashes of input files.
     run : callable
         Computes it, writes its files into a folder that is laid out as the results folder, and says what to report.
+    check : callable, optional
+        Refuses what can be seen to be wrong before any stage is computed.
     """
 
     name: str
@@ -94,6 +96,7 @@ class StageJob:
     after: Callable[[Project], tuple[str, ...]]
     depends: Callable[[Project], Mapping[str, Any]]
     run: Callable[[Context, Path], Report]
+    check: Callable[[Project], None] = lambda project: None
 
     def key(self, context: Context, version: str) -> str:
         """Hash of everything the stage depends on.

@@ -118,4 +118,12 @@ def _response(name: Any, responses: Mapping[str, str], project: Project) -> Any:
     return responses[name]
 
 
-COUPLE = StageJob("couple", _absent, _after, _depends, _run)
+def _check(project: Project) -> None:
+    """Names of responses that [identify] has to make."""
+    made = {f"{PREFIX}{one.name}": "" for one in project.identify}
+    for key in _RESPONSES:
+        for name in tables_of(project).get("uncertainty", {}).get(key) or ():
+            _response(name, made, project)
+
+
+COUPLE = StageJob("couple", _absent, _after, _depends, _run, _check)

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ...design import cold_side, feedback_linearization
 from ...errors import InputError
 from ...report import Report
 from ..certify import claim_ranges
@@ -45,13 +46,29 @@ def _run(context: Context, folder: Path) -> Report:
     return below(report, FOLDER, "design")
 
 
+def _check(project: Project) -> None:
+    """What does not depend on numbers: modules, set-points, points to regulate, their influence on each other."""
+    assert project.design is not None
+    try:
+        request = design_from_table(project.system, project.design.model_dump(exclude_unset=True), project.boxes)
+        cold_side(feedback_linearization(project.system), regulate=request.regulate)
+    except InputError as error:
+        raise _of_table(error, project) from None
+
+
 def _of_table(error: InputError, project: Project) -> InputError:
-    """A refusal that names an option of the command names the key of the table instead."""
+    """A refusal that names an option of the command, or an argument, names the key of the table instead."""
     option, _, value = error.where.partition(" ")
-    if not option.startswith("--"):
+    if str(project.path) in error.where:
         return error
-    return InputError(error.what, where=f"{project.path} [design] {option[2:].replace('-', '_')} {value}".strip(),
-                      expected=error.expected, remedy=error.remedy)
+    if option in ("design", "argument"):
+        key = ""
+    elif option == "[design]":
+        key = value
+    else:
+        key = f"{option.removeprefix('--').replace('-', '_')} {value}"
+    return InputError(error.what, where=f"{project.path} [design] {key}".strip(), expected=error.expected,
+                      remedy=error.remedy)
 
 
-DESIGN = StageJob("design", _absent, certified_after, _depends, _run)
+DESIGN = StageJob("design", _absent, certified_after, _depends, _run, _check)

@@ -62,8 +62,9 @@ def run_project(project: Project, out: str | Path, *, only: Sequence[str] = (), 
     Raises
     ------
     InputError
-        Anything wrong with the project's data and tables: finished stages stay, the next run continues. A stage in
-        `only` without what it needs; names that are no stages; a folder that is in use for something else.
+        Anything wrong with the project's data and tables: finished stages stay, the next run continues. What [design]
+        and [couple] ask for is looked at before any stage is computed. A stage in `only` without what it needs; names
+        that are no stages; a folder that is in use for something else.
 
     Examples
     --------
@@ -82,6 +83,9 @@ def run_project(project: Project, out: str | Path, *, only: Sequence[str] = (), 
     target = Path(out)
     _check_names(only, start)
     check_free(target)
+    for job in STAGES:
+        if not job.absent(project) and (not only or job.name in only):
+            job.check(project)
     context = Context(project, target, progress)
     stages: list[Stage] = []
     try:

@@ -1,0 +1,75 @@
+"""What a chain refuses before it computes anything, although a later stage asks for it."""
+
+from pathlib import Path
+
+import pytest
+from commands import Run
+
+SYSTEM = """
+[system]
+name = "stack"
+temperature_unit = "degC"
+[ambients.room]
+temperature = 22.0
+[lumps.sink]
+capacity = 200.0
+[lumps.middle]
+capacity = 20.0
+[lumps.cold]
+capacity = 10.0
+[[links]]
+between = ["sink", "room"]
+conductance = 4.0
+[modules.lower]
+hot = "sink"
+cold = "middle"
+seebeck = { value = 0.05 }
+resistance = { value = 2.0 }
+conductance = { value = 0.5 }
+current_limits = [0.0, 2.0]
+[modules.upper]
+hot = "{hot}"
+cold = "cold"
+seebeck = { value = 0.02 }
+resistance = { value = 1.0 }
+conductance = { value = 0.2 }
+current_limits = [0.0, 1.0]
+[sensors.T]
+lump = "cold"
+noise = 0.02
+"""
+PROJECT = """
+[project]
+name = "stack"
+system = "stack.toml"
+[certify]
+temperature = [-20.0, 60.0]
+"""
+
+
+def refused(folder: Path, run: Run, tables: str, hot: str = "sink") -> str:
+    (folder / "stack.toml").write_text(SYSTEM.replace("{hot}", hot))
+    (folder / "project.toml").write_text(PROJECT + tables)
+    said = run("run", folder / "project.toml", "--out", folder / "out")
+    assert said.status == 2 and not (folder / "out").exists(), said
+    assert str(folder / "project.toml") in said.err and len(said.err.replace(str(folder), "")) < 600
+    return said.err
+
+
+def test_a_cascade_is_refused_before_anything_is_computed(tmp_path: Path, run: Run) -> None:
+    said = refused(tmp_path, run, "[design]\n", hot="middle")
+    assert "[design]: a cascade: module 'lower' cools the hot face 'middle' of module 'upper'" in said
+    assert "Leave [design] out" in said
+
+
+@pytest.mark.parametrize(("tables", "words"), [
+    ('[design]\nregulate = { upper = "T9" }\n', ("[design]", "T9")),
+    ('[design]\nregulate = { lower = "T" }\n', ("[design]", "lower")),  # the cold face of the other module
+    ("[design]\nsetpoint = { upper = 90.0, lower = 5.0 }\n", ("[design] setpoint", "outside of the box")),
+    ("[design]\nsetpoint = { upper = 5.0 }\n", ("[design] setpoint", "lower")),
+    ("[design]\nmargins = { gain = -1.0 }\n", ("[design]", "gain")),
+    ('[couple]\nfrf_1 = ["identify.one"]\n', ("[couple]", "identify.one", "no [identify.NAME]"))])
+def test_what_later_stages_cannot_do_is_refused_at_once(tables: str, words: tuple[str, ...], tmp_path: Path, run: Run
+                                                        ) -> None:
+    said = refused(tmp_path, run, tables)
+    assert all(word in said for word in words), said
