@@ -24,7 +24,7 @@ def with_reference(path: Path, records: Sequence[Record], names: Sequence[str],
     Parameters
     ----------
     path : Path
-        Measured file.
+        Measured file of a closed loop.
     records : sequence of Record
         Uninterrupted parts of the plant's columns.
     names : sequence of str
