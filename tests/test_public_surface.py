@@ -45,7 +45,8 @@ SURFACE = {
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tune_pi unobservable
-        Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf mixed polytopic_feedback
+        Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf
+        mixed output_feedback polytopic_feedback
     """,
     "diagnosis": """
         Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
@@ -91,7 +92,8 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design FeedbackDesign FrfDesign RobustAgainst SynthesisCode frf_pid h2 hinf mixed polytopic_feedback
+        Design FeedbackDesign FrfDesign RobustAgainst SynthesisCode frf_pid h2 hinf
+        mixed output_feedback polytopic_feedback
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

@@ -8,6 +8,7 @@ from ..synthesis import frf_pid as frf_pid
 from ..synthesis import h2 as h2
 from ..synthesis import hinf as hinf
 from ..synthesis import mixed as mixed
+from ..synthesis import output_feedback as output_feedback
 from ..synthesis import polytopic_feedback as polytopic_feedback
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
@@ -82,4 +83,4 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
            "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]
 __all__ += ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf",  # of synthesis
-            "mixed", "polytopic_feedback"]
+            "mixed", "output_feedback", "polytopic_feedback"]

@@ -13,6 +13,7 @@ from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
 from ._mixed import mixed as mixed
 from ._outcomes import SynthesisCode as SynthesisCode
+from ._output_feedback import output_feedback as output_feedback
 
 __all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf",
-           "mixed", "polytopic_feedback"]
+           "mixed", "output_feedback", "polytopic_feedback"]

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..._checks import quoted
-from ...design import Design, frf_pid, h2, hinf, mixed
+from ...design import Design, frf_pid, h2, hinf, mixed, output_feedback
 from ...errors import InputError
 from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "mixed", "frf-pid")
-_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed,
+METHODS = ("hinf", "h2", "mixed", "output-feedback", "frf-pid")
+_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "output-feedback": output_feedback,
                                            "frf-pid": frf_pid}
 _TITLES = {"hinf": "H-infinity norm", "h2": "H2 norm", "region": "Region of the eigenvalues",
            "stability": "Stability", "peak": "Peak gain"}
