@@ -1,7 +1,8 @@
 """Blind suite with foreign truth: machines of 150 cells and more against a user's network of 4 to 8 lumps.
 
-Run: python tests/benchmarks/bench_foreign_diagnosis.py [--seeds 1 3] [--only TEXT] [--jobs 1] [--out FILE]. Even seeds
-served for development, odd ones judge. Results are appended to FILE; started again, finished data sets are skipped.
+Run: python tests/benchmarks/bench_foreign_diagnosis.py [--seeds 1 3] [--only TEXT] [--jobs 1] [--peers] [--out FILE].
+Even seeds served for development, odd ones judge; --peers lets two other methods choose on the same data. Results are
+appended to FILE; started again, finished data sets are skipped.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="*", default=[1])
     parser.add_argument("--only", default="", help="part of the keys to run, such as bar/hidden")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--peers", action="store_true")
     parser.add_argument("--out", type=Path, default=Path(tempfile.gettempdir()) / "foreign_diagnosis.jsonl")
     chosen = parser.parse_args()
     header(f"diagnosis with foreign truth, seeds {chosen.seeds}, results in {chosen.out}")
@@ -35,7 +37,8 @@ def main() -> None:
     rows = {row["key"]: row for row in map(json.loads, lines) if row["key"] in keys}
     left = [case for key, case in keys.items() if key not in rows]
     with chosen.out.open("a", encoding="utf-8") as file:
-        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(delayed(judged)(one) for one in left):
+        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered")(delayed(judged)(one, chosen.peers)
+                                                                                  for one in left):
             rows[row["key"]] = row
             file.write(json.dumps(row, default=float) + "\n")
             file.flush()

@@ -14,9 +14,10 @@ import robthermal as rt
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from foreign.cases import SUB, Case, H, all_cases, made  # noqa: E402 - beside the benchmarks
 from foreign.hidden import CATALOG, MAKE, Hidden, lagged  # noqa: E402
-from foreign.judge import answer  # noqa: E402
+from foreign.judge import answer, wilson  # noqa: E402
 from foreign.machines import MACHINES, ROOM  # noqa: E402
 from foreign.march import march  # noqa: E402
+from foreign.peers import beta_of, risks, unfalsified  # noqa: E402
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -94,3 +95,28 @@ LINK, LAG = ["missing_link", ["x1", "x4"]], ["sensor_lag", ["T1"]]
 ])
 def test_answers_are_judged(verdict, names, others, truth, expected):
     assert answer({"verdict": verdict, "names": names, "others": others, "truth": truth}) == expected
+
+
+@pytest.mark.parametrize(("r", "v"), [(1.0, 0.5), (0.2, 1e-4), (5.0, 8.0), (3.0, 0.4)])
+def test_increments_have_the_center_and_the_metric_variance_asked_for(r, v):
+    """By sampling: the mean of ln(x / (1 - x)) is ln r, its variance v (Rene and Longtin 2025, supplement)."""
+    x = np.random.default_rng(2).beta(*beta_of(r, v), 200_000)
+    odds = np.log(x) - np.log1p(-x)
+    assert odds.mean() == pytest.approx(np.log(r), abs=4 * np.sqrt(v / x.size))
+    assert odds.var() == pytest.approx(v, rel=0.05)
+
+
+def test_a_model_that_holds_falsifies_bad_ones_and_no_equal():
+    z = np.random.default_rng(0).standard_normal(6000)
+    good, alike, bad = 0.5 * z**2, 0.5 * z[::-1] ** 2, 0.5 * (3.0 * z) ** 2
+    assert unfalsified([bad, good, alike], 2.0**-6) == [1, 2]
+    drawn = risks(good, 2.0**-6, np.random.default_rng(1))
+    assert drawn.mean() == pytest.approx(0.5, rel=0.1) and drawn.std() < 0.02
+    assert unfalsified([bad, good, alike], 4.0) == [0, 1, 2]  # a scale that lets the bad one vary that much
+
+
+def test_intervals_are_those_of_wilson():
+    """The ends p solve |k/n - p| = z sqrt(p (1 - p) / n)."""
+    for k, n in ((0, 8), (15, 17), (9, 9)):
+        for p in wilson(k, n):
+            assert abs(k / n - p) == pytest.approx(1.959964 * (p * (1 - p) / n) ** 0.5, abs=1e-9)

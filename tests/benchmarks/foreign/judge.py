@@ -10,16 +10,18 @@ from typing import Any
 import robthermal as rt
 
 from .cases import STRENGTH, Case, made
+from .peers import SCALES, choices
 
 Row = dict[str, Any]
 NAMED = ("named", "named_with_remainder", "ambiguous")
 
 
-def judged(case: Case) -> Row:
-    """Make the data, diagnose, and keep what the tables need."""
+def judged(case: Case, compare: bool = False) -> Row:
+    """Make the data, diagnose, and keep what the tables need; with the choices of the peers if asked for."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         one = made(case)
+        peers = {"peers": choices(one.system, one.train)} if compare and case.group == "hidden" else {}
         start = time.process_time()
         try:
             found = rt.diagnose(one.system, one.train, validation=one.unseen)
@@ -34,7 +36,7 @@ def judged(case: Case) -> Row:
             "others": [[[o["effect"], o["where"]] for o in others] for others in answer["alternatives"]],
             "provisional": [[e["effect"], e["where"]] for e in answer["provisional"]],
             "verdict": found.verdict, "gap": answer["gap"], "remainder": answer.get("remainder"),
-            "text": found.outcome.text, "seconds": time.process_time() - start}
+            "text": found.outcome.text, "seconds": time.process_time() - start, **peers}
 
 
 def within(row: Row) -> bool:
@@ -63,9 +65,18 @@ def answer(row: Row) -> str:
 
 
 def rate(rows: list[Row], hit: Callable[[Row], bool]) -> str:
-    """Share, as counts."""
-    k = sum(map(hit, rows))
-    return f"{100 * k / len(rows):5.1f} %  {k} of {len(rows)}" if rows else "none"
+    """Share with Wilson's 95 % interval, and the counts."""
+    k, n = sum(map(hit, rows)), len(rows)
+    if not rows:
+        return "none"
+    low, high = wilson(k, n)
+    return f"{100 * k / n:5.1f} % [{100 * low:.1f}, {100 * high:.1f}]  {k} of {n}"
+
+
+def wilson(k: int, n: int, z: float = 1.959964) -> tuple[float, float]:
+    """Wilson's interval of a share (1927)."""
+    middle, width = k + z**2 / 2.0, z * (k * (n - k) / n + z**2 / 4.0) ** 0.5
+    return max(0.0, (middle - width) / (n + z**2)), min(1.0, (middle + width) / (n + z**2))
 
 
 def print_tables(rows: list[Row]) -> None:
@@ -85,9 +96,28 @@ def print_tables(rows: list[Row]) -> None:
           f"{rate(stated, lambda r: 0.5 <= r['remainder']['train']['rms'] / r['coarse'] <= 2.0)}")
     seconds = sorted(row["seconds"] for row in rows)
     print(f"CPU seconds: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")
+    print_peers([row for row in hidden if "peers" in row])
     for row in rows:
         if answer(row) not in ("unique", "refused") or (row["group"] == "hidden" and answer(row) == "refused"):
             names = "; ".join(" or ".join(f"{n}({', '.join(w)})" for n, w in [one, *others])
                               for one, others in zip(row["names"], row["others"], strict=True))
             names = names or row["text"][:90]
             print(f"  {row['key']}: {answer(row)}, {row['verdict']}, strength {row['strength']:.1f}: {names}")
+
+
+def print_peers(rows: list[Row]) -> None:
+    """How often the peers' choice is the truth: the best correlation; the only name that nothing falsifies."""
+    def right(row: Row, name: Any) -> bool:
+        return name is not None and any(same(name, true) for true in row["truth"])
+
+    if not rows:
+        return
+    print(f"residual correlation: first guess right       {rate(rows, lambda r: right(r, r['peers']['correlation']))}")
+    print(f"best score: right                             {rate(rows, lambda r: right(r, r['peers']['best score']))}")
+    for c in map(str, SCALES):
+        left = {row["key"]: row["peers"]["discrepancy"][c] for row in rows}
+        alone = [row for row in rows if len(left[row["key"]]) == 1 and left[row["key"]][0] is not None]
+        good = sum(right(row, left[row["key"]][0]) for row in alone)
+        held = sum(any(right(row, name) for name in left[row["key"]]) for row in rows)
+        print(f"empirical discrepancy, c = {float(c):<8.3g} unique {good} of {len(rows)}, unique and wrong "
+              f"{len(alone) - good}, truth among what is left {held}")
