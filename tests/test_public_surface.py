@@ -26,9 +26,9 @@ SURFACE = {
     """,
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
-        check_certificate check_loop_parameters closed_loop contraction frequency_norm frequency_radius gains
+        check_certificate check_loop_parameters claim_box closed_loop contraction frequency_norm frequency_radius gains
         heater_heat hinf invariance largest_current largest_regulated_current limit_map loop network observer peak
-        regulated runaway runaway_free stability thesis_bounds usable_current
+        regulated runaway runaway_free scheduled stability thesis_bounds usable_current
     """,
     "coupling": """
         NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors
@@ -44,7 +44,7 @@ SURFACE = {
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
-        step_response_linearity tune_pi unobservable
+        step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf
         mixed output_feedback polytopic_feedback
     """,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _stability
+from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _scheduled, _stability
 from ._document import Unreadable, load, sections
 from ._exact import Malformed, NotCovered, short
 from ._result import NOT_COVERED, NOT_VALID, VALID, Answer
@@ -18,7 +18,8 @@ KINDS: dict[str, Kind] = {
     "contraction": (_contraction.read, _contraction.check), "invariance": (_invariance.read, _invariance.check),
     "runaway": (_runaway.read, _runaway.check), "network": (_network.read, _network.check),
     "stability": (_stability.read, _stability.check), "gain": (_gain.read, _gain.check),
-    "observer": (_observer.read, _observer.check), "polytope": (_polytope.read, _polytope.check)}
+    "observer": (_observer.read, _observer.check), "polytope": (_polytope.read, _polytope.check),
+    "scheduled": (_scheduled.read, _scheduled.check)}
 OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop")
 
 

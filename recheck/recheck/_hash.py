@@ -57,7 +57,11 @@ def _thermal(system: Mapping[str, Any]) -> list[Any]:
              [Name(name) for name in system["ambients"]],
              [_link(link) for link in system["links"]],
              [_module(name, module) for name, module in system["modules"].items()]]
-    if "gain" in system:
+    if "operating" in system:
+        operating = system["operating"]
+        found += [Name("scheduled"), [operating["temperature"][name] for name in system["lumps"]],
+                  [operating["current"][name] for name in system["modules"]], system["gain"]]
+    elif "gain" in system:
         found += [Name("observer"), [_sensor(sensor) for sensor in system["sensors"]], system["gain"]]
     if "controller" in system:
         found += [Name("controller"), system["controller"]]

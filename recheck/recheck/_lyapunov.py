@@ -7,7 +7,7 @@ and of where their tangents meet. Where a vertex that is no point of the box fai
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -102,7 +102,7 @@ def refine(network: Network, start: Units, nonlinear: Sequence[Sequence[Entries]
             raise NotCovered(f"{sum(counts)} vertices of matrices of {size} rows are too many to keep")
         modules = [[Share(*part(vertex.entries), vertex) for vertex in vertices(network, group, cuts)]
                    for group in found]
-        open_vertex = _first_failure(Share(*start), [*links, *modules])
+        open_vertex = first_failure(Share(*start), [*links, *modules])
         if open_vertex is None:
             return valid(f"the matrix is positive definite at all {total} vertices of the relaxed box")
         failed = open_vertex
@@ -113,7 +113,7 @@ def refine(network: Network, start: Units, nonlinear: Sequence[Sequence[Entries]
     return not_covered("the matrix inequality is not proven at a vertex, and not refuted either")
 
 
-def _first_failure(start: Share, shares: Sequence[Sequence[Share]]) -> Failure | None:
+def first_failure(start: Share, shares: Sequence[Sequence[Share]]) -> Failure | None:
     for total, chosen in _sums(start, shares):
         if definite(total.rows, total.error) is not True:
             return Failure(chosen)
@@ -139,8 +139,12 @@ def decide(matrix: list[list[Fraction]]) -> bool | None:
     return definite(scaling.matrix({(i, j): matrix[i][j] for i in range(n) for j in range(n)}), 1)
 
 
-def link_shares(network: Network) -> tuple[Entries, list[list[Entries]]]:
-    """Return the linear links at their least conductance, and the two ends of every slope that varies."""
+def link_shares(network: Network, ambient: Mapping[str, Interval] | None = None
+                ) -> tuple[Entries, list[list[Entries]]]:
+    """Return the linear links at their least conductance, and the two ends of every slope that varies.
+
+    ``ambient``: ranges of the ambients, where a claim has them.
+    """
     base: Entries = {}
     nonlinear: list[list[Entries]] = []
     for link in network.links:
@@ -152,6 +156,9 @@ def link_shares(network: Network) -> tuple[Entries, list[list[Entries]]]:
             add(base, place, link.conductance[0] * value)
         if len(lumps) == 2:
             low, high = link.exchange(network.temperature[lumps[0]], network.temperature[lumps[1]])
+        elif link.gain[1] != 0 and ambient is not None:
+            name, = (node for node in link.nodes if isinstance(node, str))
+            low, high = link.exchange(network.temperature[lumps[0]], ambient[name])
         elif link.gain[1] != 0:
             raise NotCovered("convection to an ambient has no bounded slope for a full matrix")
         else:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _stability
+from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _scheduled, _stability
 from ._exact import Interval, short
 from ._hash import machine_hash, short_hash
 from ._thermal import Network
@@ -82,12 +82,15 @@ def _subject(network: Network, parts: Parts, plant: str = "continuous plant") ->
             f"{_parameters(network.parameters, parts)}")
 
 
-def _region(network: Network) -> str:
+def _temperatures(network: Network) -> str:
     boxes = network.temperature
     if all(box == boxes[0] for box in boxes):
-        words = f"in {_span(boxes[0])} K"
-    else:
-        words = ", ".join(f"{short(name)} in {_span(box)} K" for name, box in zip(network.lumps, boxes, strict=True))
+        return f"in {_span(boxes[0])} K"
+    return ", ".join(f"{short(name)} in {_span(box)} K" for name, box in zip(network.lumps, boxes, strict=True))
+
+
+def _region(network: Network) -> str:
+    words = _temperatures(network)
     currents = ", ".join(f"{short(module.name)} in {_span(box)} A"
                          for module, box in zip(network.modules, network.current, strict=True))
     return f"lump temperatures {words}" + (f" and module currents {currents}, each independent of the others"
@@ -215,7 +218,22 @@ def _polytope_measure(problem: _polytope.Problem, sampled: bool) -> str:
     return f"all eigenvalues of its loop have {' and '.join(words)}"
 
 
+def _scheduled_claim(problem: _scheduled.Problem, parts: Parts) -> str:
+    network = problem.network
+    outside = [f"ambient {short(name)} in {_span(box)} K" for name, box in problem.ambient.items()]
+    outside += [f"heat load on {short(network.lumps[k])} in {_span(box)} W" for k, box in problem.heat.items()]
+    words = f", for all {', '.join(outside)}, constant or not" if outside else ""
+    currents = ", ".join(f"{short(module.name)} in {_span(box)} A"
+                         for module, box in zip(network.modules, network.current, strict=True))
+    return (f"The {_subject(network, parts)}, with the state feedback I = I0 + F (x - x0) as given{words}, with no "
+            f"other heat: from every start with (x - x0)'P(x - x0) <= {decimal(problem.level)}, P of table "
+            f"{short_hash(parts['evidence']['matrix'])}, this bound is kept for ever, and with it lump temperatures "
+            f"{_temperatures(network)} and module currents {currents}; while ambients and heat loads are constant, "
+            f"(x - x*)'P(x - x*) falls at least as exp(-2 rate t), rate = {decimal(problem.rate)} 1/s, x* the only "
+            f"equilibrium there, within {decimal(problem.offset)} K of x0 in every lump.")
+
+
 _KINDS: dict[str, Callable[[Any, Parts], str]] = {
     "contraction": _contraction_claim, "invariance": _invariance_claim, "gain": _gain_claim,
-    "observer": _observer_claim, "polytope": _polytope_claim,
+    "observer": _observer_claim, "polytope": _polytope_claim, "scheduled": _scheduled_claim,
     "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}

@@ -27,6 +27,8 @@ from ._regulated import largest_regulated_current as largest_regulated_current
 from ._regulated import regulated as regulated
 from ._runaway import Runaway as Runaway
 from ._runaway import runaway as runaway
+from ._scheduled import scheduled as scheduled
+from ._surroundings import claim_box as claim_box
 from ._surroundings import heater_heat as heater_heat
 from ._thesis import ThesisBounds as ThesisBounds
 from ._thesis import thesis_bounds as thesis_bounds
@@ -35,7 +37,7 @@ from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
 __all__ = ["CertifyCode", "CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree",
-           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "closed_loop", "contraction",
+           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "claim_box", "closed_loop", "contraction",
            "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
            "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
-           "runaway_free", "stability", "thesis_bounds", "usable_current"]
+           "runaway_free", "scheduled", "stability", "thesis_bounds", "usable_current"]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ..errors import InputError
 from ..thermal import System
-from ._sections import Interval, named_ranges
+from ._sections import Currents, Interval, Temperatures, named_ranges, region_section
 
 _HARMLESS = ("gain", "drive.delay", "drive.time_constant")  # ranges that are counted, or keep heat within its limits
 
@@ -56,6 +56,48 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
         low, high = heat.get(heater.lump, (0.0, 0.0))
         heat[heater.lump] = (low + ends[0], high + ends[-1])
     return heat
+
+
+def claim_box(system: System, *, current: Currents, temperature: Temperatures,
+              ambient: Mapping[str, Interval] | None = None, parameters: Mapping[str, Interval] | None = None
+              ) -> dict[str, dict[str, Sequence[float]]]:
+    """Ranges of every lump, module and ambient of a box, and of the uncertain numbers that a claim knows.
+
+    Parameters
+    ----------
+    system : System
+        Network with its modules.
+    current : mapping
+        {module: (lower, upper)} [A], every module.
+    temperature : tuple or mapping
+        Box [K]: (lower, upper) for all lumps, or {lump: (lower, upper)}.
+    ambient : mapping, optional
+        {ambient: (lower, upper)} [K]; default its nominal temperature.
+    parameters : mapping, optional
+        Uncertain numbers of the system as in `contraction`; what no claim depends on is left out.
+
+    Returns
+    -------
+    dict
+        "temperature" and "ambient" [K], "current" [A], "parameters" [own unit], each {name: (lower, upper)}.
+
+    Raises
+    ------
+    InputError
+        Boxes that do not fit the system.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> box = rt.certify.claim_box(rt.systems.two_module(), current={"m1": (0, 1), "m2": (0, 1)}, temperature=(280, 320))
+    >>> box["current"]["m2"], box["temperature"]["x1"], len(box["temperature"])
+    ([0.0, 1.0], [280.0, 320.0], 18)
+    """
+    region = region_section(system, current, temperature, parameters)
+    boxes = region["temperature"]
+    lumps = dict(boxes) if isinstance(boxes, Mapping) else dict.fromkeys(system.lump_names, boxes)
+    return {"temperature": lumps, "current": region["current"], "parameters": region.get("parameters", {}),
+            "ambient": {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}}
 
 
 def ambient_ranges(system: System, ambient: Mapping[str, Interval] | None,

@@ -63,6 +63,9 @@ from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 from ._step_response_linearity import StepResponseLinearity as StepResponseLinearity
 from ._step_response_linearity import step_response_linearity as step_response_linearity
+from ._tem_feedback import TemFeedback as TemFeedback
+from ._tem_feedback import tem_feedback as tem_feedback
+from ._tem_hull import tem_polytope as tem_polytope
 from ._tuning import Tuning as Tuning
 from ._tuning import checked_margins as checked_margins
 from ._tuning import tune_pi as tune_pi
@@ -77,10 +80,11 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController",
            "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
            "PlantMargins", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen", "StateFeedback",
-           "StepResponseLinearity", "Tuning", "certify_loop", "check_polarity", "checked_margins", "cold_side",
+           "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity", "checked_margins", "cold_side",
            "collapse", "constant_gain", "corner_plants", "disturbance_observer", "face_ranges", "feed_forward",
            "feedback_linearization", "gains_digest", "linear_controller", "load_controller", "loop_margins",
            "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
-           "state_feedback", "step_response_linearity", "tune_pi", "unobservable"]
+           "state_feedback", "step_response_linearity", "tem_feedback",
+           "tem_polytope", "tune_pi", "unobservable"]
 __all__ += ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf",  # of synthesis
             "mixed", "output_feedback", "polytopic_feedback"]

@@ -13,6 +13,7 @@ import numpy as np
 from .._arrays import Array
 from .._checks import finite_number, quoted
 from .._control import control
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, made_by, read_plant
 from ..verification import Certificate, establish
@@ -87,6 +88,27 @@ class FeedbackDesign(Design):
         if not all(every):
             return {}
         return {name: {key: min(one[name][key] for one in every) for key in every[0][name]} for name in every[0]}
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the eigenvalues of the loops at the vertices.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        ax = axes_for(ax)
+        m = len(self.gain)
+        poles = np.array([np.linalg.eigvals(one.A + one.B[:, -m:] @ self.gain) for one in self.plants]).ravel()
+        ax.plot(poles.real, poles.imag, "x", label=f"loops at the {len(self.plants)} vertices")
+        unit = "" if self.controller.dt else " [1/s]"
+        ax.set(xlabel=f"real part{unit}", ylabel=f"imaginary part{unit}")
+        ax.legend(loc="best")
+        return ax
 
 
 def polytopic_feedback(plants: Sequence[control.StateSpace], n_ctrl: int, *, rate: float = 0.0,

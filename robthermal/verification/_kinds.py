@@ -16,8 +16,9 @@ from ._peak import PEAK
 from ._polytope import POLYTOPE
 from ._regulated import REGULATED
 from ._runaway import RUNAWAY
+from ._scheduled import SCHEDULED
 from ._stability import STABILITY
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
                                                        REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP,
-                                                       CLOSED_LOOP, POLYTOPE)}
+                                                       CLOSED_LOOP, POLYTOPE, SCHEDULED)}

@@ -7,7 +7,7 @@ Not convex in the current for a general P, so (I, I²) is relaxed to a polygon a
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from flint import arb, arb_mat, fmpq
@@ -139,8 +139,12 @@ def module_slopes(system: ThermalSystem, region: Region, pieces: int) -> list[Mo
     return [ModuleSlopes(system, region, group, points) for group in clusters(system)]
 
 
-def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[list[Described]], str]:
-    """Return the linear links, the two ends of every slope that varies, and what is missing to bound one."""
+def link_slopes(system: ThermalSystem, region: Region, ambient: Mapping[str, Interval] | None = None
+                ) -> tuple[Entries, list[list[Described]], str]:
+    """Return the linear links, the two ends of every slope that varies, and what is missing to bound one.
+
+    ``ambient``: ranges of the ambients, where a claim has them.
+    """
     names, temperature = system.lumps, region.temperature
     base: Entries = {}
     nonlinear: list[list[Described]] = []
@@ -152,6 +156,11 @@ def link_slopes(system: ThermalSystem, region: Region) -> tuple[Entries, list[li
             exchange: Entries = {(i, i): fmpq(-1), (i, j): fmpq(1), (j, j): fmpq(-1), (j, i): fmpq(1)}
             if link.convects or link.spread != 0:
                 nonlinear.append(_ends(exchange_slope(link, temperature[i], temperature[j]), exchange, "conductance"))
+        elif ends and link.convects and ambient is not None:
+            name, = (node for node in (a, b) if isinstance(node, str))
+            exchange = {(ends[0], ends[0]): fmpq(-1)}
+            slope = exchange_slope(link, temperature[ends[0]], ambient[name])
+            nonlinear.append(_ends(slope, exchange, "convection"))
         elif ends and link.convects:
             return base, nonlinear, (f"natural convection from lump {name_of(names[ends[0]])} to an ambient has no "
                                      "bounded slope; use energy, sum or max")

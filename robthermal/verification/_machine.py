@@ -6,7 +6,7 @@ because gain matrices, controllers and weights refer to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from ._fields import get, mapping, sequence, text
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _CONSTANTS = ("seebeck", "resistance", "conductance", "sink_conductance", "sink_temperature", "setpoint")
 _SIZES = {"linear": ("A", "B", "C", "D", "sample_time"), "network": ("capacity", "rows", "cols", "values")}
-_ADDED = ("gain", "controller")  # what observers and loops add to the section of a machine
+_ADDED = ("gain", "controller", "operating")  # what observers, loops and feedbacks add to the section of a machine
 
 
 def machine_hash(system_section: Mapping[str, Any]) -> str:
@@ -110,12 +110,23 @@ def _thermal(table: Mapping[str, Any]) -> list[Any]:
                 *module.conductance, module.reference] for module in system.modules]
     content = [Name("thermal"), Name(system.name), [[name, c] for name, c in zip(nodes, system.capacity, strict=True)],
                [Name(ambient) for ambient in system.ambients], links, modules]
-    if "gain" in table:
+    if "operating" in table:
+        content += [Name("scheduled"), _operating(table, "temperature", system.lumps),
+                    _operating(table, "current", [module.name for module in system.modules]),
+                    get(table, "gain", "system")]
+    elif "gain" in table:
         content += [Name("observer"), [_sensor(item) for item in sequence(table.get("sensors", ()), "system.sensors")],
                     table["gain"]]
     if "controller" in table:
         content += [Name("controller"), table["controller"]]
     return content
+
+
+def _operating(table: Mapping[str, Any], key: str, names: Sequence[str]) -> list[Any]:
+    """Return the numbers of an operating point, in the order of lumps or modules."""
+    where = f"system.operating.{key}"
+    found = mapping(get(mapping(table["operating"], "system.operating"), key, "system.operating"), where)
+    return [get(found, name, where) for name in names]
 
 
 def _sensor(value: Any) -> list[Any]:

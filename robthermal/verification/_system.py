@@ -165,7 +165,7 @@ def say_region(system: ThermalSystem, region: Region) -> str:
     """Return the box of a claim in words."""
     currents = ", ".join(f"{name_of(module.name)} in {say_interval(current)} A"
                          for module, current in zip(system.modules, region.current, strict=True))
-    words = f"lump temperatures {_say_temperatures(system, region)}"
+    words = f"lump temperatures {say_temperatures(system, region)}"
     return words + (f" and module currents {currents}, each independent of the others" if currents else "")
 
 
@@ -174,7 +174,8 @@ def say_interval(value: Interval) -> str:
     return f"[{decimal(value[0])}, {decimal(value[1])}]"
 
 
-def _say_temperatures(system: ThermalSystem, region: Region) -> str:
+def say_temperatures(system: ThermalSystem, region: Region) -> str:
+    """Return the range of every lump, once where all are the same."""
     if all(box == region.temperature[0] for box in region.temperature):
         return f"in {say_interval(region.temperature[0])} K"
     return ", ".join(f"{name_of(name)} in {say_interval(box)} K"
