@@ -37,7 +37,7 @@ from ._usable_result import CurrentBound as CurrentBound
 from ._usable_result import UsableCurrent as UsableCurrent
 
 __all__ = ["CertifyCode", "CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree",
-           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "claim_box", "closed_loop", "contraction",
-           "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance", "largest_current",
-           "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak", "regulated", "runaway",
-           "runaway_free", "scheduled", "stability", "thesis_bounds", "usable_current"]
+           "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "claim_box", "closed_loop",
+           "contraction", "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance",
+           "largest_current", "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak",
+           "regulated", "runaway", "runaway_free", "scheduled", "stability", "thesis_bounds", "usable_current"]

@@ -1,4 +1,4 @@
-"""State feedback of the currents around an operating point: from which starts it works, proven for the nonlinear set-up."""
+"""State feedback of the currents around an operating point: from which starts it is proven to work."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ def scheduled(system: System, *, gain: ArrayLike, matrix: ArrayLike, level: floa
     region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
     if heat:
         region["heat"] = named_ranges(heat, system.lump_names, "heat", "lump")
-    section |= {"gain": _matrix(gain, (len(system.modules), len(system.lumps)), "gain"),
-                "operating": {"temperature": _named(operating_temperatures, system.lump_names, "operating_temperatures"),
-                              "current": _named(operating_current, system.module_names, "operating_current")}}
+    point = {"temperature": _named(operating_temperatures, system.lump_names, "operating_temperatures"),
+             "current": _named(operating_current, system.module_names, "operating_current")}
+    section |= {"gain": _matrix(gain, (len(system.modules), len(system.lumps)), "gain"), "operating": point}
     P = np.array(_matrix(matrix, (len(system.lumps),) * 2, "matrix"))
     evidence = {"matrix": ((P + P.T) / 2).tolist()}
     region |= {"level": float(level), "rate": float(rate)}

@@ -89,7 +89,8 @@ def claim_box(system: System, *, current: Currents, temperature: Temperatures,
     Examples
     --------
     >>> import robthermal as rt
-    >>> box = rt.certify.claim_box(rt.systems.two_module(), current={"m1": (0, 1), "m2": (0, 1)}, temperature=(280, 320))
+    >>> two = rt.systems.two_module()
+    >>> box = rt.certify.claim_box(two, current={"m1": (0, 1), "m2": (0, 1)}, temperature=(280, 320))
     >>> box["current"]["m2"], box["temperature"]["x1"], len(box["temperature"])
     ([0.0, 1.0], [280.0, 320.0], 18)
     """

@@ -80,11 +80,11 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController",
            "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
            "PlantMargins", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen", "StateFeedback",
-           "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity", "checked_margins", "cold_side",
-           "collapse", "constant_gain", "corner_plants", "disturbance_observer", "face_ranges", "feed_forward",
-           "feedback_linearization", "gains_digest", "linear_controller", "load_controller", "loop_margins",
-           "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points", "simulate_loop",
-           "state_feedback", "step_response_linearity", "tem_feedback",
-           "tem_polytope", "tune_pi", "unobservable"]
+           "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity", "checked_margins",
+           "cold_side", "collapse", "constant_gain", "corner_plants", "disturbance_observer", "face_ranges",
+           "feed_forward", "feedback_linearization", "gains_digest", "linear_controller", "load_controller",
+           "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points",
+           "simulate_loop", "state_feedback", "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi",
+           "unobservable"]
 __all__ += ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf",  # of synthesis
             "mixed", "output_feedback", "polytopic_feedback"]

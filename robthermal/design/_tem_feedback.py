@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._celsius import ZERO_CELSIUS
 from .._checks import finite_number, positive_number, quoted
+from .._control import control
 from .._drawing import axes_for
 from ..certify import scheduled
 from ..errors import InputError, Outcome
@@ -25,7 +25,7 @@ from ._numbers import numbers
 from ._tem_hull import TemHull, read_box, tem_hull
 from ._tem_program import Ellipsoid, largest_ball
 
-_HALVINGS = 6  # of the rate, where the one asked for is not reached
+_QUARTERS, _HALVINGS = 7, 4  # of the rate, where the one asked for is not reached
 _METHOD = "state feedback over a box of temperatures and currents (matrix inequalities)"
 
 
@@ -126,8 +126,9 @@ class TemFeedback(FeedbackDesign):
             return words
         rest = ", ".join(f"{name} {value - ZERO_CELSIUS:.2f} °C" for name, value in self.operating_temperatures.items())
         amperes = ", ".join(f"{name} {value:.4g} A" for name, value in self.operating_current.items())
-        return (f"{words}\n  starts          ellipsoid around the operating point, semi-axes {self.semi_axes[0]:.4g} to "
-                f"{self.semi_axes[-1]:.4g} K\n  operating       {amperes}; {rest}")
+        axes = f"semi-axes {self.semi_axes[0]:.4g} to {self.semi_axes[-1]:.4g} K"
+        return (f"{words}\n  starts          ellipsoid around the operating point, {axes}\n"
+                f"  operating       {amperes}; {rest}")
 
     def plot(self, ax: Any = None) -> Any:
         """Draw, lump by lump, the box, the operating temperature and how far the ellipsoid of starts reaches.
@@ -208,7 +209,8 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     >>> import robthermal as rt
     >>> stage = rt.System(ambients={"room": {"temperature": 298.0}},
     ...     lumps={"plate": {"capacity": 60.0}, "module": {"capacity": 12.0}, "sink": {"capacity": 90.0}},
-    ...     links=[{"between": ("plate", "module"), "conductance": 5.0}, {"between": ("sink", "room"), "conductance": 4.0},
+    ...     links=[{"between": ("plate", "module"), "conductance": 5.0},
+    ...            {"between": ("sink", "room"), "conductance": 4.0},
     ...            {"between": ("plate", "room"), "conductance": 0.15}],
     ...     modules={"m": {"hot": "sink", "cold": "module", "seebeck": {"value": 0.052}, "resistance": {"value": 2.1},
     ...              "conductance": {"value": 0.5}, "reference_temperature": 298.0}})
@@ -229,8 +231,8 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     found = largest_ball(hull, asked, room, current_room)
     cert = None if found is None else scheduled(
         system, gain=found.F, matrix=np.linalg.inv(found.W), level=1.0, rate=asked, operating_temperatures=point[0],
-        operating_current=point[1], current=box["current"], temperature=box["temperature"], ambient=ambient, heat=heat,
-        parameters=box["parameters"] or None)  # type: ignore[arg-type]
+        operating_current=point[1], current=_pairs(box["current"]), temperature=temperature, ambient=ambient, heat=heat,
+        parameters=_pairs(box["parameters"]))
     outcome = _outcome(found, cert, asked, hull, room, current_room)
     return _design(system, box, point, found, cert, asked, outcome, time.perf_counter() - start)
 
@@ -256,14 +258,15 @@ def _operating(system: System, operating: Any, box: Mapping[str, Any], heat: Map
     rest = steady_state(system, {**currents, **middle}, heat=loads)
     if not rest.equilibria:
         raise InputError(f"no steady state at these currents: {rest.outcome.text}", where="argument operating",
-                         expected="currents with a steady state", remedy=rest.outcome.remedy)
+                         expected="currents with a steady state")
     inside = [one for one in rest.equilibria if all(low < one.temperatures[name] < high
                                                     for name, (low, high) in box["temperature"].items())]
     if not inside:
         first = rest.equilibria[0].temperatures
         name, value = next((name, first[name]) for name, (low, high) in box["temperature"].items()
                            if not low < first[name] < high)
-        raise InputError(f"at rest lump {name!r} is at {value:.2f} K, outside of the box {tuple(box['temperature'][name])}",
+        ends = tuple(box["temperature"][name])
+        raise InputError(f"at rest lump {name!r} is at {value:.2f} K, outside of the box {ends}",
                          where="argument temperature", expected="a box around the operating point",
                          remedy="Widen the box, or operate with other currents.")
     return {name: float(inside[0].temperatures[name]) for name in system.lump_names}, currents
@@ -279,14 +282,19 @@ def _outcome(found: Ellipsoid | None, cert: Certificate | None, asked: float, hu
                 f"equilibrium decays with {asked:g} 1/s or faster.")
         return SynthesisCode.NOT_CERTIFIED.outcome(f"A gain was computed, but not proven: {cert.reason}.",
                                                    remedy="Ask for a lower rate, a smaller box or narrower ranges.")
-    low, high = 0.0, asked
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if largest_ball(hull, middle, room, current_room) is not None else (low, middle)
+    def reached(rate: float) -> bool:
+        return largest_ball(hull, rate, room, current_room) is not None
+
+    low = next((asked / 4**k for k in range(1, _QUARTERS) if reached(asked / 4**k)), 0.0)
     if not low:
         return SynthesisCode.INFEASIBLE.outcome(
-            f"No feedback with one quadratic form for the whole box was found, at a rate of {high:.3g} 1/s or above.",
+            "No feedback with one quadratic form for the whole box was found, at a rate of "
+            f"{asked / 4 ** (_QUARTERS - 1):.3g} 1/s or above.",
             remedy="Take a smaller box of temperatures or currents.")
+    high = 4 * low
+    for _ in range(_HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if reached(middle) else (low, middle)
     return SynthesisCode.INFEASIBLE.outcome(
         f"rate = {asked:g}: the best achievable with one quadratic form for the whole box is about {low:.3g} 1/s.",
         remedy="Ask for less, or take a smaller box.")
@@ -307,12 +315,15 @@ def _design(system: System, box: Mapping[str, Any], point: tuple[dict[str, float
     words = "Nothing is proven."
     if ok:
         ranges = f", {len(box['parameters'])} uncertain parameters in their ranges" if box["parameters"] else ""
-        words = ("Proven for the nonlinear network, from every start in the ellipsoid, for every temperature and current "
-                 f"on the way{ranges}.")
+        words = ("Proven for the nonlinear network, from every start in the ellipsoid, for every temperature and "
+                 f"current on the way{ranges}.")
     P = np.eye(n) if found is None else np.linalg.inv(found.W)
     return TemFeedback(controller, -asked if ok else np.inf, -np.inf, loop, [cert] if ok and cert is not None else [],
-                       RobustAgainst(words, {"parameters": float(len(box["parameters"]))}), outcome, _METHOD, "Clarabel",
-                       seconds, 0 if found is None else found.solves, None, F, (P + P.T) / 2, asked if ok else 0.0,
-                       (plant,), 1.0 if ok else 0.0, point[0], point[1],
-                       {name: (float(a), float(b)) for name, (a, b) in box["temperature"].items()},
-                       {name: (float(a), float(b)) for name, (a, b) in box["current"].items()})
+                       RobustAgainst(words, {"parameters": float(len(box["parameters"]))}), outcome, _METHOD,
+                       "Clarabel", seconds, 0 if found is None else found.solves, None, F, (P + P.T) / 2,
+                       asked if ok else 0.0, (plant,), float(ok), *point, _pairs(box["temperature"]),
+                       _pairs(box["current"]))
+
+
+def _pairs(ranges: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:
+    return {name: (float(low), float(high)) for name, (low, high) in ranges.items()}

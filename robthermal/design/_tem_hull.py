@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-import control
 import numpy as np
 
+from .._arrays import Places
+from .._control import control
 from ..certify import claim_box
 from ..errors import InputError
 from ..thermal import Equations, Module, System
@@ -35,7 +36,7 @@ class TemHull:
         """Number of joint vertices."""
         return int(np.prod([float(len(parts)) for parts, _ in self.groups]))
 
-    def at(self, numbers: Array) -> tuple[Array, Array]:
+    def at(self, numbers: Places) -> tuple[Array, Array]:
         """A and B of some joint vertices."""
         n, m = len(self.base), self.groups[0][1].shape[2]
         A, B = np.repeat(self.base[None], len(numbers), axis=0), np.zeros((len(numbers), n, m))
@@ -46,7 +47,7 @@ class TemHull:
             B += inputs[own]
         return A, B
 
-    def chunks(self) -> Iterator[tuple[Array, Array, Array]]:
+    def chunks(self) -> Iterator[tuple[Places, Array, Array]]:
         """All joint vertices, some at a time: their numbers, A and B."""
         for first in range(0, self.count, _CHUNK):
             numbers = np.arange(first, min(first + _CHUNK, self.count))
@@ -55,7 +56,8 @@ class TemHull:
 
 def tem_hull(system: System, box: Mapping[str, Mapping[str, Sequence[float]]]) -> TemHull:
     """Hull over a box with ranges of every lump, module and ambient, as `read_box` returns it."""
-    temperature, current, ambient, parameters = (box[key] for key in ("temperature", "current", "ambient", "parameters"))
+    temperature, current = box["temperature"], box["current"]
+    ambient, parameters = box["ambient"], box["parameters"]
     worst = system.with_parameters({name: low for name, (low, _) in parameters.items() if name.startswith("links.")})
     eq, index = Equations(worst), {name: k for k, name in enumerate(system.lumps)}
     n, m = len(index), len(system.modules)

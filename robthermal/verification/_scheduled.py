@@ -1,8 +1,9 @@
 """Kind "scheduled": a network of modules under a state feedback of their currents, from an ellipsoid of starts.
 
-I = I0 + F (x - x0). Over the box the loop contracts in V = e'Pe: the hull of its slopes J + b F is built here (Bernstein
-points in two temperatures and the current of every module, the ends of links that are not linear). The ellipsoid lies in
-the box, its currents in their ranges, and what is left of the heat flows at x0 is too small to push a trajectory out.
+I = I0 + F (x - x0). Over the box the loop contracts in V = e'Pe: the hull of its slopes J + b F is built here
+(Bernstein points in two temperatures and the current of every module, the ends of links that are not linear). The
+ellipsoid lies in the box, its currents in their ranges, and what is left of the heat flows at x0 is too small to push a
+trajectory out (proof note, 13).
 """
 
 from __future__ import annotations
@@ -27,7 +28,6 @@ from ._fields import (
     mapping,
     no_other,
     not_negative,
-    numbers,
     positive,
 )
 from ._flow import control_points

@@ -1,9 +1,14 @@
 """The two-module setup, its law, cold side and a controller."""
 
+import sys
+from pathlib import Path
+
 import module_systems
 import pytest
 
 import robthermal as rt
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))  # sampled truth about certificates
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from pathlib import Path
 import certificate_truth
 import mutant_feedback
 import mutant_linear
+import mutant_scheduled
 import mutant_thermal
 import numpy as np
 import pytest
@@ -24,8 +25,9 @@ from robthermal.verification import establish
 from robthermal.verification._kinds import KINDS
 
 SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
-                                                  *mutant_feedback.SUBJECTS)}
-COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope")
+                                                  *mutant_feedback.SUBJECTS, *mutant_scheduled.SUBJECTS)}
+COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope",
+           "scheduled")
 
 
 def document_of(certificate) -> dict:

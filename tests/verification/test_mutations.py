@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mutant_feedback
 import mutant_linear
+import mutant_scheduled
 import mutant_thermal
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from mutants import ALARMS, FALSE, Subject, judge, run
 from robthermal.verification._kinds import KINDS
 
 SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
-                                                  *mutant_feedback.SUBJECTS)}
+                                                  *mutant_feedback.SUBJECTS, *mutant_scheduled.SUBJECTS)}
 
 
 def test_every_kind_has_a_falsifier():
@@ -42,6 +43,8 @@ def test_falsifiers_find_what_is_false(kind):
                        for key, value in region.items() if key in ("rate", "bound", "decay", "radius")})
         if document["system"]["sample_time"] and "rate" in region:
             region["rate"] = 0.999
+    elif kind == "scheduled":
+        region["level"] = 4 * region["level"]
     elif kind == "closed_loop":
         region["rate" if region["measure"] == "stability" else "bound"] = (
             (0.999 if document["system"]["sample_time"] else 1e6) if region["measure"] == "stability"

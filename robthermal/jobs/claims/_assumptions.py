@@ -53,6 +53,10 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
                     "beyond those of the plant."),
     "polytope": ("The plant is linear at every moment and lies in the convex hull of the vertices; its states are "
                  "measured.", "The gain runs with the numbers of the certificate file, without limits or delays."),
+    "scheduled": (
+        "The feedback reads all lump temperatures at every moment and the currents follow without delay.",
+        "The machine starts inside the ellipsoid; ambients and heats stay in their stated ranges.",
+    ),
     "loop": (
         "Controller and linearizing feedback law run as in the certificate file, read the true temperatures at the "
         "samples, and the current is held between them. Where the sentence says \"sampled model\", nothing is claimed "
