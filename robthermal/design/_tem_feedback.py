@@ -60,7 +60,7 @@ class TemFeedback(FeedbackDesign):
     plant : GeneralizedPlant or None
         Always None: the plant is not linear.
     gain : ndarray, shape (n_modules, n_lumps)
-        F [A/K].
+        Feedback F of the currents [A/K].
     matrix : ndarray, shape (n_lumps, n_lumps)
         P of V = (x - x0)'P(x - x0) [1/K²].
     rate : float

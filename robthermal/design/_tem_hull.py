@@ -122,9 +122,9 @@ def control_points(module: Module, hot: Sequence[float], cold: Sequence[float], 
         if values.shape[axis] == 3:
             low, middle, high = (np.take(values, k, axis) for k in range(3))
             chord = (low + high) / 2
-            bent = 2 * middle - chord
-            linear = np.abs(bent - chord).max() <= _SAME * np.abs(values).max()
-            values = np.stack([low, high] if linear else [low, bent, high], axis)
+            raised = 2 * middle - chord
+            linear = np.abs(raised - chord).max() <= _SAME * np.abs(values).max()
+            values = np.stack([low, high] if linear else [low, raised, high], axis)
     return np.unique(values.reshape(-1, 6), axis=0)
 
 
@@ -177,7 +177,7 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     >>> import robthermal as rt
     >>> plants = rt.design.tem_polytope(rt.systems.two_module(), temperature=(280.0, 320.0), current=(0.0, 1.0))
     >>> len(plants), plants[0].nstates, plants[0].input_labels
-    (144, 18, ['m1', 'm2'])
+    (729, 18, ['m1', 'm2'])
     """
     box = read_box(system, temperature, current, covariance, probability, ambient)
     hull = tem_hull(system, box)

@@ -71,9 +71,9 @@ def _flow(link: Link, heats: Heats) -> tuple[arb, arb]:
     for a, b, g, k, c in product(first, second, _two(link.conductance, link.spread), _two(link.gain, link.gain_spread),
                                  _two(link.radiation, link.radiation_spread)):
         linear, difference = g * (b - a) + c * (b**4 - a**4), b - a
-        bent = [k * difference * bound for bound in power(abs(difference), link.exponent)] if k != 0 else [fmpq(0)]
-        least.append(linear + min(bent))
-        most.append(linear + max(bent))
+        convected = [k * difference * bound for bound in power(abs(difference), link.exponent)] if k != 0 else [fmpq(0)]
+        least.append(linear + min(convected))
+        most.append(linear + max(convected))
     return arb(min(least)), arb(max(most))
 
 

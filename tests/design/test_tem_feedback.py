@@ -83,7 +83,9 @@ def test_numbers_of_the_contract(designed):
 
 def test_every_start_on_the_boundary_stays_and_decays(designed):
     rest = np.array(list(designed.operating_temperatures.values()))
-    for x in boundary(designed, np.random.default_rng(0), 12):
+    starts = boundary(designed, np.random.default_rng(0), 12)
+    assert len(starts) == 12
+    for x in starts:
         path = run(designed, x, lambda t: (298.0, {}), 150.0, 150) - rest
         V = np.einsum("ti,ij,tj->t", path, designed.matrix, path)
         assert V[0] == pytest.approx(designed.level)
