@@ -46,7 +46,7 @@ SURFACE = {
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf
-        mixed output_feedback polytopic_feedback
+        mixed mu_synthesis output_feedback polytopic_feedback
     """,
     "diagnosis": """
         Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
@@ -93,7 +93,7 @@ SURFACE = {
     """,
     "synthesis": """
         Design FeedbackDesign FrfDesign RobustAgainst SynthesisCode frf_pid h2 hinf
-        mixed output_feedback polytopic_feedback
+        mixed mu_synthesis output_feedback polytopic_feedback
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

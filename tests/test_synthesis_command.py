@@ -79,3 +79,28 @@ def test_bad_files_name_what_is_wrong(run, tmp_path, content, method, words):
     done = design_by(run, tmp_path, content, method)
     assert done.status == 2 and words in " ".join((done.out + done.err).split()), done.out + done.err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("method", "more", "kinds"), [
+    ("mixed", "[design]\nhinf_limit = 12.0\n", ["closed_loop", "closed_loop"]),
+    ("output-feedback", "[design]\norder = 1\n", ["closed_loop"])])
+def test_methods_with_arguments(run, tmp_path, method, more, kinds):
+    done = design_by(run, tmp_path, PLANT + more, method)
+    assert done.status == 0, done.out + done.err
+    files = sorted((tmp_path / "out" / "certificates").glob("*"))
+    assert [rt.Certificate.load(path).kind for path in files] == kinds
+
+
+def test_robust_performance_from_a_file(run, tmp_path):
+    content = ("[plant]\nA = [[-1.0]]\nB = [[0.2, 1.0, 0.0, 1.0]]\nC = [[0.0], [1.0], [0.0], [1.0]]\n"
+               "D = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.1, 0.0]]\n"
+               'n_meas = 1\nn_ctrl = 1\n[design]\norder = 1\nblocks = [["full", 1, 1], ["full", 2, 2]]\n')
+    done = design_by(run, tmp_path, content, "mu")
+    assert done.status == 0, done.out + done.err
+    assert (tmp_path / "out" / "certificates" / "1_frequency.json").exists()
+    assert "matrices in floating-point numbers" in (tmp_path / "out" / "report.html").read_text().replace("&#39;", "'")
+
+
+def test_a_missing_argument_is_named(run, tmp_path):
+    done = design_by(run, tmp_path, PLANT, "mixed")
+    assert done.status == 2 and "design.hinf_limit is missing" in " ".join((done.out + done.err).split())

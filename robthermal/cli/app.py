@@ -243,8 +243,8 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            sensors: Annotated[str | None, typer.Option(
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
-               help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, output-feedback, frf-pid: "
-               "a synthesis for PLANT.toml (docs/command_line.md), without the other options.")] = "energy",
+               help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, mu, output-feedback, "
+               "frf-pid: a synthesis for PLANT.toml (docs/command_line.md), without the other options.")] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
                metavar="FILE.json|NAME=LO:HI")] = None,

@@ -8,6 +8,7 @@ from ..synthesis import frf_pid as frf_pid
 from ..synthesis import h2 as h2
 from ..synthesis import hinf as hinf
 from ..synthesis import mixed as mixed
+from ..synthesis import mu_synthesis as mu_synthesis
 from ..synthesis import output_feedback as output_feedback
 from ..synthesis import polytopic_feedback as polytopic_feedback
 from ._certify_loop import CertifiedLoop as CertifiedLoop
@@ -87,4 +88,4 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "simulate_loop", "state_feedback", "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi",
            "unobservable"]
 __all__ += ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "frf_pid", "h2", "hinf",  # of synthesis
-            "mixed", "output_feedback", "polytopic_feedback"]
+            "mixed", "mu_synthesis", "output_feedback", "polytopic_feedback"]

@@ -12,8 +12,9 @@ from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
 from ._mixed import mixed as mixed
+from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 
 __all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf",
-           "mixed", "output_feedback", "polytopic_feedback"]
+           "mixed", "mu_synthesis", "output_feedback", "polytopic_feedback"]

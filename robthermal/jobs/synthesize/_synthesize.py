@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..._checks import quoted
-from ...design import Design, frf_pid, h2, hinf, mixed, output_feedback
+from ...design import Design, frf_pid, h2, hinf, mixed, mu_synthesis, output_feedback
 from ...errors import InputError
 from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "mixed", "output-feedback", "frf-pid")
-_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "output-feedback": output_feedback,
-                                           "frf-pid": frf_pid}
-_TITLES = {"hinf": "H-infinity norm", "h2": "H2 norm", "region": "Region of the eigenvalues",
-           "stability": "Stability", "peak": "Peak gain"}
+METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid")
+_VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "mu": mu_synthesis,
+                                           "output-feedback": output_feedback, "frf-pid": frf_pid}
+_TITLES = {"frequency": "Structured singular value", "hinf": "H-infinity norm", "h2": "H2 norm",
+           "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain"}
 
 
 @dataclass(frozen=True)
@@ -75,12 +75,14 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
         raise InputError(f"method = {quoted(method)}", where="--method", expected=f"one of {list(METHODS)}")
     verb = _VERBS[method]
     allowed = [name for name, one in inspect.signature(verb).parameters.items() if one.kind is one.KEYWORD_ONLY]
+    if method == "mu":  # blocks is its last positional argument
+        allowed = ["blocks", *allowed]
     unknown = [name for name in job.arguments if name not in allowed]
     if unknown:
         raise InputError(f"unknown key {quoted(unknown[0])}", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")
     missing = [name for name, one in inspect.signature(verb).parameters.items()
-               if one.kind is one.KEYWORD_ONLY and one.default is one.empty and name not in job.arguments]
+               if name in allowed and one.default is one.empty and name not in job.arguments]
     if missing:
         raise InputError(f"key design.{missing[0]} is missing", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")

@@ -18,6 +18,9 @@ from ._synthesize import Synthesis
 
 _ASSUMED = ("Plant and controller are linear and do not vary with time; no actuator saturates.",
             "Certificates speak of the floating-point numbers of plant and controller in their files.")
+_FORMED = "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic."
+_HOW = {"frequency": "About the loop's matrices in floating-point numbers, as in the file; re-derived in ball "
+                     "arithmetic at every frequency."}
 
 
 def write_synthesis(result: Synthesis, out: str | Path) -> Report:
@@ -83,7 +86,7 @@ def _claims(result: Synthesis) -> Iterator[Claim]:
         reason = "" if one.good or one.verdict is None else one.verdict.reason
         yield Claim(one.title, one.certificate.claim, one.certificate.holds, one.good, "the plant of the file",
                     f"bound {one.certificate.region.get('bound', 'as stated')}" if one.good else "none",
-                    "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic.", reason,
+                    _HOW.get(one.certificate.kind, _FORMED), reason,
                     one.file, one.certificate.kind, one.verdict.seconds if one.verdict else 0.0)
 
 
