@@ -78,7 +78,9 @@ class Day:
     loss : float
         Conductance of a path from the block to the room that no file has [W/K].
     draught : float
-        Amplitude of a heat into the plate with a period of 8 minutes that begins after a third of the record [W].
+        Heat into the plate that comes and goes at random, a few minutes at a time [W]: in no catalog.
+    drift : float
+        How much more the block's sensor reads at the end of the record than at its start [K]: in no catalog.
     """
 
     factors: dict[str, float] = field(default_factory=dict)
@@ -86,6 +88,7 @@ class Day:
     room: float = 0.0
     loss: float = 0.0
     draught: float = 0.0
+    drift: float = 0.0
 
 
 HEALTHY = Day()
@@ -110,12 +113,12 @@ def record(seed: int, day: Day = HEALTHY, *, scatter: float = 0.03, length: int 
     rate[0, 5], rate[2, 5] = day.loss / capacity[0], g3 / capacity[2]
     step = expm(rate * STEP)  # exact for held inputs
     T, rows = there + rng.uniform(0.0, 3.0, 3), []
+    gusts = np.cumsum(rng.random(length) < 0.05) % 2  # on and off, 200 s on the mean
     for k in range(length):
         rows.append(T)
-        draught = day.draught * np.sin(2.0 * np.pi * k * STEP / 480.0) if k > length // 3 else 0.0
-        T = step[:3] @ np.array([*T, factor["power"] * heater[k], draught, there])
+        T = step[:3] @ np.array([*T, factor["power"] * heater[k], day.draught * gusts[k], there])
     readings = np.array(rows) + NOISE * rng.standard_normal((length, 3))
-    readings[:, 0] += day.offset
+    readings[:, 0] += day.offset + day.drift * np.linspace(0.0, 1.0, length)
     columns = [heater, np.full(length, said + ZERO)] if room else [heater]
     return rt.Record(sample_time=STEP, inputs=np.column_stack(columns), outputs=readings + ZERO,
                      input_names=["heater", "room"][:len(columns)], output_names=["T_block", "T_plate", "T_sink"])

@@ -19,7 +19,7 @@ from .fit import Refit, SessionGain, exact
 from .search import SearchState, ShortList
 
 _NOISE_ONLY = 1.5  # whitened variance
-_SHARE = 0.5  # of the excess mean square, that a change must explain where something else has changed too
+_MOST = 0.95  # of what is outside the scatter, that changes must remove where they leave some of it
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -99,9 +99,9 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     state = SearchState(nominal=before, names=None, scores=found.scores, fit=fit if found.rounds else exact(before),
                         current=found.scores, short=ShortList(fit, (), {}), rounds=found.rounds, complete=True)
     held_out = validation.predicted(before, state.fit)
-    excess = excess_of(fit, healthy)
+    excess, bare_excess = excess_of(fit, healthy), excess_of(new, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
-    verdict, outcome = _verdict(found, excess, gaps, _bare(fit, healthy))
+    verdict, outcome = _verdict(found, excess, gaps, excess.removed(bare_excess), _bare(fit, healthy))
     found_some = verdict in ("named", "named_with_remainder", "ambiguous")
     return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
                   plain=exact(fit) if found_some else None)
@@ -121,12 +121,13 @@ def _bare(fit: Refit, healthy: Reference) -> bool:
             and all(one.variance < _NOISE_ONLY for one in healthy.each))
 
 
-def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], bare: bool) -> tuple[Verdict, Outcome]:
+def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float, bare: bool
+             ) -> tuple[Verdict, Outcome]:
     reasons = " ".join(excess.reasons)
     if not found.rounds and not reasons:
         text = "Nothing has changed: the new records are within the scatter of the reference records."
         return "consistent", DiagnosisCode.CONSISTENT.outcome(text)
-    if not found.rounds or not _explains(gaps, bool(reasons)):
+    if not found.rounds or (reasons and removed < _MOST) or not _closes(gaps[1:]):
         helped = "; ".join(map(str, found.rounds))
         text = f"Something has changed; no change of a parameter and no effect of the catalog explains it. {reasons}"
         text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else "")
@@ -140,8 +141,6 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], bare: bool) -> 
     return "named", DiagnosisCode.NAMED.outcome("One change explains the new records.")
 
 
-def _explains(gaps: Sequence[Gap], more: bool) -> bool:
-    """Whether enough of the gap is gone on validation records and, where something else changed too, on all."""
-    if more and left(gaps[0]).share_explained < _SHARE:
-        return False
-    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in gaps[1:])
+def _closes(validation: Sequence[Gap]) -> bool:
+    """Whether enough of the gap is gone on the validation records, if there are any."""
+    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in validation)

@@ -1,6 +1,6 @@
 """What changed between two days: how often a healthy day is called changed, and how often a change is named.
 
-Run: python tests/benchmarks/bench_changes.py [--cases 100] [--kinds healthy fan ...] [--jobs 1]. Truth from scipy
+Run: python tests/benchmarks/bench_changes.py [--cases 100] [--first 1] [--kinds fan ...] [--jobs 1]. Truth from scipy
 alone (tests/two_days.py): every parameter of every day is off by 3 %, one of them is in no fit table. Wilson intervals
 of 95 %.
 """
@@ -36,7 +36,9 @@ KINDS: dict[str, tuple[Day, set[str]]] = {
     "fouling": (Day({"fan": 0.8}), {FAN}),
     "offset": (Day(offset=2.0), {"T_block"}),
     "room": (Day(room=4.0), {"sink"}),
-    "outside": (Day(draught=4.0), set()),
+    "outside: gusts": (Day(draught=4.0), set()),
+    "outside: weak gusts": (Day(draught=1.0), set()),
+    "outside: drift": (Day(drift=2.0), {"T_block"}),
 }
 
 
@@ -67,11 +69,12 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--kinds", nargs="*", default=list(KINDS))
     parser.add_argument("--references", type=int, default=4)
+    parser.add_argument("--first", type=int, default=1, help="first seed")
     parser.add_argument("--jobs", type=int, default=1)
     chosen = parser.parse_args()
     header(f"what changed: {chosen.cases} cases each, {chosen.references} reference records, scatter 3 %")
     for kind in chosen.kinds:
-        seeds = range(1, 1 + chosen.cases)
+        seeds = range(chosen.first, chosen.first + chosen.cases)
         rows = Parallel(n_jobs=chosen.jobs)(delayed(one)(kind, seed, chosen.references) for seed in seeds)
         verdicts = Counter(f"{verdict} ({right})" for verdict, right, _ in rows)
         changed = sum(verdict != "consistent" for verdict, _, _ in rows)

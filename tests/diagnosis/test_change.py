@@ -93,8 +93,17 @@ def test_a_room_warmer_than_recorded_is_no_change_of_a_parameter(rig: rt.System,
     assert ("ambient_gradient", ("sink",)) in names and "parameter_change" not in {effect for effect, _ in names}
 
 
-def test_what_is_in_no_catalog_is_unexplained(rig: rt.System, old: list[rt.Record]) -> None:
-    found = rt.diagnose(rig, record(71, Day(draught=6.0), **SIZES), reference=old, effects=FEW)
+def test_several_new_records_scatter_as_healthy_ones_do(rig: rt.System, old: list[rt.Record]) -> None:
+    new = [record(seed, Day({"fan": 0.5}), **SIZES) for seed in (11, 13)]
+    found = rt.diagnose(rig, new, reference=old, effects=FEW)
+    assert [one.where for one in found.effects] == [(FAN,)]
+    assert rt.diagnose(rig, [record(seed, **SIZES) for seed in (21, 23)], reference=old, effects=FEW
+                       ).verdict == "consistent"
+
+
+@pytest.mark.parametrize("day", [Day(draught=3.0), Day(drift=2.0)], ids=["gusts", "drifting sensor"])
+def test_what_is_in_no_catalog_is_unexplained(rig: rt.System, old: list[rt.Record], day: Day) -> None:
+    found = rt.diagnose(rig, record(71, day, **SIZES), reference=old, effects=[*FEW, "periodic_load", "hidden_mass"])
     assert found.verdict == "unexplained" and found.effects == () and not found.outcome.ok
     assert "Something has changed" in found.outcome.text
 

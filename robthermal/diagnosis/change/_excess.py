@@ -48,6 +48,17 @@ class Excess:
                        f"(p = {self.p_value:.1g}).")
         return tuple(out)
 
+    def removed(self, before: Excess) -> float:
+        """Part of the mean square beyond that of the reference records that changes have removed [-].
+
+        Parameters
+        ----------
+        before : Excess
+            Of the same records without any change.
+        """
+        excess = before.variance - 1.0
+        return 1.0 - max(self.variance - 1.0, 0.0) / excess if excess > 0.0 else 0.0
+
 
 def excess_of(new: Refit, reference: Reference) -> Excess:
     """Compare new records with the reference records.

@@ -25,6 +25,7 @@ from ..fit import (
     NoiseScaling,
     Refit,
     SessionGain,
+    Sessions,
     extended,
     filters,
     fitted,
@@ -39,6 +40,7 @@ from ._scatter import Scatter, scatter_of
 Array = NDArray[np.float64]
 _FILTERS = 2  # rounds: a filter is that of the estimate
 _PINNED = 1e3  # times as certain as the scatter says: fixed, with the same unknowns
+_WIDEST = 0.1  # relative scatter of a parameter from one new record to another
 _OF_RECORD = (".temperature", ".initial")  # numbers that are each record's own
 
 
@@ -122,7 +124,8 @@ def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEsti
     ranges = replace(nominal.ranges, start=values, sigma=np.full(values.size, np.inf))
     structure = Held(base=nominal.base.with_parameters(ranges.assigned(values)), ranges=ranges, data=tuple(data),
                      starts=tuple(one.initial(nominal.base, "free") for one in data), tolerance=nominal.tolerance,
-                     sessions=nominal.sessions, center=ranges.coordinates(values), root=root_of(scatter.next_one))
+                     sessions=_with_scatter(nominal.sessions, ranges, scatter) if len(data) > 1 else nominal.sessions,
+                     center=ranges.coordinates(values), root=root_of(scatter.next_one))
     wider = float(np.sqrt(scatter.inflation))
     levels = NoiseScaling(wider, dict.fromkeys(floor.noise, wider))
     v = structure.start(values, [])
@@ -132,6 +135,16 @@ def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEsti
                                structure, v)
         v = fitted_once.v
     return relinearized(fitted_once)
+
+
+def _with_scatter(sessions: Sessions, ranges: Ranges, scatter: Scatter) -> Sessions:
+    """Sessions in which the parameters of every record scatter about those that all new records share."""
+    relative = np.minimum(scatter.std / ranges.unit, _WIDEST)
+    wide = np.where(ranges.logarithmic, relative * np.abs(ranges.start), relative * ranges.unit)
+    own = [(name, float(width)) for group, width in zip(ranges.members, wide, strict=True) for name in group]
+    return replace(sessions, inputs=(*sessions.inputs, *(name for name, _ in own)),
+                   numbers=(*sessions.numbers, *(name for name, _ in own)),
+                   sigma=(*sessions.sigma, *(width for _, width in own)))
 
 
 def pinned(new: Refit) -> Refit:

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 SessionGain = bool | Mapping[str, float]
 SIGMA = 0.05  # relative
 _FARTHEST = 0.9  # relative: an input never vanishes
+_OTHERS = 8.0  # standard deviations
 _WARMEST = 30.0  # K: a room is never farther from what the system says
 
 
@@ -27,11 +28,12 @@ class Sessions:
     Parameters
     ----------
     inputs : tuple of str
-        Heaters and modules whose gain may differ from record to record, then ambients that were not recorded.
+        Heaters and modules whose gain may differ from record to record, then ambients that were not
+        recorded, and other numbers that scatter.
     numbers : tuple of str
         The system's number behind each.
     sigma : tuple of float
-        Prior standard deviation of each gain [-] or ambient [K].
+        Prior standard deviation of each gain [-], ambient [K] or other number in its unit.
     """
 
     inputs: tuple[str, ...] = ()
@@ -46,8 +48,7 @@ class Sessions:
     @property
     def reach(self) -> Array:
         """Bound of every unknown, in units of its prior."""
-        return np.array([_WARMEST / sigma if _is_ambient(number) else min(20.0, _FARTHEST / sigma)
-                         for number, sigma in zip(self.numbers, self.sigma, strict=True)])
+        return np.array([_reach(number, sigma) for number, sigma in zip(self.numbers, self.sigma, strict=True)])
 
     def applied(self, system: System, g: Array) -> System:
         """System as it was in one session.
@@ -113,6 +114,19 @@ def _is_ambient(number: str) -> bool:
     return number.startswith("ambients.")
 
 
+def _reach(number: str, sigma: float) -> float:
+    """Bound in standard deviations of an ambient, a gain, or another number of which these are a few per cent."""
+    if _is_ambient(number):
+        return _WARMEST / sigma
+    return min(20.0, _FARTHEST / sigma) if _is_gain(number) else _OTHERS
+
+
+def _is_gain(number: str) -> bool:
+    return number.endswith(".drive.gain")
+
+
 def _moved(number: str, name: str, by: float) -> str:
-    """An ambient by kelvins, a gain by a factor."""
-    return f"{name} {by:+.4g} K" if _is_ambient(number) else f"{name} × {1.0 + by:.4g}"
+    """An ambient by kelvins, a gain by a factor, another number by as much as it differs."""
+    if _is_gain(number):
+        return f"{name} × {1.0 + by:.4g}"
+    return f"{name} {by:+.4g}{' K' if _is_ambient(number) else ''}"
