@@ -39,6 +39,14 @@ class Compared:
         Standard deviation of every parameter of the fit from record to record, relative to it [-].
     deviation : dict
         How far every parameter of the new records is from the mean of the reference records, relative to it [-].
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> compared = rt.diagnosis.Compared(records=3, rms=0.12, remainder=0.08, deviation={"links.sink-room.conductance":
+    ...     -0.5}, scatter={"links.sink-room.conductance": 0.03})
+    >>> compared.deviation["links.sink-room.conductance"] / compared.scatter["links.sink-room.conductance"] < -4.0
+    True
     """
 
     records: int

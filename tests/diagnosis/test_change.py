@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,11 @@ def test_a_fan_that_stands_still_is_named(fan: rt.diagnosis.Diagnosis) -> None:
     assert abs(value + 0.5) < 3 * std and 0.01 < std < 0.05  # the scatter of 3 % of half the conductance is in it
     assert fan.system.parameter(FAN) == pytest.approx(0.4, rel=0.1)
     assert fan.gap["validation"].after < 0.4 * fan.gap["validation"].before
+
+
+def test_results_are_pickled(fan: rt.diagnosis.Diagnosis) -> None:
+    again = pickle.loads(pickle.dumps(fan))
+    assert again.to_dict() == fan.to_dict() and again.reference == fan.reference
 
 
 def test_the_reference_is_in_the_file(fan: rt.diagnosis.Diagnosis) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 from ...fitting import Ranges
 from ...thermal import System
@@ -33,9 +34,13 @@ def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) ->
     return system.with_parameters({name: system.parameter(name) * factor for name in where})
 
 
+def _places(members: tuple[str, ...], system: System) -> list[tuple[str, ...]]:
+    return [members]
+
+
 def _effect(members: tuple[str, ...]) -> Effect:
     return Effect(name=NAME, meaning="A parameter has another value than on the reference records, by a factor.",
-                  places=lambda system: [members],
+                  places=partial(_places, members),
                   quantities=(Quantity(SIZE, "", -_FARTHEST, _FARTHEST),), add=_add)
 
 
