@@ -41,7 +41,7 @@ def imported(path: Path) -> Iterator[str]:
                 yield from names
         elif isinstance(node, ast.Import):
             yield from (alias.name.split(".")[1] for alias in node.names if alias.name.startswith("robthermal."))
-        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "rt":
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "rt":
             yield node.attr  # `import robthermal as rt` loads a package when it is named
 
 

@@ -17,8 +17,9 @@ def test_picture_shows_the_imports_of_today() -> None:
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     drawn = (ROOT / "docs" / "images" / "packages.svg").read_text(encoding="utf-8")
-    assert "jobs imports report" in script.description()
-    assert script.description() in drawn, "run docs/pictures_of_packages.py again"
+    today = script.description()
+    assert "jobs imports report" in today
+    assert today in drawn, "run docs/pictures_of_packages.py again"
     assert all(f">{name}<" in drawn for row in script.layers() for name in row)
     assert "images/packages.svg" in PAGE
 
