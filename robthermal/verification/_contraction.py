@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from flint import fmpq
@@ -51,7 +52,8 @@ def find_margin(problem: Contraction) -> dict[str, float]:
         if problem.method in ("sum", "max"):
             extra = round_down(_weighted.largest_margin(problem))
         else:
-            extra = search(lambda value: _prove_rate(problem, problem.rate + fmpq(*value.as_integer_ratio())).valid,
+            prove_rate = _prover(problem)
+            extra = search(lambda value: prove_rate(problem.rate + fmpq(*value.as_integer_ratio())).valid,
                            round_down(problem.rate))
     return {"rate": shorten(extra)}
 
@@ -62,17 +64,18 @@ def shorten(value: float) -> float:
 
 
 def _prove_matrix(problem: Contraction) -> Proof:
-    extra = max(problem.margin, fmpq(0))
-    proof = _prove_rate(problem, problem.rate + extra)
+    extra, prove_rate = max(problem.margin, fmpq(0)), _prover(problem)
+    proof = prove_rate(problem.rate + extra)
     if proof.valid:
         return replace(proof, margins={"rate": round_down(extra)})
-    if extra > 0 and _prove_rate(problem, problem.rate).valid:
+    if extra > 0 and prove_rate(problem.rate).valid:
         return Proof(False, f"stored margin {show(extra)} 1/s is larger than what can be proven: {proof.reason}")
     return proof
 
 
-def _prove_rate(problem: Contraction, rate: fmpq) -> Proof:
-    return (_energy if problem.method == "energy" else _lyapunov).prove(problem, rate)
+def _prover(problem: Contraction) -> Callable[[fmpq], Proof]:
+    """Return the proof of the method for any rate."""
+    return _energy.prover(problem) if problem.method == "energy" else partial(_lyapunov.prove, problem)
 
 
 def search(proven: Callable[[float], bool], rate: float) -> float:

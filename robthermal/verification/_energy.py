@@ -7,6 +7,8 @@ box); what is left is a matrix as small as the modules, checked at the vertices 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -31,23 +33,33 @@ _MOST_WORK = 3e8  # joint vertices times (lumps of modules)³
 _PIECES = 8
 
 
-def prove(problem: Contraction, rate: fmpq) -> Proof:
-    """Prove that -(sym J + rate E) is positive definite over the box."""
+def prover(problem: Contraction) -> Callable[[fmpq], Proof]:
+    """Return the proof, for any rate, that -(sym J + rate E) is positive definite over the box.
+
+    The vertices do not depend on the rate: they are made once, when a rate first needs them.
+    """
     system = problem.system
     groups = clusters(system)
     ports = sorted(lump for group in groups for lump in group.lumps)
     points = [_points(problem, k) for k in range(len(system.modules))]
     many = _too_many(problem, groups, points, len(ports))
-    if many:
-        return Proof(False, f"method energy: {many}")
-    rows = [{j: arb(value) for j, value in row.items()} for row in _network(problem, rate)]
-    failed = eliminate(rows, set(ports))
-    if failed is not None:
-        return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven even without the "
-                            f"modules, at lump {name_of(system.lumps[failed])}")
-    choices = [_undominated(group, list(vertices(system, problem.region, group, points))) for group in groups]
-    rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
-    return _check(problem, rate, rest, ports, groups, choices)
+
+    @cache
+    def choices() -> list[list[tuple[Block, Vertex]]]:
+        return [_undominated(group, list(vertices(system, problem.region, group, points))) for group in groups]
+
+    def prove(rate: fmpq) -> Proof:
+        if many:
+            return Proof(False, f"method energy: {many}")
+        rows = [{j: arb(value) for j, value in row.items()} for row in _network(problem, rate)]
+        failed = eliminate(rows, set(ports))
+        if failed is not None:
+            return Proof(False, f"method energy: sym J < -{show(rate)} E fails or cannot be proven even without the "
+                                f"modules, at lump {name_of(system.lumps[failed])}")
+        rest = [[rows[i].get(j, arb(0)) for j in ports] for i in ports]
+        return _check(problem, rate, rest, ports, groups, choices())
+
+    return prove
 
 
 def _too_many(problem: Contraction, groups: list[Cluster], points: list[list[Point]], ports: int) -> str:
@@ -115,6 +127,8 @@ def _undominated(group: Cluster, found: list[Vertex]) -> list[tuple[Block, Verte
 
 
 def _below(lower: Block, upper: Block) -> bool:
+    if any(up[i] < low[i] for i, (low, up) in enumerate(zip(lower, upper, strict=True))):
+        return False  # a negative diagonal entry: not semidefinite
     return is_semidefinite([[b - a for a, b in zip(low, up, strict=True)]
                             for low, up in zip(lower, upper, strict=True)])
 
