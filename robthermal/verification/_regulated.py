@@ -8,8 +8,9 @@ Jacobian (see ``_regulated_modules``) over the box; every inequality is convex i
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import product
 from typing import Any
 
@@ -83,11 +84,11 @@ def prove(problem: Regulated) -> Proof:
         lost = lost_regulation(problem.network) or _malformed(problem)
         if lost:
             return Proof(False, lost)
-        extra = max(problem.margin, fmpq(0))
-        proof = _prove_rate(problem, problem.rate + extra)
+        extra, prove_rate = max(problem.margin, fmpq(0)), _prover(problem)
+        proof = prove_rate(problem.rate + extra)
         if proof.valid:
             return replace(proof, margins={"rate": round_down(extra)})
-        if extra > 0 and _prove_rate(problem, problem.rate).valid:
+        if extra > 0 and prove_rate(problem.rate).valid:
             return Proof(False, f"stored margin {show(extra)} 1/s is larger than what can be proven: {proof.reason}")
         return proof
 
@@ -95,7 +96,8 @@ def prove(problem: Regulated) -> Proof:
 def find_margin(problem: Regulated) -> dict[str, float]:
     """Return a margin that the checker proves, close to the largest [1/s]."""
     with working_precision():
-        extra = search(lambda value: _prove_rate(problem, problem.rate + fmpq(*value.as_integer_ratio())).valid,
+        prove_rate = _prover(problem)
+        extra = search(lambda value: prove_rate(problem.rate + fmpq(*value.as_integer_ratio())).valid,
                        round_down(problem.rate))
     return {"rate": shorten(extra)}
 
@@ -120,7 +122,12 @@ def _malformed(problem: Regulated) -> str:
     return f"method lyapunov: {broken}" if broken else ""
 
 
-def _prove_rate(problem: Regulated, rate: fmpq) -> Proof:
+def _prover(problem: Regulated) -> Callable[[fmpq], Proof]:
+    """Return the proof for any rate; the reduced Jacobian does not depend on it and is made once for each cut."""
+    return partial(_prove_rate, problem, cache(partial(shares, problem.network, problem.method)))
+
+
+def _prove_rate(problem: Regulated, reduced: Callable[[int], tuple[Entries, Groups, str]], rate: fmpq) -> Proof:
     """Prove the inequality over the box, cutting the currents finer where it fails."""
     proof = Proof(False, "")
     for pieces in _PIECES:
@@ -128,7 +135,7 @@ def _prove_rate(problem: Regulated, rate: fmpq) -> Proof:
         many = too_many_corners(problem.network.system, region, 16 * pieces, problem.weights)  # 4 corners, 4 bounds
         if many:
             return replace(proof, reason=proof.reason or f"method {problem.method}: {many}")
-        base, groups, missing = shares(problem.network, problem.method, pieces)
+        base, groups, missing = reduced(pieces)
         if missing:
             return Proof(False, f"method {problem.method}: {missing}")
         proof = (_prove_lines if problem.weights else _prove_form)(problem, rate, base, groups)
