@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from importlib.metadata import version
 from typing import Any
 
@@ -20,6 +21,7 @@ _UNCERTAIN = (".capacity", ".conductance", ".natural.gain", ".radiation",
               *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance") for part in ("value", "slope")))
 
 _NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
+_LISTED = 12  # names in a message
 _HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to the network
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
@@ -138,16 +140,22 @@ def named_ranges(values: Mapping[str, Interval], names: tuple[str, ...], argumen
     """Checked intervals of some of the names."""
     unknown = [name for name in values if name not in names]
     if unknown:
-        raise InputError(f"there is no {kind} {unknown[0]!r}", where=f"argument {argument}",
-                         expected="one of " + ", ".join(names))
+        raise _unknown(unknown[0], names, f"argument {argument}", kind)
     return {name: _interval(pair, f"argument {argument}[{name!r}]", kelvin=kelvin) for name, pair in values.items()}
+
+
+def _unknown(name: str, names: Sequence[str], where: str, kind: str) -> InputError:
+    near = get_close_matches(name, names, n=1)
+    listed = ", ".join(names[:_LISTED]) + (f" and {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+    return InputError(f"there is no {kind} {name!r}", where=where, expected=f"one of {listed}",
+                      remedy=f"Did you mean {near[0]!r}?" if near else "")
 
 
 def _same_names(given: Iterable[str], names: tuple[str, ...], where: str, kind: str) -> None:
     given = list(given)
     missing, unknown = [n for n in names if n not in given], [n for n in given if n not in names]
     if unknown:
-        raise InputError(f"there is no {kind} {unknown[0]!r}", where=where, expected="one of " + ", ".join(names))
+        raise _unknown(unknown[0], names, where, kind)
     if missing:
         raise InputError(f"{kind} {missing[0]!r} has no range", where=where, expected=f"a range for every {kind}",
                          remedy=f'Add "{missing[0]}": (lower, upper); (0, 0) says that it is never used.')

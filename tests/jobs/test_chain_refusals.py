@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 from commands import Run
 
+import robthermal as rt
+
 SYSTEM = """
 [system]
 name = "stack"
@@ -73,3 +75,32 @@ def test_what_later_stages_cannot_do_is_refused_at_once(tables: str, words: tupl
                                                         ) -> None:
     said = refused(tmp_path, run, tables)
     assert all(word in said for word in words), said
+
+
+@pytest.mark.parametrize(("tables", "words"), [
+    ('parameters = { "links.sink-rom.conductance" = [1.0, 5.0] }\n',
+     ("[certify] parameters", "Did you mean 'links.sink-room.conductance'?")),
+    ('parameters = { "links.sink-room.conductance" = [5.0, 1.0] }\n',
+     ("[certify] parameters.links.sink-room.conductance: [5, 1]", "Write [1, 5].")),
+    ("current = { lower = [1.0, 0.0] }\n", ("[certify] current.lower: [1, 0]", "Write [0, 1].")),
+    ('[gate]\ntolerance = "0.1"\n', ("gate.tolerance = '0.1'",)),
+    ('[system]\nname = "x"\n', ("unknown key 'system'", "is a key of another table"))])
+def test_the_project_is_checked_before_anything_is_computed(tables: str, words: tuple[str, ...], tmp_path: Path,
+                                                             run: Run) -> None:
+    said = refused(tmp_path, run, tables)
+    assert all(word in said for word in words) and "constrained" not in said, said
+
+
+def test_a_list_of_parameters_is_cut() -> None:
+    system = rt.systems.two_module()
+    with pytest.raises(rt.InputError, match="no parameter 'lumps.x1.capacitx'.*more.*Did you mean 'lumps.x1.ca") as no:
+        rt.certify.contraction(system, current={"m1": (0, 1), "m2": (0, 1)}, temperature=(278.15, 358.15),
+                               parameters={"lumps.x1.capacitx": (1.0, 2.0)})
+    assert len(str(no.value)) < 600
+
+
+def test_the_header_proposed_for_a_column_is_the_nearest(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,NTC Stage,NTC Probe\n0,20.0,21.0\n1,20.1,21.1\n2,20.2,21.2\n")
+    with pytest.raises(rt.InputError, match="Did you mean 'NTC Probe'.*--column 'T=NTC Probe'"):
+        rt.read_record(log, outputs=["T"], columns={"T": "NTC Prob"})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -285,7 +286,7 @@ def read_project(path: str | Path) -> Project:
     asked = data.diagnose or DiagnoseTable()
     measured = dict.fromkeys([*train, *validation, *(file for one in identify for file in one.records), *responses])
     return Project(head.name, head.label, system, train, validation, head.median_filter, data.calibrate.initial,
-                   data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path),
+                   data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path, asked.adopt),
                    (path, system_file, *measured), _gate(system, data.gate, path), data.diagnose is not None,
                    asked.session_gain, reading, path, system_file, identify, responses, asked.adopt, data.design,
                    data.couple, head.notes.strip(), data.calibrate.max_iterations)
@@ -351,8 +352,22 @@ def _gate(system: System, table: GateTable, path: Path) -> Gate:
     return Gate(table.tolerance, table.remarks)
 
 
-def _boxes(system: System, table: CertifyTable, confidence: float, path: Path) -> Boxes:
+def _boxes(system: System, table: CertifyTable, confidence: float, path: Path, adopt: bool) -> Boxes:
     unit, where = system.temperature_unit, f"{path} [certify]"
+    uncertain = {} if isinstance(table.parameters, str) else table.parameters
+    for name in uncertain:
+        if name not in system.parameter_names and not adopt:  # an adopted effect may bring it
+            near = get_close_matches(name, system.parameter_names, n=1)
+            raise InputError(f"there is no parameter {name!r}", where=f"{where} parameters",
+                             expected="TABLE.NAME.KEY as in the system file",
+                             remedy=f"Did you mean {(near or system.parameter_names)[0]!r}?")
+    box_of = {"temperature": table.temperature} if table.temperature else {}
+    for key, pairs in (("", box_of), ("ambient.", table.ambient), ("current.", table.current or {}),
+                       ("heat.", table.heat or {}), ("parameters.", uncertain)):
+        for name, (low, high) in pairs.items():
+            if low > high:
+                raise InputError(f"[{low:g}, {high:g}]", where=f"{where} {key}{name}", expected="[lower, upper]",
+                                 remedy=f"Write [{high:g}, {low:g}].")
     box = range_in_kelvin(table.temperature, unit, f"{where} temperature") if table.temperature else None
     return Boxes(temperature=box or Boxes().temperature,
                  ambient={name: range_in_kelvin(pair, unit, f"{where} ambient.{name}")

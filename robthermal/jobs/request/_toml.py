@@ -15,6 +15,7 @@ from ...errors import InputError
 _MAX_BYTES = 10_000_000
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 T = TypeVar("T", bound=BaseModel)
+_OF_UNIONS = ("float", "constrained-float", "str", "list[str]")  # where pydantic says which of several types it tried
 
 
 class Table(BaseModel):
@@ -81,11 +82,15 @@ def refusal(error: ValidationError, path: Path, remedy: str, known: Collection[s
     """
     faults: list[Any] = error.errors(include_url=False)
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
-    place = ".".join(str(word) for word in fault["loc"])
+    place = ".".join(str(word) for word in fault["loc"] if word not in _OF_UNIONS)
     what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
         fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
-    near = get_close_matches(str(fault["loc"][-1]), known, n=1) if fault["type"] == "extra_forbidden" else []
-    return InputError(what, where=str(path), remedy=f"Did you mean {near[0]!r}? {remedy}" if near else remedy)
+    last = str(fault["loc"][-1])
+    if fault["type"] == "extra_forbidden" and last in known:
+        remedy = f"{last!r} is a key of another table: is this the right file, and the right table? {remedy}"
+    elif fault["type"] == "extra_forbidden" and (near := get_close_matches(last, known, n=1)):
+        remedy = f"Did you mean {near[0]!r}? {remedy}"
+    return InputError(what, where=str(path), remedy=remedy)
 
 
 def _keys(schema: type[BaseModel]) -> Iterator[str]:

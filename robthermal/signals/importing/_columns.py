@@ -345,11 +345,13 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
             where=table.where,
             expected="a numeric vector as long as the others",
         )
-    near = suggestion(name, tuple(split_header(header)[0] for header in unknown)).split(" Known:")[0] if unknown else ""
+    names = {split_header(header)[0]: header for header in unknown}
+    near = suggestion(name, tuple(names)).split(" Known:")[0] if unknown else ""
     near = near if near.startswith("Did") else ""
     listed = ", ".join(map(repr, unknown))
     listed = listed if len(listed) <= _LISTED else listed[:_LISTED] + " …"
-    example = unknown[0] if unknown else "HEADER"
+    alike = next((header for own, header in names.items() if f"{own!r}" in near), None)
+    example = alike or (unknown[0] if unknown else "HEADER")
     remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
     if role in ("input", "current"):
         remedy += f" Zeros if {name!r} was off."
