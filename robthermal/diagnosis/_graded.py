@@ -27,7 +27,7 @@ from .search import (
 )
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
-_CLOSED = 0.3  # of the excess rms of the validation records
+_CLOSED_SQUARE = 1.0 - (1.0 - 0.3) ** 2  # of the excess mean square of the validation records: 30 % of its rms
 
 
 def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple[Evidence, ...]:
@@ -102,7 +102,7 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             state, found = _lasting(revise(replace(state, misfit_left=False)), finer)
         if not found:
             return _nothing_lasts(judged, finer)
-        state = _with_rivals(validated(replace(state, misfit_left=False), validation, progress), finer)
+        state = _with_rivals(validated(replace(state, misfit_left=False), validation, progress), finer, validation)
         return _graded(judged, state, finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
@@ -126,11 +126,12 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
     return replace(state, nominal=finer, rounds=rounds, fit=fit), found
 
 
-def _with_rivals(state: SearchState, finer: Refit) -> SearchState:
+def _with_rivals(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
     """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
 
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
-    was accepted; the same effect at neighboring lumps is added there.
+    was accepted; the same effect at neighboring lumps is added there. A rival with which the validation data keep their
+    gap could not be named itself, and is none.
     """
     if finer.structure.n_coarse:
         return replace(state, rounds=tuple(map(with_neighbors, state.rounds)))
@@ -140,9 +141,19 @@ def _with_rivals(state: SearchState, finer: Refit) -> SearchState:
         known = {round_.best.candidate.key, *(entry.candidate.key for entry in round_.contenders)}
         entries = () if less is None else refit_short_list(less, score(less, state.names)).entries
         rivals = (entry for entry in entries if entry.candidate.key not in known
-                  and (reproducible(state.fit, entry.fit) < SURE or _nearly(state.fit, entry.fit, less)))
+                  and (reproducible(state.fit, entry.fit) < SURE or _nearly(state.fit, entry.fit, less))
+                  and _predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*round_.contenders, *rivals)))
     return replace(state, rounds=tuple(rounds))
+
+
+def _predicts(fit: Refit, nominal: Refit, validation: Validation) -> bool:
+    """Whether a fit closes enough of the gap of the validation data, if there are any."""
+    try:
+        held = validation.predicted(exact(nominal), fit)
+    except (Diverged, InputError):  # a model that runs away predicts nothing
+        return False
+    return held is None or left(held.gap).share_explained >= _CLOSED_SQUARE
 
 
 def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
@@ -176,7 +187,7 @@ def _closes(gaps: Sequence[Gap]) -> bool:
     """Whether most of the excess is gone on the training records, and enough of it on the validation records."""
     if left(gaps[0]).share_explained < _SHARE:
         return False
-    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in gaps[1:])
+    return all(left(gap).share_explained >= _CLOSED_SQUARE for gap in gaps[1:])
 
 
 def _nothing_lasts(judged: Judged, finer: Refit) -> Judged:

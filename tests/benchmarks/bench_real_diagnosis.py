@@ -25,12 +25,15 @@ def example(name: str) -> ModuleType:
 
 
 def one_line(found: rt.diagnosis.Diagnosis) -> str:
-    """Verdict, and the accepted effects with what the records cannot exclude."""
+    """Verdict, the accepted effects with what the records cannot exclude, and the error on the held-out run."""
+    gap = found.gap.get("validation")
+    held = "" if gap is None else f"; held out {gap.before:.1f} K before, {gap.after:.1f} K after"
     if not found.effects:
-        return f"{found.verdict}; provisional: {', '.join(effect.label for effect in found.provisional) or 'nothing'}"
+        tried = ", ".join(effect.label for effect in found.provisional) or "nothing"
+        return f"{found.verdict}; provisional: {tried}{held}"
     names = [" | ".join([effect.label, *(f"{name}({', '.join(where)})" for name, where in others)])
              for effect, others in zip(found.effects, found.alternatives, strict=True)]
-    return f"{found.verdict}: {'; '.join(names)}"
+    return f"{found.verdict}: {'; '.join(names)}{held}"
 
 
 def free_runs(board: ModuleType, system: rt.System, training: rt.Record, validation: rt.Record) -> str:

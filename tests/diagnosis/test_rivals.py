@@ -1,4 +1,7 @@
-"""The same effect at a neighboring lump: a bar of 60 cells, by scipy's matrix exponential, against five lumps."""
+"""Rivals where the model is not exact: heat paths to a neighboring lump, and those that fail on validation data.
+
+The truth is a bar of 60 cells, by scipy's matrix exponential, against five lumps.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,8 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.diagnosis._graded import _predicts
+from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis.fit import Refit, coarsened
 from robthermal.diagnosis.search import Accepted, decide, refit_short_list, with_neighbors
 from robthermal.diagnosis.search._neighbors import neighboring
@@ -28,7 +33,7 @@ def bar() -> rt.System:
 
 
 @cache
-def measured(cell: int) -> rt.Record:
+def measured(cell: int, seed: int = 1) -> rt.Record:
     """The bar of 60 cells with a path of 0.2 W/K from a cell to the middle of the last lump."""
     C, K = 30.0 * LUMPS / CELLS, np.zeros((CELLS, CELLS))
     pairs = [(i, i + 1, 0.8 * CELLS / LUMPS) for i in range(CELLS - 1)] + [(cell, 53, 0.2)]
@@ -39,14 +44,14 @@ def measured(cell: int) -> rt.Record:
     heated = np.zeros((CELLS, 1))
     heated[:12] = 1.0 / 12
     M = expm(H / C * np.block([[K, heated], [np.zeros((1, CELLS + 1))]]))
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     q = np.repeat(rng.uniform(0.0, 6.0, N // 20), 20)
     T, rows = np.zeros(CELLS), []
     for k in range(N):
         rows.append([T[12 * i - 7:12 * i - 5].mean() for i in (1, 2, 4, 5)])
         T = M[:CELLS, :CELLS] @ T + M[:CELLS, CELLS] * q[k]
     return rt.Record(sample_time=H, inputs=q, outputs=ROOM + np.array(rows) + 0.005 * rng.standard_normal((N, 4)),
-                     input_names=["q"], output_names=["T1", "T2", "T4", "T5"])
+                     input_names=["q"], output_names=["T1", "T2", "T4", "T5"], start_time=1e5 * seed)
 
 
 @cache
@@ -95,3 +100,15 @@ def test_only_heat_paths_have_neighbors(effect: str):
     places = rt.diagnosis.candidates(bar(), [effect])
     assert len(places) >= 4
     assert not any(neighboring(bar(), a, b) for a in places for b in places)
+
+
+def test_a_rival_that_leaves_the_gap_of_the_validation_data_is_none():
+    """The path explains another record; the lag of a sensor in its place, refitted, does not."""
+    nominal = rt.diagnosis.refit(bar(), measured(6))
+    path, lag = (rt.diagnosis.refit_short_list(nominal, rt.diagnosis.score(nominal, [name])).entries[0].fit
+                 for name in ("missing_link", "sensor_lag"))
+    seen, unseen = Validation(None), Validation(measured(6, seed=2))
+    assert lag.rss < nominal.rss
+    assert _predicts(path, nominal, unseen)
+    assert not _predicts(lag, nominal, unseen) and not _predicts(nominal, nominal, unseen)
+    assert _predicts(lag, nominal, seen)  # nothing held out, nothing against it
