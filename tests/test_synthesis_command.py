@@ -104,3 +104,91 @@ def test_robust_performance_from_a_file(run, tmp_path):
 def test_a_missing_argument_is_named(run, tmp_path):
     done = design_by(run, tmp_path, PLANT, "mixed")
     assert done.status == 2 and "design.hinf_limit is missing" in " ".join((done.out + done.err).split())
+
+
+VERTICES = """
+[plant]
+n_ctrl = 1
+vertices = [{ A = [[0.0, 1.0], [-1, -0.1]], B = [[0.0], [1.0]] }, { A = [[0.0, 1.0], [2, -0.1]], B = [[0.0], [1.0]] }]
+[design]
+rate = 0.5
+"""
+SETUP = """
+[system]
+name = "stage"
+temperature_unit = "K"
+[ambients.room]
+temperature = 298.0
+[lumps.plate]
+capacity = 60.0
+[lumps.module]
+capacity = 12.0
+[lumps.sink]
+capacity = 90.0
+[[links]]
+between = ["plate", "module"]
+conductance = 5.0
+[[links]]
+between = ["sink", "room"]
+conductance = 4.0
+[[links]]
+between = ["plate", "room"]
+conductance = 0.15
+[modules.m]
+hot = "sink"
+cold = "module"
+seebeck = { value = 0.052, slope = 0.0 }
+resistance = { value = 2.1, slope = 0.0 }
+conductance = { value = 0.5, slope = 0.0 }
+reference_temperature = 298.0
+"""
+SCHEDULED = """
+[system]
+file = "setup.toml"
+box = { temperature = [265.0, 335.0], current = [0.2, 1.8] }
+[design]
+operating = 1.0
+rate = 0.012
+"""
+
+
+def test_state_feedback_for_vertices(run, tmp_path):
+    done = design_by(run, tmp_path, VERTICES, "polytope")
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    saved = rt.Certificate.load(tmp_path / "out" / "certificates" / "1_stability.json")
+    assert rt.verify(saved).valid and saved.system["gain"] == design["gain"] and design["rate"] >= 0.5
+    assert "constant or varying" in (tmp_path / "out" / "report.html").read_text()
+    assert run("verify", "--second", str(tmp_path / "out" / "certificates" / "1_stability.json")).status == 0
+    refused = tmp_path / "no"
+    refused.mkdir()
+    far = design_by(run, refused, VERTICES.replace("[[0.0], [1.0]] }]", "[[0.0], [-1.0]] }]"), "polytope")
+    assert far.status == 1 and "at the mean of vertices 1 and 2" in " ".join((far.out + far.err).split())
+
+
+def test_scheduled_currents_of_a_system(run, tmp_path):
+    (tmp_path / "setup.toml").write_text(SETUP)
+    done = design_by(run, tmp_path, SCHEDULED, "tem")
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert design["operating_current"] == {"m": 1.0} and design["level"] == 1.0 and design["rate"] == 0.012
+    saved = rt.Certificate.load(tmp_path / "out" / "certificates" / "1_scheduled.json")
+    assert rt.verify(saved).valid and saved.system["gain"] == design["gain"]
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "do not vary with time" not in report and "lumped network" in report
+    (tmp_path / "fast").mkdir()
+    (tmp_path / "fast" / "setup.toml").write_text(SETUP)
+    fast = design_by(run, tmp_path / "fast", SCHEDULED.replace("0.012", "5.0"), "tem")
+    assert fast.status == 1 and "best achievable" in " ".join((fast.out + fast.err).split())
+
+
+@pytest.mark.parametrize(("content", "method", "words"), [
+    (VERTICES.replace("rate", "speed"), "polytope", "'speed'"), (VERTICES, "hinf", "needs a plant"),
+    (VERTICES.replace("[[0.0], [1.0]] }, {", "[[0.0]] }, {"), "polytope", "vertices[0]"),
+    (VERTICES.replace("n_ctrl = 1", "n_ctrl = 3"), "polytope", "n_ctrl = 3"), (VERTICES, "tem", "thermal system"),
+    (SCHEDULED, "tem", "setup.toml"), (SCHEDULED.replace("current =", "currents ="), "tem", "currents"),
+    (SCHEDULED.replace("file =", "path ="), "tem", "path"), (PLANT.replace("n_meas = 1", ""), "hinf", "n_meas")])
+def test_bad_files_of_state_feedback_name_what_is_wrong(run, tmp_path, content, method, words):
+    done = design_by(run, tmp_path, content, method)
+    assert done.status == 2 and words in " ".join((done.out + done.err).split()), done.out + done.err
+    assert not (tmp_path / "out").exists()

@@ -244,7 +244,8 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
                help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, mu, output-feedback, "
-               "frf-pid: a synthesis for PLANT.toml (docs/command_line.md), without the other options.")] = "energy",
+               "frf-pid, polytope, tem: a synthesis for PLANT.toml (docs/command_line.md), no other options.")
+           ] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
                metavar="FILE.json|NAME=LO:HI")] = None,

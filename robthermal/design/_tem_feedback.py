@@ -120,6 +120,11 @@ class TemFeedback(FeedbackDesign):
                                                                     ) @ self.gain.T
         return np.clip(wanted, low, high)
 
+    def _facts(self) -> dict[str, Any]:
+        return super()._facts() | {"level": self.level, "operating_temperatures": dict(self.operating_temperatures),
+                                   "operating_current": dict(self.operating_current),
+                                   "current_limits": dict(self.current_limits), "temperature": dict(self.temperature)}
+
     def __str__(self) -> str:
         words = super().__str__()
         if not self.holds:

@@ -152,11 +152,14 @@ class Design:
         InputError
             For another ending, C source of a continuous controller, or a file that cannot be written.
         """
-        facts = {"method": self.method, "solver": self.solver, "value": self.value, "lower": self.lower,
+        export_design(self.controller, self._facts(), self.certificates, path, name)
+
+    def _facts(self) -> dict[str, Any]:
+        """What design.json says beside the controller."""
+        return {"method": self.method, "solver": self.solver, "value": self.value, "lower": self.lower,
                  "margins": self.margins, "robust_against": {"text": str(self.robust_against),
                                                              **self.robust_against.data},
                  "outcome": {"ok": self.outcome.ok, "code": self.outcome.code, "text": self.outcome.text}}
-        export_design(self.controller, facts, self.certificates, path, name)
 
 
 def zero_controller(plant: GeneralizedPlant) -> Plant:

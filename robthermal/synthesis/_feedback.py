@@ -89,6 +89,9 @@ class FeedbackDesign(Design):
             return {}
         return {name: {key: min(one[name][key] for one in every) for key in every[0][name]} for name in every[0]}
 
+    def _facts(self) -> dict[str, Any]:
+        return super()._facts() | {"gain": self.gain, "matrix": self.matrix, "rate": self.rate}
+
     def plot(self, ax: Any = None) -> Any:
         """Draw the eigenvalues of the loops at the vertices.
 

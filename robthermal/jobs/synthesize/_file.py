@@ -13,19 +13,28 @@ from pydantic import Field
 from ..._control import control
 from ...errors import InputError
 from ...identify import FrequencyResponse, read_response
+from ...thermal import System, read_system
 from ..request import Number, Table, read_text, read_toml
 
 _REMEDY = "docs/command_line.md lists the keys of PLANT.toml."
 _Matrix = list[list[Number]]
 
 
+class _Vertex(Table):
+    A: _Matrix
+    B: _Matrix
+    C: _Matrix | None = None
+    D: _Matrix | None = None
+
+
 class _Plant(Table):
+    vertices: list[_Vertex] | None = None
     A: _Matrix | None = None
     B: _Matrix | None = None
     C: _Matrix | None = None
     D: _Matrix | None = None
     file: str | None = None
-    n_meas: int
+    n_meas: int | None = None
     n_ctrl: int
     dt: Number = 0.0
 
@@ -35,9 +44,22 @@ class _Response(Table):
     sample_time: Number | None = None
 
 
+class _Box(Table):
+    temperature: list[Number] | dict[str, list[Number]]
+    current: list[Number] | dict[str, list[Number]]
+    ambient: dict[str, list[Number]] | None = None
+    heat: dict[str, list[Number]] | None = None
+
+
+class _System(Table):
+    file: str
+    box: _Box
+
+
 class _File(Table):
     plant: _Plant | None = None
     frf: _Response | None = None
+    system: _System | None = None
     design: dict[str, Any] = Field(default_factory=dict)
 
 
@@ -48,7 +70,7 @@ class SynthesisJob:
     Parameters
     ----------
     plant : control.StateSpace or None
-        Generalized plant; None where there is a response.
+        Generalized plant; None where there are vertices, a response or a system.
     n_meas, n_ctrl : int
         Numbers of measurements and of controls; 1 each for a response.
     response : FrequencyResponse or None
@@ -57,6 +79,10 @@ class SynthesisJob:
         Keyword arguments of the synthesis, table [design].
     files : tuple of Path
         Files that were read.
+    plants : tuple of control.StateSpace
+        Plants at the vertices of a hull; empty where there is one plant.
+    system : System or None
+        Thermal system whose currents are fed back.
     """
 
     plant: control.StateSpace | None
@@ -65,6 +91,8 @@ class SynthesisJob:
     response: FrequencyResponse | None
     arguments: dict[str, Any]
     files: tuple[Path, ...]
+    plants: tuple[control.StateSpace, ...] = ()
+    system: System | None = None
 
 
 def read_plant_file(path: str | Path) -> SynthesisJob:
@@ -73,8 +101,8 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     Parameters
     ----------
     path : str or Path
-        TOML file with [plant] (A, B, C, D, or file: JSON with these keys; n_meas, n_ctrl, dt) or [frf] (file), and
-        [design] with the keyword arguments of the synthesis.
+        TOML file with [plant] (A, B, C, D, or file: JSON with these keys; n_meas, n_ctrl, dt; or vertices), [frf]
+        (file) or [system] (file, box), and [design] with the keyword arguments of the synthesis.
 
     Returns
     -------
@@ -83,7 +111,7 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     Raises
     ------
     InputError
-        A file that cannot be read, unknown or missing keys, both or neither of [plant] and [frf].
+        A file that cannot be read, unknown or missing keys, none or several of [plant], [frf] and [system].
 
     Examples
     --------
@@ -96,15 +124,45 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     """
     place = Path(path)
     found = read_toml(place, _File, _REMEDY)
-    if found.frf is not None and found.plant is None:
+    if sum(table is not None for table in (found.plant, found.frf, found.system)) != 1:
+        raise InputError("has several of [plant], [frf] and [system], or neither", where=str(place),
+                         expected="one of them", remedy=_REMEDY)
+    if found.system is not None:
+        return _system(place, found.system, found.design)
+    if found.frf is not None:
         response = place.parent / found.frf.file
         measured = read_response(response, sample_time=found.frf.sample_time)
         return SynthesisJob(None, 1, 1, measured, found.design, (place, response))
-    if found.plant is None or found.frf is not None:
-        raise InputError("has both [plant] and [frf], or neither", where=str(place), expected="one of them",
-                         remedy=_REMEDY)
+    if found.plant is None:
+        raise ValueError("one of the tables is there")
+    if found.plant.vertices:
+        plants = tuple(_vertex(place, k, one, float(found.plant.dt)) for k, one in enumerate(found.plant.vertices))
+        return SynthesisJob(None, 1, found.plant.n_ctrl, None, found.design, (place,), plants)
+    if found.plant.n_meas is None:
+        raise InputError("key plant.n_meas is missing", where=str(place), remedy=_REMEDY)
     plant, files = _plant(place, found.plant)
     return SynthesisJob(plant, found.plant.n_meas, found.plant.n_ctrl, None, found.design, files)
+
+
+def _system(place: Path, table: _System, design: dict[str, Any]) -> SynthesisJob:
+    other = place.parent / table.file
+    box = {key: _ranges(value) for key, value in table.box.model_dump().items() if value is not None}
+    return SynthesisJob(None, 1, 1, None, {**box, **design}, (place, other), (), read_system(other))
+
+
+def _ranges(value: Any) -> Any:
+    return {name: tuple(pair) for name, pair in value.items()} if isinstance(value, dict) else tuple(value)
+
+
+def _vertex(place: Path, k: int, one: _Vertex, dt: float) -> control.StateSpace:
+    try:
+        A, B = np.asarray(one.A, float), np.asarray(one.B, float)
+        C = np.eye(len(A)) if one.C is None else np.asarray(one.C, float)
+        D = np.zeros((len(C), B.shape[1])) if one.D is None else np.asarray(one.D, float)
+        return control.ss(A, B, C, D, dt)
+    except (ValueError, TypeError, IndexError) as error:
+        raise InputError(f"plant.vertices[{k}]: the matrices do not fit together: {error}", where=str(place),
+                         expected="A (n x n), B (n x m), C (p x n), D (p x m) of numbers") from None
 
 
 def _plant(place: Path, table: _Plant) -> tuple[control.StateSpace, tuple[Path, ...]]:

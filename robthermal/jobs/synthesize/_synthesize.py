@@ -8,17 +8,29 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..._checks import quoted
-from ...design import Design, frf_pid, h2, hinf, mixed, mu_synthesis, output_feedback
+from ...design import (
+    Design,
+    frf_pid,
+    h2,
+    hinf,
+    mixed,
+    mu_synthesis,
+    output_feedback,
+    polytopic_feedback,
+    tem_feedback,
+)
 from ...errors import InputError
 from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid")
+METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "tem")
 _VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "mu": mu_synthesis,
-                                           "output-feedback": output_feedback, "frf-pid": frf_pid}
+                                           "output-feedback": output_feedback, "frf-pid": frf_pid,
+                                           "polytope": polytopic_feedback, "tem": tem_feedback}
 _TITLES = {"frequency": "Structured singular value", "hinf": "H-infinity norm", "h2": "H2 norm",
-           "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain"}
+           "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain",
+           "scheduled": "From every start in the ellipsoid"}
 
 
 @dataclass(frozen=True)
@@ -73,7 +85,7 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     """
     if method not in _VERBS:
         raise InputError(f"method = {quoted(method)}", where="--method", expected=f"one of {list(METHODS)}")
-    verb = _VERBS[method]
+    verb, given = _VERBS[method], _first(job, method)
     allowed = [name for name, one in inspect.signature(verb).parameters.items() if one.kind is one.KEYWORD_ONLY]
     if method == "mu":  # blocks is its last positional argument
         allowed = ["blocks", *allowed]
@@ -86,7 +98,7 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     if missing:
         raise InputError(f"key design.{missing[0]} is missing", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")
-    design = verb(*_first(job, method), **job.arguments)
+    design = verb(*given, **job.arguments)
     return Synthesis(job, method, design, tuple(_check(k, one) for k, one in enumerate(design.certificates)))
 
 
@@ -99,6 +111,13 @@ def _check(k: int, certificate: Certificate) -> Checked:
 def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:
     if method == "frf-pid":
         return (job.plant if job.response is None else job.response,)
+    if method == "tem":
+        if job.system is None:
+            raise InputError("method tem needs a thermal system", where=f"{job.files[0]}",
+                             expected="a table [system] with file and box")
+        return (job.system,)
+    if method == "polytope" and (job.plants or job.plant is not None):
+        return list(job.plants) or [job.plant], job.n_ctrl
     if job.plant is None:
         raise InputError(f"method {method} needs a plant", where=f"{job.files[0]}", expected="a table [plant]",
                          remedy="A measured response is designed for with --method frf-pid.")

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
+from ...design import FeedbackDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
-from ..claims import ARITHMETIC, GateCode
+from ..claims import ARITHMETIC, GateCode, kind_assumptions, machine_assumptions
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
@@ -20,7 +22,9 @@ _ASSUMED = ("Plant and controller are linear and do not vary with time; no actua
             "Certificates speak of the floating-point numbers of plant and controller in their files.")
 _FORMED = "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic."
 _HOW = {"frequency": "About the loop's matrices in floating-point numbers, as in the file; re-derived in ball "
-                     "arithmetic at every frequency."}
+                     "arithmetic at every frequency.",
+        "polytope": "Loops at the vertices formed in rational numbers; one form for all, decided in ball arithmetic.",
+        "scheduled": "Hull of all slopes of the box built by the checker in rational numbers; decided in balls."}
 
 
 def write_synthesis(result: Synthesis, out: str | Path) -> Report:
@@ -58,13 +62,22 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
                           "margins": plain(design.margins), "code": design.outcome.code}}
     report = Report(title=f"Controller by {result.method}", subtitle=result.job.files[0].name, label="",
                     claims=tuple(_claims(result)), sections=tuple(_sections(result)),
-                    provenance=provenance(result.job.files), assumptions=(*_ASSUMED, ARITHMETIC), generated=now(),
+                    provenance=provenance(result.job.files), assumptions=_assumed(result), generated=now(),
                     gate=tuple(_remarks(result)), gates=(GateCode.AT_THE_BINS.code,), data=data)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
         for name in ("design.json", *(("controller.c", "controller.h") if design.controller.dt else ())):
             design.export(folder / name)
     return report
+
+
+def _assumed(result: Synthesis) -> tuple[str, ...]:
+    if result.job.plants:
+        return (*kind_assumptions("polytope"), _ASSUMED[1], ARITHMETIC)
+    if result.job.system is None:
+        return (*_ASSUMED, ARITHMETIC)
+    ranges = "covariance" in result.job.arguments
+    return (*kind_assumptions("scheduled"), *machine_assumptions(result.job.system, ranges))
 
 
 def _remarks(result: Synthesis) -> Iterator[Reason]:
@@ -93,6 +106,11 @@ def _claims(result: Synthesis) -> Iterator[Claim]:
 def _reached(result: Synthesis) -> str:
     if not result.design.holds:
         return "Nothing is proven."
+    if isinstance(result.design, FeedbackDesign) and result.design.rate > 0:
+        words = [f"rate {result.design.rate:.6g}"]
+        words += [f"{one.title} below {one.certificate.region['bound']:.6g}" for one in result.checked
+                  if "bound" in one.certificate.region]
+        return f"Proven: {', '.join(words)}."
     how = "Proven" if result.checked else "Evaluated at the bins in floating point, not proven"
     return f"{how}: {result.design.value:.6g}."
 
@@ -101,9 +119,10 @@ def _sections(result: Synthesis) -> Iterator[Section]:
     design = result.design
     K = design.controller
     sizes = f"{K.nstates} states, {K.ninputs} inputs, {K.noutputs} outputs"
+    best = f" Best possible, estimated: {design.lower:.6g}." if np.isfinite(design.lower) else ""
     text = (f"{design.method}, {design.solver}; {design.solve_time:.3g} s.\n\nController: {sizes}, "
-            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\n{_reached(result)} Best possible, "
-            f"estimated: {design.lower:.6g}.\n\n{design.outcome.text}\n\n{design.robust_against.text}")
+            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\n{_reached(result)}{best}\n\n"
+            f"{design.outcome.text}\n\n{design.robust_against.text}")
     rows = pd.DataFrame([{"loop": name, **{key: f"{value:.4g}" for key, value in one.items()}}
                          for name, one in design.margins.items()])
     tables = (Table(rows, "Margins, in floats: gain [-], phase [deg], delay [s]."),) if len(rows) else ()
