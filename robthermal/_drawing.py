@@ -6,6 +6,10 @@ from typing import Any
 
 from .errors import InputError
 
+# Okabe and Ito (2008): told apart with every common color vision; without the yellow, too pale on white. The n-th
+# sensor of a machine has the n-th color in every figure.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
 
 def axes_for(ax: Any, **figure: Any) -> Any:
     """`ax`, or the axes of a new figure.

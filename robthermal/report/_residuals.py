@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ._style import COLORS, canvas, house_style, plain
+from ._style import canvas, house_style, look, plain
 from ._traces import thin, time_unit
 
 
 def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
-                           noise: float = 0.0, title: str = "", unit: str = "K") -> Any:
+                           noise: float = 0.0, title: str = "", unit: str = "K", order: Sequence[str] = ()) -> Any:
     """Draw residuals of the same readings for two models, one below the other and on one scale.
 
     Parameters
@@ -29,6 +29,8 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
         Heading of the drawing.
     unit : str, optional
         Unit of the readings: "K", or "V" of voltages.
+    order : sequence of str, optional
+        All sensors of the machine, so that each has one color in every figure; default: those drawn.
 
     Returns
     -------
@@ -52,9 +54,10 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     with house_style():
         figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
         for ax, residuals, what in zip(axes, (before, after), ("before", "after"), strict=True):
-            for i, (name, values) in enumerate(residuals.items()):
-                ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=COLORS[i % len(COLORS)],
-                        linestyle=("-", "--", ":")[i // len(COLORS) % 3], linewidth=0.8, label=plain(name))
+            for name, values in residuals.items():
+                color, dashes = look(name, list(residuals), order)
+                ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=color, linestyle=dashes, linewidth=0.8,
+                        label=plain(name))
             if noise > 0:
                 ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
             ax.set(ylabel=f"measured −\nmodel [{unit}]", title=what)
@@ -67,7 +70,7 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
 
 
 def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
-                         unit: str, title: str = "") -> Any:
+                         unit: str, title: str = "", order: Sequence[str] = ()) -> Any:
     """Draw the size of residuals over frequency for two models, one below the other and on one scale.
 
     Parameters
@@ -80,6 +83,8 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
         Of the sizes.
     title : str, optional
         Heading of the drawing.
+    order : sequence of str, optional
+        All sensors of the machine, so that each has one color in every figure; default: those drawn.
 
     Returns
     -------
@@ -102,9 +107,10 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
     with house_style():
         figure, axes = canvas(4.8, 2, sharex=True, sharey=True)
         for ax, sizes, what in zip(axes, (before, after), ("before", "after"), strict=True):
-            for i, (name, values) in enumerate(sizes.items()):
-                ax.loglog(f, np.asarray(values, dtype=float), color=COLORS[i % len(COLORS)],
-                          linestyle=("-", "--", ":")[i // len(COLORS) % 3], linewidth=0.8, label=plain(name))
+            for name, values in sizes.items():
+                color, dashes = look(name, list(sizes), order)
+                ax.loglog(f, np.asarray(values, dtype=float), color=color, linestyle=dashes, linewidth=0.8,
+                          label=plain(name))
             ax.set(ylabel=f"|measured −\nmodel| [{unit}]", title=what)
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
         axes[-1].set(xlabel="frequency [Hz]")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
+from .._drawing import COLORS
 
-# Okabe and Ito (2008): told apart with every common color vision; without the yellow, too pale on white.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
 
 # Black and white become the ink and paper of the page (see _figure.inline), so that dark mode works.
 _STYLE: Any = {  # names are checked by matplotlib when they are set
@@ -46,6 +45,12 @@ def house_style() -> Iterator[None]:
 
     with matplotlib.rc_context(_STYLE):
         yield
+
+
+def look(name: str, drawn: Sequence[str], order: Sequence[str]) -> tuple[str, str]:
+    """Color and dashes of a sensor: by its place in `order`, else by its place among those drawn."""
+    place = list(order if name in order else drawn).index(name)
+    return COLORS[place % len(COLORS)], ("-", "--", ":")[place // len(COLORS) % 3]
 
 
 def plain(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..fitting import residual as residual_of
-from ._style import COLORS, canvas, house_style, plain
+from ._style import canvas, house_style, look, plain
 
 _BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures
 
@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 
 def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], model: Mapping[str, ArrayLike], *,
-                           residual: bool = True, title: str = "", unit: str = "K") -> Any:
+                           residual: bool = True, title: str = "", unit: str = "K",
+                           order: Sequence[str] = ()) -> Any:
     """Draw readings, the model's answer, and their difference.
 
     Parameters
@@ -36,6 +37,8 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         Heading of the drawing.
     unit : str, optional
         Unit of all readings: "K", drawn in °C, or "V".
+    order : sequence of str, optional
+        All sensors of the machine, so that each has one color in every figure; default: those drawn.
 
     Returns
     -------
@@ -62,8 +65,8 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         figure, axes = canvas(4.4 if residual else 3.0, 2 if residual else 1, sharex=True, squeeze=False,
                               height_ratios=(2, 1) if residual else None)
         above, below = axes[0, 0], axes[-1, 0]
-        for i, (name, (data, answer)) in enumerate(pairs.items()):
-            color, dashes = COLORS[i % len(COLORS)], ("-", "--", ":")[i // len(COLORS) % 3]
+        for name, (data, answer) in pairs.items():
+            color, dashes = look(name, list(pairs), order)
             _dots(above, *thin(t / scale, data - zero), color)
             above.plot(*thin(t / scale, answer - zero), dashes, color=color, label=plain(name))
             if residual:

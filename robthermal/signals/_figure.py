@@ -6,33 +6,46 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from .._drawing import COLORS
+
 if TYPE_CHECKING:
     from ._record import Record
 
+_QUANTITIES = {"K": "temperature", "degC": "temperature", "A": "current", "V": "voltage", "W": "heat", "%": "duty"}
+
 
 def draw(record: Record) -> NDArray[Any]:
-    """Two axes, inputs (held) above outputs."""
+    """One axes per unit, inputs (held) above outputs."""
     # Imported here: matplotlib is slow to load, and most programs never draw.
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, 1, sharex=True, layout="constrained")
-    for name in record.input_names:
-        axes[0].step(record.time, record[name], where="post", label=_label(record, name))
-    for name in record.output_names:
-        axes[1].plot(record.time, record[name], label=_label(record, name))
-    for axis, kind, names in zip(axes, ("inputs", "outputs"), (record.input_names, record.output_names), strict=True):
-        axis.set_ylabel(kind)
+    panels = _panels(record)
+    figure, grid = plt.subplots(len(panels), 1, sharex=True, layout="constrained", squeeze=False,
+                                figsize=(6.4, max(4.8, 2.0 * len(panels))))
+    axes: NDArray[Any] = grid[:, 0]
+    for axis, (kind, unit, names) in zip(axes, panels, strict=True):
+        own = record.input_names if kind == "inputs" else record.output_names
+        for name in names:
+            style: dict[str, Any] = {"where": "post"} if kind == "inputs" else {}
+            paint = axis.step if kind == "inputs" else axis.plot
+            place = own.index(name) if kind == "outputs" else -1 - own.index(name)  # inputs from the other end
+            paint(record.time, record[name], label=name, color=COLORS[place % len(COLORS)], **style)
+        axis.set_ylabel(f"{_QUANTITIES.get(unit, kind)} [{unit}]" if unit else kind)
         axis.grid(True, alpha=0.3)
+        axis.set_title(kind, loc="left", fontsize="small")
         if names:
             axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(names), 6), fontsize="small",
                         frameon=False, borderaxespad=0.2)  # above the curves, on none of them
-    axes[1].set_xlabel("time [s]")
+    axes[-1].set_xlabel("time [s]")
     if record.name:
         figure.suptitle(record.name)
-    grid: NDArray[Any] = axes
-    return grid
+    return axes
 
 
-def _label(record: Record, name: str) -> str:
-    unit = record.units.get(name)
-    return f"{name} [{unit}]" if unit else name
+def _panels(record: Record) -> list[tuple[str, str, list[str]]]:
+    """Kind, unit and names of the channels that share an axis; both kinds have one, even without channels."""
+    found: list[tuple[str, str, list[str]]] = []
+    for kind, names in (("inputs", record.input_names), ("outputs", record.output_names)):
+        units = dict.fromkeys(record.units.get(name, "") for name in names) or {"": None}
+        found += [(kind, unit, [name for name in names if record.units.get(name, "") == unit]) for unit in units]
+    return found

@@ -268,12 +268,12 @@ class Record:
         write(self, Path(path), temperature_unit, temperatures)
 
     def plot(self) -> NDArray[Any]:
-        """Inputs and outputs against time.
+        """Inputs and outputs against time, each unit on axes of its own.
 
         Returns
         -------
-        ndarray of matplotlib.axes.Axes, shape (2,)
-            Inputs above, outputs below.
+        ndarray of matplotlib.axes.Axes, shape (n,)
+            One for each unit of the inputs, then one for each unit of the outputs; two where all share a unit.
         """
         return draw(self)
 

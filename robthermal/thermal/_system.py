@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from .._html import short_table
 from ..errors import InputError
+from ._draw_network import draw_network
 from ._equations import Equations
 from ._network import check_network
 from ._parameters import parameters, present_effects, read_parameter, replace_parameters
@@ -269,6 +270,21 @@ class System(Part):
         graph = csr_array((np.array(weights, float), (rows, columns)), shape=(len(names), len(names)))
         _, _, origin = dijkstra(graph, directed=False, indices=targets, min_only=True, return_predecessors=True)
         return {names[i]: names[o] for i, o in enumerate(origin) if o >= 0}
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the network: lumps, ambients, heat paths, modules, sensors and heaters; returns the matplotlib axes.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones of a size that holds every name.
+
+        Raises
+        ------
+        InputError
+            For more than 300 lumps and ambients.
+        """
+        return draw_network(self, ax)
 
     def _paths(self) -> list[tuple[str, str, float]]:
         links = [(*link.between, link.conductance + (link.natural.gain if link.natural else 0.0)

@@ -100,9 +100,21 @@ def test_table_frame_and_plot() -> None:
     assert list(table.columns) == ["time", *record.names]
     np.testing.assert_array_equal(table["T1"], record["T1"])
     axes = record.plot()
-    assert axes.shape == (2,)
-    np.testing.assert_array_equal(axes[1].lines[2].get_ydata(), record["T3"])
+    assert axes.shape == (4,)  # inputs in W and without unit, outputs in K and without unit
+    np.testing.assert_array_equal(axes[3].lines[1].get_ydata(), record["T3"])
     assert axes[0].lines[0].get_drawstyle() == "steps-post"
+
+
+def test_amperes_and_kelvin_have_axes_of_their_own() -> None:
+    record = rt.Record(sample_time=1.0, inputs=np.tile([0.5, 298.0], (20, 1)), outputs=np.full((20, 3), 300.0),
+                       input_names=["m1", "room"], output_names=["T1", "U1", "T2"],
+                       units={"m1": "A", "room": "K", "T1": "K", "U1": "V", "T2": "K"})
+    axes = record.plot()
+    assert [axis.get_ylabel() for axis in axes] == ["current [A]", "temperature [K]", "temperature [K]", "voltage [V]"]
+    low, high = axes[0].get_ylim()
+    assert 0.4 < low < 0.5 < high < 0.6  # not a flat line below 298 K
+    colors = [line.get_color() for axis in axes[2:] for line in axis.lines]
+    assert len(set(colors)) == 3
 
 
 def hole(value: Any, row: int = 3, column: int = 1) -> np.ndarray:

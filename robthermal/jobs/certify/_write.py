@@ -8,6 +8,7 @@ from ...report import Report
 from ..claims import Certification, machine_assumptions, required_claims
 from ..evidence import write_certification
 from ..folder import output_folder
+from ..network import network_section
 from ..now import now
 from ..provenance import provenance, subtitle
 from ._reasons import CERTIFY_GATES, certification_reasons, stays_usable
@@ -56,7 +57,8 @@ def certification_report(result: Certification, files: tuple[Path, ...]) -> Repo
     """
     return Report(title=result.system.name, subtitle=subtitle(result.system), label="",
                   claims=required_claims(result.checked, stays_usable(result)),
-                  sections=tuple(certification_sections(result)), provenance=provenance(files), generated=now(),
+                  sections=(network_section(result.system), *certification_sections(result)),
+                  provenance=provenance(files), generated=now(),
                   assumptions=machine_assumptions(result.system, result.parameters is not None),
                   gate=certification_reasons(result), gates=CERTIFY_GATES, usable=result.usable,
                   data={"certify": certify_table(result)})

@@ -10,6 +10,7 @@ from ...report import Evidence, Report, Section, Stage
 from ...thermal import System
 from ..claims import ARITHMETIC, GateCode
 from ..evidence import checker
+from ..network import NETWORK, network_section
 from ..now import now
 from ..provenance import provenance, subtitle
 from ..request import Project
@@ -50,7 +51,8 @@ def assemble(context: Context, stages: Sequence[Stage], system: System) -> Repor
     return Report(
         title=project.name, subtitle=subtitle(system), label=project.label,
         claims=tuple(claim for _, report in parts for claim in report.claims),
-        sections=(input_section(project, data["imports"]), *_sections(context.finished, stages)),
+        sections=(input_section(project, data["imports"]), replace(network_section(system), chapter="Inputs"),
+                  *_sections(context.finished, stages)),
         provenance=provenance(project.files), assumptions=common, generated=now(),
         evidence=tuple(one for _, report in parts for one in _resting(report, common)), checker=checker(),
         gate=applied(reasons, project.gate), usable=certified.report.usable if certified else (),
@@ -73,7 +75,8 @@ def _sections(finished: Mapping[str, Finished], stages: Sequence[Stage]) -> Iter
     for stage in stages:
         chapter = stage.name.capitalize()
         if stage.name in finished:
-            yield from (replace(section, chapter=chapter) for section in finished[stage.name].report.sections)
+            yield from (replace(section, chapter=chapter) for section in finished[stage.name].report.sections
+                        if section.anchor != NETWORK)
         else:
             yield Section("Not computed" if stage.status == "failed" else "Not run", stage.text, chapter=chapter,
                           anchor=f"{stage.name}-{stage.status}")

@@ -88,11 +88,11 @@ def calibration_part(stage: str, done: Calibrated, data: Data, project: Project)
     facts = data_facts(done.system, done.comparisons, misfits, kinds, done.fit)
     tables: dict[str, Any] = {"facts": asdict(facts), "residuals": residual_table(done.misfits),
                               "imports": import_table([*data.train, *data.validation])}
-    sections = [comparison_section(done.comparisons, done.fit)] if done.comparisons else []
+    sections = [comparison_section(done.comparisons, done.fit, done.system.sensor_names)] if done.comparisons else []
     if done.fit is not None:
         sections += [*response_sections(done.fit), parameter_section(done.fit, None)]
         tables["calibrate"] = {"parameters": parameter_table(done.fit, None), "outcome": done.fit.outcome.code}
-    first = [first_section(done.comparisons, done.misfits)] if done.misfits else []
+    first = [first_section(done.comparisons, done.misfits, done.system.sensor_names)] if done.misfits else []
     return part(stage, sections, first=first, data=tables)
 
 

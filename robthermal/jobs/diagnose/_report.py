@@ -16,6 +16,7 @@ from ...signals import Record
 from ...thermal import write_system
 from ..evidence import write_report
 from ..folder import output_folder
+from ..network import network_section
 from ..now import now
 from ..provenance import provenance, subtitle
 from ._answer import answer_sentence
@@ -122,6 +123,7 @@ def _shown_first(result: Diagnosed) -> list[Residuals]:
 
 def _sections(result: Diagnosed) -> Iterator[Section]:
     found = result.diagnosis
+    yield network_section(found.system)
     yield _effect_section(found)
     if found.reference is not None:
         yield change_section(found, found.reference)
@@ -183,7 +185,7 @@ def _gap_section(result: Diagnosed) -> Section:
     if found.provisional:
         text += " The effects are provisional, not names."
     figures = [_figure(one, found) for one in result.residuals if one not in _shown_first(result)]
-    figures += [_spectrum(one) for one in result.residuals] + [_response(one) for one in result.responses]
+    figures += [_spectrum(one, found) for one in result.residuals] + [_response(one) for one in result.responses]
     return Section("Residual before and after", text, figures=tuple(figures),
                    tables=(Table(pd.DataFrame(rows), "Residuals, root mean square; all sensors, then each."),),
                    anchor="gap")
@@ -192,7 +194,8 @@ def _gap_section(result: Diagnosed) -> Section:
 def _figure(one: Residuals, found: Diagnosis) -> Figure:
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     drawn = residuals_before_after(one.time, {n: one.before[n] for n in names}, {n: one.after[n] for n in names},
-                                   noise=_noise(one, found), title=f"{one.kind}: {one.name}", unit=one.unit)
+                                   noise=_noise(one, found), order=found.system.sensor_names, unit=one.unit,
+                                   title=f"{one.kind}: {one.name}")
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
     return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
                        caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
@@ -205,10 +208,11 @@ def _noise(one: Residuals, found: Diagnosis) -> float:
     return gap.noise if gap.unit == one.unit else rmse([np.array([found.noise_floor.noise[n] for n in one.before])])
 
 
-def _spectrum(one: Residuals) -> Figure:
+def _spectrum(one: Residuals, found: Diagnosis) -> Figure:
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     before, after = ({name: sizes[name] for name in names} for sizes in one.spectra())
-    drawn = spectra_before_after(one.frequency, before, after, unit=f"{one.unit}/√Hz", title=f"{one.kind}: {one.name}")
+    drawn = spectra_before_after(one.frequency, before, after, unit=f"{one.unit}/√Hz", title=f"{one.kind}: {one.name}",
+                                 order=found.system.sensor_names)
     return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {one.kind} record, without and with the "
                        "effects.", caption=f"The same residuals over frequency, {one.kind} record.")
 

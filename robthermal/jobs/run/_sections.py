@@ -13,7 +13,7 @@ from ._misfit import Misfit
 from ._result import Comparison
 
 
-def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> Section:
+def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None, order: tuple[str, ...]) -> Section:
     """Model against data: residuals before and after, every record drawn."""
     rows = [{"record": f"{c.kind}: {c.record.name}", "sensor": _named(name, c.record.units.get(name)),
              "nominal model [K]": before, "calibrated model [K]": c.rmse(c.calibrated)[name]}
@@ -25,19 +25,19 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None) -> 
             "every sensor; for the calibrated model these are the numbers of the calibration itself.")
     if fit is not None:
         text += f"\n\n{fit.outcome.text}"
-    figures = tuple(figure for c in comparisons for figure in _comparison_figures(c))
+    figures = tuple(figure for c in comparisons for figure in _comparison_figures(c, order))
     return Section("Model against data", text, figures=figures,
                    tables=(Table(table, "Residuals (measured − model), root mean square."),), anchor="model")
 
 
-def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ...]) -> Section:
+def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ...], order: tuple[str, ...]) -> Section:
     """Model against the records that were held out, for the first screen; against the training records without any."""
     kind, record = _shown(misfits)[0].kind, _shown(misfits)[0].record
     worst = next((c for c in comparisons if c.kind == kind and c.record.name == record), comparisons[0])
     what = ("records that were held out" if kind == "validation" else
             "its own training records: none was held out, so that nothing is known about its predictions")
     return Section("Model against data", f"The calibrated model, run freely, beside {what}.",
-                   figures=_comparison_figures(worst),
+                   figures=_comparison_figures(worst, order),
                    tables=(misfit_table(misfits),), anchor="validation")
 
 
@@ -76,17 +76,17 @@ def _answer(one: Misfit) -> str:
     return "NOT within the tolerance" if one.beyond else "beyond the noise, within the tolerance"
 
 
-def _comparison_figures(c: Comparison) -> tuple[Figure, ...]:
+def _comparison_figures(c: Comparison, order: tuple[str, ...]) -> tuple[Figure, ...]:
     """One drawing of the temperatures, and one of the voltages where the record has any."""
     units = {name: c.record.units.get(name) for name in c.rmse(c.calibrated)}
     groups = {"K": [n for n, own in units.items() if own != "V"], "V": [n for n, own in units.items() if own == "V"]}
-    return tuple(_comparison_figure(c, names, unit) for unit, names in groups.items() if names)
+    return tuple(_comparison_figure(c, names, unit, order) for unit, names in groups.items() if names)
 
 
-def _comparison_figure(c: Comparison, sensors: list[str], unit: str) -> Figure:
+def _comparison_figure(c: Comparison, sensors: list[str], unit: str, order: tuple[str, ...]) -> Figure:
     names = _worst(c, sensors, 4)
     figure = measured_against_model(c.record.time, {n: c.record[n] for n in names}, {n: c.calibrated[n] for n in names},
-                                    title=f"{c.kind}: {c.record.name}", unit=unit)
+                                    title=f"{c.kind}: {c.record.name}", unit=unit, order=order)
     what = "voltages" if unit == "V" else "temperatures"
     alt = f"Time plot of measured and simulated {what}, {c.kind} record, with residuals below."
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(sensors) else (

@@ -10,6 +10,7 @@ from ..certify import certification_sections, stays_usable
 from ..claims import machine_assumptions, required_claims
 from ..evidence import write_certification
 from ..folder import output_folder
+from ..network import network_section
 from ..now import now
 from ..provenance import provenance, subtitle
 from ..request import write_calibrated
@@ -53,11 +54,14 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     ['calibrated.toml', 'certificates', 'junit.xml', 'report.html', 'report.json', 'summary.json']
     """
     project, certified = result.project, result.certification
-    sections = [comparison_section(result.comparisons, result.fit)] if result.comparisons else []
+    sections = [network_section(result.system)]
+    order = result.system.sensor_names
+    if result.comparisons:
+        sections.append(comparison_section(result.comparisons, result.fit, order))
     if result.fit is not None:
         sections.append(parameter_section(result.fit, certified.parameters))
     sections.extend(certification_sections(certified))
-    first = (first_section(result.comparisons, result.misfits),) if result.misfits else ()
+    first = (first_section(result.comparisons, result.misfits, order),) if result.misfits else ()
     report = Report(title=project.name, subtitle=subtitle(result.system), label=project.label,
                     claims=required_claims(certified.checked, stays_usable(certified)), sections=tuple(sections),
                     provenance=provenance(project.files), generated=now(),
