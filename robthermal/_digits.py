@@ -26,6 +26,22 @@ def upwards(value: float, digits: int) -> str:
     return _rounded(_converted(value), digits, ROUND_CEILING)
 
 
+def probability(p: float) -> str:
+    """``p = ...`` with two digits, or a bound where it is too small to be computed.
+
+    Parameters
+    ----------
+    p : float
+        Probability [-].
+
+    Examples
+    --------
+    >>> probability(0.031), probability(0.0)
+    ('p = 0.031', 'p < 1e-16')
+    """
+    return f"p = {p:.2g}" if p >= 1e-16 else "p < 1e-16"
+
+
 def downwards(value: float, digits: int) -> str:
     """`value` with so many digits, never larger than it is.
 

@@ -13,9 +13,9 @@ class DiagnosisCode(OutcomeCode):
 
     ADEQUATE = (True, "Nothing is left to explain.")
     AMBIGUOUS = (False, "The records cannot distinguish some effects.",
-                 "See alternatives, and next_experiment for what separates them.")
-    CONSISTENT = (True, "Nothing is missing that these records could show: see not_testable and the detection limits "
-                  "in scores.")
+                 "See the alternatives, and the next experiment for what separates them.")
+    CONSISTENT = (True, "Nothing is missing that these records could show: see what they could not have shown, and "
+                  "the detection limits.")
     CONVERGED = (True, "The fit converged.")
     DECLARED = (True, "Noise as declared.")
     DOUBTFUL = (False, "The declared noise is far from what the record shows.",
@@ -40,4 +40,4 @@ class DiagnosisCode(OutcomeCode):
     PREDICTED = (True, "The validation records are predicted as well as the training records are fitted.")
     SELECTED = (True, "The convex program was solved.")
     UNEXPLAINED = (False, "None of the known effects explains the records.",
-                   "Look at `located`: lump, sensor and conditions.")
+                   "Look where the misfit sits: lump, sensor and conditions.")

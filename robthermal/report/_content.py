@@ -205,6 +205,10 @@ class Report:
         Tables for the JSON summary, by key.
     stages : sequence of Stage, optional
         Stages of a chain in their order; none in the report of a single job.
+    headline : str, optional
+        The answer in a sentence, beside the verdict; the reasons then stand with the claims only.
+    numbers : sequence of (str, str, str), optional
+        The number that matters: what it is, the number, and what to compare it with.
 
     Examples
     --------
@@ -230,6 +234,8 @@ class Report:
     first: Sequence[Section] = ()
     data: Mapping[str, Any] = field(default_factory=dict)
     stages: Sequence[Stage] = ()
+    headline: str = ""
+    numbers: Sequence[tuple[str, str, str]] = ()
 
     @property
     def holds(self) -> bool:

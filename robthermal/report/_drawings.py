@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._drawing import COLORS
 from ..errors import InputError
-from ._style import COLORS, canvas, house_style, plain
+from ._style import canvas, house_style, plain
 
 _DASHES = ("--", ":", "-.", (0, (5, 1)), (0, (1, 1)))
 _MOST_BARS = 40  # more names than this cannot be read; a band over the index can

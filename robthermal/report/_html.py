@@ -92,7 +92,7 @@ def _cards(claims: Sequence[Claim]) -> list[Claim]:
     return [claim for claim in claims if id(claim) in first or not claim.good]
 
 
-_OWN = ("top", "usable", "usable-title", "claims", "claims-title", "bounds",
+_OWN = ("top", "numbers", "usable", "usable-title", "claims", "claims-title", "bounds",
         "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
         "provenance", "check")
 

@@ -59,6 +59,8 @@ class _Stored(_Strict):
     first: list[_Section]
     data: dict[str, Any]
     stages: list[Stage] = []
+    headline: str = ""
+    numbers: list[tuple[str, str, str]] = []
     digest: str
 
 
@@ -96,7 +98,8 @@ def write_content(report: Report, path: str | Path) -> Path:
                "evidence": [asdict(one) for one in report.evidence], "checker": report.checker,
                "gate": [asdict(one) for one in report.gate], "gates": list(report.gates),
                "usable": [asdict(one) for one in report.usable], "first": _stored(report.first),
-               "data": dict(report.data), "stages": [asdict(one) for one in report.stages]}
+               "data": dict(report.data), "stages": [asdict(one) for one in report.stages],
+               "headline": report.headline, "numbers": [list(one) for one in report.numbers]}
     return save_json({**content, "digest": _digest(content)}, path)
 
 
@@ -182,7 +185,7 @@ def read_content(path: str | Path) -> Report:
                              for one in part) for part in (stored.sections, stored.first))
     return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
                   stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
-                  stored.gates, stored.usable, first, stored.data, stored.stages)
+                  stored.gates, stored.usable, first, stored.data, stored.stages, stored.headline, stored.numbers)
 
 
 def _printed(table: Table | Printed) -> Printed:

@@ -82,9 +82,10 @@ def _box(ax: Any, node: _Node, place: Array, size: Array) -> None:
     # Imported here: matplotlib is slow to load, and most programs draw nothing.
     from matplotlib.patches import FancyBboxPatch
 
-    style = {"linestyle": (0, (4, 2)), "edgecolor": "#666666"} if node.ambient else {"edgecolor": "black"}
-    ax.add_patch(FancyBboxPatch(place - size / 2 + 0.05, *(size - 0.1), boxstyle="round,pad=0.05", facecolor="white",
-                                linewidth=1.1, zorder=3, **style))
+    (x, y), (width, height) = place - size / 2 + 0.05, size - 0.1
+    ax.add_patch(FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0.05", facecolor="white", linewidth=1.1,
+                                zorder=3, linestyle=(0, (4, 2)) if node.ambient else "-",
+                                edgecolor="#666666" if node.ambient else "black"))
     top = place[1] + (len(node.lines) - 1) * _LINE / 2
     for k, (text, marker, color) in enumerate(node.lines):
         y, shift = top - k * _LINE, _LETTER if marker else 0.0

@@ -9,8 +9,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import robthermal as rt
 from robthermal.errors import InputError
-from robthermal.report import Figure, box_ranges, current_limits, house_style, load_curve, measured_against_model
+from robthermal.report import (
+    Figure,
+    box_ranges,
+    current_limits,
+    house_style,
+    load_curve,
+    measured_against_model,
+    residuals_before_after,
+)
 
 
 def labels(figure: Any) -> list[str]:
@@ -24,6 +33,19 @@ def test_traces_are_in_celsius_and_the_residual_is_measured_minus_model() -> Non
     dots = above.patches[0].get_path().vertices[::2]
     np.testing.assert_allclose(dots, [[0.0, 26.85], [2.0, 27.85]])
     np.testing.assert_allclose(below.lines[0].get_ydata(), [-0.5, np.nan, -0.25])
+
+
+def test_a_sensor_has_one_color_whichever_sensors_are_drawn_with_it() -> None:
+    order, values = ("T1", "T2", "T3"), [300.0, 301.0]
+    alone = measured_against_model([0.0, 1.0], {"T3": values}, {"T3": values}, order=order)
+    both = residuals_before_after([0.0, 1.0], {"T3": values, "T1": values}, {"T3": values, "T1": values}, order=order)
+    color = alone.axes[0].lines[0].get_color()
+    assert color == both.axes[0].lines[0].get_color() != both.axes[0].lines[1].get_color()
+    system = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"a": {"capacity": 1.0}},
+                       links=[{"between": ("a", "room"), "conductance": 1.0}],
+                       sensors={name: {"lump": "a"} for name in order})
+    dots = [line.get_color() for line in system.plot().lines if line.get_marker() == "o"]
+    assert dots[2] == color and len(set(dots)) == 3
 
 
 @pytest.mark.parametrize(("span", "unit"), [(100.0, "s"), (3000.0, "min"), (90_000.0, "h")])

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._digits import probability
 from ..._drawing import axes_for
 from ...errors import Outcome
 from .._outcomes import DiagnosisCode
@@ -103,9 +104,10 @@ def adequacy(fit: Refit) -> Adequacy:
     white = float(scipy.stats.chi2.sf(*together)) if tested else 1.0
     p = min(1.0, 2.0 * min(white, min(lumps.values()) * len(lumps)))
     ok = p > SMALLEST_P
-    outcome = DiagnosisCode.ADEQUATE.outcome(f"Nothing is left to explain (p = {p:.2g}).") if ok else (
+    outcome = DiagnosisCode.ADEQUATE.outcome(f"Nothing is left to explain ({probability(p)}).") if ok else (
         DiagnosisCode.INADEQUATE.outcome(
-            f"Something is left (p = {p:.1e}): the model with these effects does not explain the records.", remedy=""))
+            f"Something is left ({probability(p)}): the model with these effects does not explain the records.",
+            remedy=""))
     return Adequacy({name: float(scipy.stats.chi2.sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p,
                     fit.variance, outcome)
 

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._digits import probability
 from ...errors import Diverged, InputError, Outcome
 from ...fitting import Start, counted, free_run, refuse_same, rmse
 from ...thermal import System
@@ -149,9 +150,9 @@ def hold_out(before: Refit, after: Refit, validation: Measured | Sequence[Measur
     variance_after, p = predicted(after, after, data)
     ok = p > SMALLEST_P
     outcome = DiagnosisCode.PREDICTED.outcome(
-        f"The validation records are predicted as well as the training records are fitted (p = {p:.2g})."
+        f"The validation records are predicted as well as the training records are fitted ({probability(p)})."
     ) if ok else DiagnosisCode.NOT_PREDICTED.outcome(
-        f"The validation records are not predicted (p = {p:.1e}): something else is missing, or has changed.")
+        f"The validation records are not predicted ({probability(p)}): something else is missing, or has changed.")
     return HoldOut(gap, variance_before, variance_after, p, outcome, residuals)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...diagnosis import Diagnosis, Found
+from ...diagnosis import Diagnosis, Found, Gap
 from ._change_words import change_in_words, nothing_changed, parameter_in_words
 
 _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",
@@ -17,39 +17,59 @@ _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_li
 
 
 def answer_sentence(found: Diagnosis) -> str:
-    """What the model lacks or what has changed, what adding it does to the error, and what is left.
+    """What the model lacks or what has changed, and what adding it does to the error.
 
     Parameters
     ----------
     found : Diagnosis
         What was found.
     """
-    kind = "validation" if "validation" in found.gap else "train"
-    gap = found.gap[kind]
-    records = "validation data" if kind == "validation" else "the new records" if found.reference else (
-        "the training data")
-    parts = []
+    gap, records = _shown(found)
     if found.effects:
-        parts.append(f"{_sets(found)} With it the error on {records} falls from {gap.before:.2g} to "
-                     f"{gap.after:.2g} {gap.unit}.")
-    elif found.verdict == "consistent":
-        parts.append(nothing_changed(found) if found.reference else
-                     f"The model explains the records: the error on {records} is {gap.before:.2g} {gap.unit}, noise "
-                     f"alone would give {gap.noise:.2g} {gap.unit}.")
-    else:
-        what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
-                "Something is missing that no effect of the catalog explains")
-        parts.append(f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
-                     f"{gap.noise:.2g} {gap.unit}.")
-    return " ".join([*parts, *([] if found.remainder is None else [str(found.remainder)])])
+        said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
+            f"The model lacks {accepted_in_words(found)}")
+        return f"{said}. With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
+    if found.verdict == "consistent":
+        return nothing_changed(found) if found.reference else (
+            "The model explains the records: its error is no larger than the noise of the sensors allows.")
+    what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
+            "Something is missing in the model that no effect of the catalog explains")
+    return (f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "
+            f"{gap.unit}.")
 
 
-def _sets(found: Diagnosis) -> str:
-    """What was accepted, each with what the records cannot distinguish from it."""
+def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
+    """The error of the model, before and after, and that of noise alone.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    """
+    gap, records = _shown(found)
+    size = f"{gap.before:.2g} → {gap.after:.2g} {gap.unit}" if found.effects else f"{gap.before:.2g} {gap.unit}"
+    return (f"Error of the model on {records}, root mean square", size,
+            f"Noise alone would give {gap.noise:.2g} {gap.unit}.")
+
+
+def accepted_in_words(found: Diagnosis) -> str:
+    """The accepted effects at their places, each with what the records cannot distinguish from it.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        What was found.
+    """
     sets = [[_accepted(effect, bool(found.reference)), *(in_words(name, where) for name, where in others)]
             for effect, others in zip(found.effects, found.alternatives, strict=True)]
-    listed = ", and ".join(" or ".join(names) for names in sets)
-    return f"Since the reference records: {listed}." if found.reference else f"The model lacks {listed}."
+    return ", and ".join(" or ".join(names) for names in sets)
+
+
+def _shown(found: Diagnosis) -> tuple[Gap, str]:
+    """The gap that counts: on records that no fit has seen, if there are any."""
+    if "validation" in found.gap:
+        return found.gap["validation"], "validation data"
+    return found.gap["train"], "the new records" if found.reference else "the training data"
 
 
 def _accepted(effect: Found, changed: bool) -> str:

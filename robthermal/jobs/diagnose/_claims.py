@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..._digits import probability
 from ...diagnosis import Diagnosis
 from ...report import Claim
+from ._answer import accepted_in_words, in_words
 from ._diagnose import Diagnosed
 
 _SENTENCE = {
@@ -26,6 +28,8 @@ _CHANGED = {
 }
 _HOW_CHANGED = ("A change is accepted where healthy records exceed it with a chance below 0.03 for all parameters "
                 "together, 0.01 for the effects of the catalog (F test with the scatter among the reference records).")
+_WHY_NOT = {"ambiguous": "see the next experiment for what separates them",
+            "unexplained": "a misfit beyond the noise stays with every one that was tried"}
 
 
 def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
@@ -37,11 +41,11 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
         Diagnosis, as `diagnose_records` returns it.
     """
     found = result.diagnosis
-    names = ", ".join(effect.label for effect in found.effects)
-    ruled_out = ", ".join(candidate.label for candidate in found.ruled_out)
+    names = accepted_in_words(found)
+    ruled_out = ", ".join(in_words(one.effect.name, one.where) for one in found.ruled_out)
     said = _SENTENCE if found.reference is None else _CHANGED
     yield _claim(f"Verdict: {found.verdict}", said[found.verdict].format(names=names), found.outcome.ok,
-                 found.outcome.text, _records(result, "train"), _margin(found),
+                 _WHY_NOT.get(found.verdict, found.outcome.text), _records(result, "train"), _margin(found),
                  _HOW_CHANGED if found.reference else
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "
                  "within ΔBIC 10 of it are alternatives"
@@ -51,14 +55,14 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
         return
     yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
                  "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),
-                 f"p = {found.adequacy.p_value:.2g}, must be above 0.001",
+                 f"{probability(found.adequacy.p_value)}, must be above 0.001",
                  "Portmanteau tests of the innovations, and a spline of heat into every lump.")
     if found.hold_out is not None:
         outcome = found.hold_out.outcome
         yield _claim("Unseen records are predicted", "Records that no fit has seen are predicted as well as the "
                      "training records are fitted, give or take the uncertainty of the parameters.", outcome.ok,
                      outcome.text, _records(result, "validation"),
-                     f"p = {found.hold_out.p_value:.2g}, must be above 0.0001",
+                     f"{probability(found.hold_out.p_value)}, must be above 0.0001",
                      "F test of the whitened prediction errors against those of the training records."
                      + (f" The same records ruled out {ruled_out}; p is not corrected for that." if ruled_out else ""))
 
@@ -99,4 +103,5 @@ def _records(result: Diagnosed, kind: str) -> str:
 
 
 def _margin(found: Diagnosis) -> str:
-    return "; ".join(f"{effect.label}: ΔBIC {effect.delta_bic:.0f}" for effect in found.effects) or "no effect accepted"
+    said = [f"{in_words(effect.effect, effect.where)}: ΔBIC {effect.delta_bic:.0f}" for effect in found.effects]
+    return "; ".join(said) or "no effect accepted"

@@ -19,7 +19,7 @@ from ..folder import output_folder
 from ..network import network_section
 from ..now import now
 from ..provenance import provenance, subtitle
-from ._answer import answer_sentence
+from ._answer import answer_sentence, number_that_matters
 from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
@@ -80,7 +80,8 @@ def diagnosis_report(result: Diagnosed) -> Report:
     return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
-                  generated=now(), answer=found.verdict.upper())
+                  generated=now(), answer=found.verdict.upper(), headline=answer_sentence(found),
+                  numbers=(number_that_matters(found),))
 
 
 def save_diagnosis(found: Diagnosis, folder: Path) -> None:
@@ -109,9 +110,11 @@ def _write_experiment(found: Diagnosis, path: Path) -> None:
 
 
 def _first(result: Diagnosed) -> Section:
-    """One sentence, and the gap before and after beside it; what no fit has seen if there is any."""
+    """The residual before and after; of a record that no fit has seen, if there is any."""
     found = result.diagnosis
-    return Section("What the records say", answer_sentence(found), anchor="answer",
+    text = "With the provisional effects: " if found.provisional and found.remainder is not None else ""
+    text += str(found.remainder or "")
+    return Section("What the model leaves of the readings", text, anchor="answer",
                    figures=[_figure(one, found) for one in _shown_first(result)])
 
 
@@ -151,7 +154,8 @@ def _effect_section(found: Diagnosis) -> Section:
     rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std, "unit": unit,
              "ΔBIC": effect.delta_bic, "p": effect.p_value, **_evidence(effect)}
             for effect in listed for name, (value, std, unit) in effect.values.items()]
-    text = "augmented.toml holds these effects." if found.effects else "augmented.toml holds the system refitted."
+    text = f"{_own_words(found)}\n\n"
+    text += "augmented.toml holds these effects." if found.effects else "augmented.toml holds the system refitted."
     if found.provisional:
         text += " The effects below help, but do not explain everything: they are not names."
     tables = [Table(pd.DataFrame(rows), "Effects, in order of acceptance.")] if rows else []
@@ -160,6 +164,16 @@ def _effect_section(found: Diagnosis) -> Section:
     if others:
         tables.append(Table(pd.DataFrame(others), "What these records cannot tell from it."))
     return Section("What was found", text, tables=tables, anchor="effects")
+
+
+def _own_words(found: Diagnosis) -> str:
+    """Why the verdict is as it is, without what the claims and the first screen say already."""
+    said = [found.adequacy.outcome.text, str(found.remainder or "")]
+    said += [] if found.hold_out is None else [found.hold_out.outcome.text]
+    text = found.outcome.text
+    for sentence in said:
+        text = text.replace(sentence, "")
+    return " ".join(text.split())
 
 
 def _evidence(effect: Found) -> dict[str, float]:
@@ -199,7 +213,8 @@ def _figure(one: Residuals, found: Diagnosis) -> Figure:
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
     return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
                        caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
-                       "alone would give.")
+                       "alone would give."
+                       + (" After: with provisional effects, which are no names." if found.provisional else ""))
 
 
 def _noise(one: Residuals, found: Diagnosis) -> float:
