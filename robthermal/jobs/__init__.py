@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import explanations as explanations
     from . import folder as folder
     from . import map as map
+    from . import network as network
     from . import measured as measured
     from . import now as now
     from . import provenance as provenance
@@ -60,7 +61,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verify import verify_files as verify_files
 
 _PACKAGES = ("certify", "chain", "claims", "couple", "datasheet", "design", "diagnose", "evidence",
-             "explanations", "folder", "map", "measured", "now", "provenance", "rebuild", "request",
+             "explanations", "folder", "map", "network", "measured", "now", "provenance", "rebuild", "request",
              "run", "starter", "synthesize", "verify")
 
 _HOME = {  # public name: the package inside that it lives in
