@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import explanations as explanations
     from . import folder as folder
     from . import map as map
-    from . import network as network
     from . import measured as measured
+    from . import network as network
     from . import now as now
     from . import provenance as provenance
     from . import rebuild as rebuild
