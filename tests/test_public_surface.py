@@ -45,7 +45,7 @@ SURFACE = {
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
-        Design FeedbackDesign FrfDesign RobustAgainst frf_pid h2 hinf
+        Design FeedbackDesign FrfDesign RobustAgainst anti_windup frf_pid h2 hinf
         mixed mu_synthesis output_feedback polytopic_feedback
     """,
     "diagnosis": """
@@ -92,7 +92,7 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design FeedbackDesign FrfDesign RobustAgainst SynthesisCode frf_pid h2 hinf
+        Design FeedbackDesign FrfDesign RobustAgainst SynthesisCode anti_windup frf_pid h2 hinf
         mixed mu_synthesis output_feedback polytopic_feedback
     """,
     "systems": """

@@ -3,6 +3,7 @@
 For any linear plant; thermal front ends are in `robthermal.design`, which also re-exports what is here.
 """
 
+from ._anti_windup import anti_windup as anti_windup
 from ._design import Design as Design
 from ._design import RobustAgainst as RobustAgainst
 from ._feedback import FeedbackDesign as FeedbackDesign
@@ -16,5 +17,5 @@ from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 
-__all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "frf_pid", "h2", "hinf",
-           "mixed", "mu_synthesis", "output_feedback", "polytopic_feedback"]
+__all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "anti_windup", "frf_pid",
+           "h2", "hinf", "mixed", "mu_synthesis", "output_feedback", "polytopic_feedback"]
