@@ -263,3 +263,17 @@ def test_models_of_compleib_with_small_channels(name):
                     np.pad(D11, ((0, m), (0, p))), np.vstack([D12, eps * np.eye(m)]), np.hstack([D21, eps * np.eye(p)]))
     d = rt.design.hinf(P, p, m)
     assert proven(d, P) and reference["reg"] * (1 - 1e-6) < d.value < 1.005 * reference["reg"]
+
+
+@pytest.mark.parametrize(("denominator", "optimum"), [([1, 1], 0.181682), ([1, 2, 1], 0.230758)])
+def test_page_of_mixsyn(denominator, optimum):
+    """(s - 1)/(s + 1) and (s - 1)/(s + 1)² with weights 0.1 (s + 100)/(100 s + 1) and 0.1: the page at MathWorks."""
+    G, W = control.ss(control.tf([1, -1], denominator)), control.ss(control.tf([0.1, 10], [100, 1]))
+    n = G.nstates
+    P = generalized(np.block([[G.A, np.zeros((n, 1))], [-W.B @ G.C, W.A]]), np.vstack([np.zeros((n, 1)), W.B]),
+                    np.vstack([G.B, -W.B @ G.D]), np.vstack([np.hstack([-W.D @ G.C, W.C]), np.zeros((1, n + 1))]),
+                    np.hstack([-G.C, [[0.0]]]), np.vstack([W.D, [[0.0]]]), np.vstack([-W.D @ G.D, [[0.1]]]), [[1.0]],
+                    -G.D)
+    d = rt.design.hinf(P, 1, 1)
+    assert d.holds and rt.verify(d.certificates[0]).valid and norm(P, d.controller) < d.value
+    assert optimum * (1 - 1e-5) < d.value < 1.005 * optimum and d.lower == pytest.approx(optimum, rel=3e-4)
