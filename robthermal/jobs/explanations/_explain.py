@@ -54,6 +54,14 @@ class Explanation:
         return "\n".join([*lines, f"Documentation: {self.page}"])
 
 
+_CHANGE = Explanation("parameter_change", "effect",
+                      ("A parameter of [fit] has another value on the new records than on the reference records, by "
+                       "more than healthy records scatter.",),
+                      {"Acts on": ("parameter of [fit]; tied parameters together",),
+                       "Quantities": ("relative [-], the change over the value on a healthy day",)},
+                      "docs/explanations/diagnosis_change.md")
+
+
 def explainable() -> dict[str, tuple[str, ...]]:
     """Every name that `explain` knows, by what it is.
 
@@ -67,7 +75,7 @@ def explainable() -> dict[str, tuple[str, ...]]:
     >>> "sensor_lag" in rt.jobs.explainable()["effect"]
     True
     """
-    return {"effect": tuple(effects()), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
+    return {"effect": (*effects(), _CHANGE.name), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
             "reason": tuple(_REASONS), "error": tuple(_ERRORS)}
 
 
@@ -108,6 +116,8 @@ def explain(name: str) -> tuple[Explanation, ...]:
 def _all(name: str) -> Iterator[Explanation]:
     if name in effects():
         yield _effect(effects()[name])
+    if name == _CHANGE.name:
+        yield _CHANGE
     if name in KINDS:
         yield _certificate(name)
     if name in outcome_codes():
