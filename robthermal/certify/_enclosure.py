@@ -34,7 +34,7 @@ from ._sections import (
     system_section,
 )
 from ._smallest_box import COLDEST, HOTTEST, smallest_box
-from ._surroundings import ambient_ranges, heater_heat
+from ._surroundings import ambient_ranges, heat_ranges
 
 RESERVE = 0.005  # share of every heat kept in reserve in boxes: three standard deviations of an ordinary calibration
 _TIGHTER = (1.0, 0.2, 0.0)  # shares of the reserve that are tried where there is no box with all of it
@@ -124,7 +124,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     currents = current_box(system, current)
     ranges = parameter_box(system, parameters or {})
     around = ambient_ranges(system, ambient, parameters)
-    heat = heater_heat(system, parameters) if heat is None else heat
+    heat = heat_ranges(system, heat, parameters)
 
     def faces(kept: Mapping[str, Any]) -> Faces:
         return Faces(system, around, heat, kept, RESERVE)

@@ -58,6 +58,14 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     return heat
 
 
+def heat_ranges(system: System, heat: Mapping[str, Interval] | None, parameters: Mapping[str, Interval] | None
+                ) -> dict[str, Interval]:
+    """Heat into every lump that gets any: as given, checked, or what heaters may give within their limits."""
+    if heat is None:
+        return heater_heat(system, parameters)
+    return {name: (low, high) for name, (low, high) in named_ranges(heat, system.lump_names, "heat", "lump").items()}
+
+
 def claim_box(system: System, *, current: Currents, temperature: Temperatures,
               ambient: Mapping[str, Interval] | None = None, parameters: Mapping[str, Interval] | None = None
               ) -> dict[str, dict[str, Sequence[float]]]:

@@ -13,7 +13,7 @@ from ._limits import DIRECTIONS, Direction, current_range
 from ._outcomes import CertifyCode
 from ._regulated import SetPoints
 from ._sections import Interval, Temperatures, parameter_box, system_section
-from ._surroundings import ambient_ranges, heater_heat
+from ._surroundings import ambient_ranges, heat_ranges
 from ._usable_bounds import Lower, Question, contraction_bound, largest_box_current, rating_bound
 from ._usable_result import CurrentBound, UsableCurrent
 from ._usable_runaway import runaway_bound
@@ -92,7 +92,7 @@ def question_of(system: System, *, direction: Direction = "cooling", temperature
     """Arguments of `usable_current`, checked."""
     _check(system, direction, method, lower)
     question = Question(system, direction, temperature, ambient_ranges(system, ambient, parameters),
-                        heater_heat(system, parameters) if heat is None else heat,
+                        heat_ranges(system, heat, parameters),
                         parameter_box(system, parameters or {}), lower, method)
     question.check_box()
     return question

@@ -87,13 +87,16 @@ def test_bins_without_excitation_are_a_remark(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("reference", "extra", "what"), [
     ('reference = "dihter"', "", "dihter"), ('reference = ["dither", "room"]', "", "2 reference(s)"),
-    ('reference = "x"', "7.5", "never changes: x"), ('reference = "dither"\nmethod = "lrmp"', "", "with a reference")])
+    ('reference = "x"', "7.5", "never changes: x"),
+    ('reference = "dither"\nmethod = "lrmp"', "", "[identify.loop] method"),
+    ("band = [10.0, 20.0]", "", "[identify.loop] band"), ("half_width = 5000", "", "[identify.loop] half_width")])
 @pytest.mark.filterwarnings("ignore:.*split")
 def test_bad_references(reference: str, extra: str, what: str, tmp_path: Path, run: Run) -> None:
     write_loop(tmp_path, np.random.default_rng(8).standard_normal(N), extra, reference)
     done = run("run", tmp_path / "project.toml", "--out", tmp_path / "out")
     assert done.status == 2
     assert what in done.err and len(done.err) < 700
+    assert "[identify.loop]" in done.err or "loop.csv" in done.err
     assert not (tmp_path / "out").exists()
 
 

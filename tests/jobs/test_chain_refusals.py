@@ -82,6 +82,10 @@ def test_what_later_stages_cannot_do_is_refused_at_once(tables: str, words: tupl
      ("[certify] parameters", "Did you mean 'links.sink-room.conductance'?")),
     ('parameters = { "links.sink-room.conductance" = [5.0, 1.0] }\n',
      ("[certify] parameters.links.sink-room.conductance: [5, 1]", "Write [1, 5].")),
+    ("heat = { colt = [0.0, 1.0] }\n", ("[certify] heat: there is no lump 'colt'", "Did you mean 'cold'?")),
+    ("ambient = { rom = [20.0, 25.0] }\n", ("[certify] ambient: there is no ambient 'rom'", "Did you mean 'room'?")),
+    ("current = { lover = [0.0, 1.0] }\n", ("[certify] current: there is no module 'lover'",)),
+    ("setpoint = { lover = 5.0 }\n", ("[certify] setpoint: there is no module 'lover'",)),
     ("current = { lower = [1.0, 0.0] }\n", ("[certify] current.lower: [1, 0]", "Write [0, 1].")),
     ('[gate]\ntolerance = "0.1"\n', ("gate.tolerance = '0.1'",)),
     ('[system]\nname = "x"\n', ("unknown key 'system'", "is a key of another table"))])
@@ -104,3 +108,8 @@ def test_the_header_proposed_for_a_column_is_the_nearest(tmp_path: Path) -> None
     log.write_text("time,NTC Stage,NTC Probe\n0,20.0,21.0\n1,20.1,21.1\n2,20.2,21.2\n")
     with pytest.raises(rt.InputError, match="Did you mean 'NTC Probe'.*--column 'T=NTC Probe'"):
         rt.read_record(log, outputs=["T"], columns={"T": "NTC Prob"})
+
+
+def test_heat_into_a_lump_that_there_is_not() -> None:
+    with pytest.raises(rt.InputError, match="argument heat: there is no lump 'x99'"):
+        rt.certify.usable_current(rt.systems.two_module(), temperature=(278.15, 358.15), heat={"x99": (0.0, 1.0)})

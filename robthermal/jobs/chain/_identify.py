@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ...errors import InputError
 from ...identify import FrequencyResponse, IdentifyCode
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
@@ -71,10 +72,17 @@ def _model(system: System, one: Identification) -> System | None:
 
 def _estimate(project: Project, one: Identification, model: System | None) -> FrequencyResponse:
     options = one.options
-    found = estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
-                              method=options.method, half_width=options.half_width, degree=options.degree,
-                              poles=options.poles, band=options.band, reading=project.reading,
-                              reference=one.reference)
+    try:
+        found = estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
+                                  method=options.method, half_width=options.half_width, degree=options.degree,
+                                  poles=options.poles, band=options.band, reading=project.reading,
+                                  reference=one.reference)
+    except InputError as error:
+        if any(path.name in error.where for path in one.records):
+            raise
+        key = error.where.removeprefix("--").replace("low, high", "band").replace("-", "_")
+        raise InputError(error.what, where=f"{project.path} [identify.{one.name}] {key}", expected=error.expected,
+                         remedy=error.remedy) from None
     return found.replace(operating_point={**found.operating_point, **one.operating_point})
 
 

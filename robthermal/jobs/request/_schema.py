@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,6 +13,7 @@ from ...errors import InputError
 from ...signals import celsius_to_kelvin, declared
 from ...thermal import FitRange, System, fit_in_kelvin, read_system
 from ..measured import ReadTable
+from ._claim_names import check_ends, check_names
 from ._stage_tables import (
     FILE_NAME,
     CoupleTable,
@@ -354,20 +354,10 @@ def _gate(system: System, table: GateTable, path: Path) -> Gate:
 
 def _boxes(system: System, table: CertifyTable, confidence: float, path: Path, adopt: bool) -> Boxes:
     unit, where = system.temperature_unit, f"{path} [certify]"
-    uncertain = {} if isinstance(table.parameters, str) else table.parameters
-    for name in uncertain:
-        if name not in system.parameter_names and not adopt:  # an adopted effect may bring it
-            near = get_close_matches(name, system.parameter_names, n=1)
-            raise InputError(f"there is no parameter {name!r}", where=f"{where} parameters",
-                             expected="TABLE.NAME.KEY as in the system file",
-                             remedy=f"Did you mean {(near or system.parameter_names)[0]!r}?")
-    box_of = {"temperature": table.temperature} if table.temperature else {}
-    for key, pairs in (("", box_of), ("ambient.", table.ambient), ("current.", table.current or {}),
-                       ("heat.", table.heat or {}), ("parameters.", uncertain)):
-        for name, (low, high) in pairs.items():
-            if low > high:
-                raise InputError(f"[{low:g}, {high:g}]", where=f"{where} {key}{name}", expected="[lower, upper]",
-                                 remedy=f"Write [{high:g}, {low:g}].")
+    ranges = {"ambient": table.ambient, "current": table.current or {}, "heat": table.heat or {},
+              "parameters": {} if isinstance(table.parameters, str) else table.parameters}
+    check_names(system, ranges, table.setpoint, where, adopt)
+    check_ends(ranges, table.temperature, where)
     box = range_in_kelvin(table.temperature, unit, f"{where} temperature") if table.temperature else None
     return Boxes(temperature=box or Boxes().temperature,
                  ambient={name: range_in_kelvin(pair, unit, f"{where} ambient.{name}")
