@@ -152,6 +152,8 @@ def concluded(judged: Judged) -> Diagnosis:
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest)
     said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions]
+    if named and judged.plain is not None:
+        said += doubts(nominal.system)
     return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
 
 
@@ -174,6 +176,20 @@ def _resolves(state: SearchState) -> str:
     if state.fit.structure.n_coarse and state.fit.variance < _NOISE_ONLY:
         return "A finer network would resolve it: split that lump."
     return "A sensor in that lump, an input that drives it alone, or a finer network there would resolve it."
+
+
+def doubts(system: System) -> list[str]:
+    """What to hold against a name beside a remainder, a sentence each: the suite of foreign truth found these wrong.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system.
+    """
+    if not system.modules:
+        return []
+    return ["A module has no inside of its own in this test. On simulated stacks with a module 2 of 7 such names were "
+            "wrong, and both records with nothing missing got one: confirm this name on the machine."]
 
 
 def _hidden(state: SearchState) -> dict[Name, str]:

@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import robthermal as rt
 from robthermal.diagnosis._graded import _predicts
 from robthermal.diagnosis._judge import Validation
+from robthermal.diagnosis.diagnose import doubts
 from robthermal.diagnosis.fit import Refit, coarsened
 from robthermal.diagnosis.search import Accepted, decide, refit_short_list, with_neighbors
 from robthermal.diagnosis.search._neighbors import neighboring
@@ -112,3 +113,9 @@ def test_a_rival_that_leaves_the_gap_of_the_validation_data_is_none():
     assert _predicts(path, nominal, unseen)
     assert not _predicts(lag, nominal, unseen) and not _predicts(nominal, nominal, unseen)
     assert _predicts(lag, nominal, seen)  # nothing held out, nothing against it
+
+
+def test_a_name_beside_a_remainder_on_a_machine_with_modules_says_that_it_is_doubtful():
+    assert doubts(bar()) == []
+    said = doubts(rt.systems.two_module())
+    assert len(said) == 1 and "module" in said[0] and "confirm" in said[0]
