@@ -151,9 +151,8 @@ def concluded(judged: Judged) -> Diagnosis:
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest)
-    said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions]
-    if named and judged.plain is not None:
-        said += doubts(nominal.system)
+    said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions,
+            *doubts(nominal.system, judged.plain is not None)]
     return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
 
 
@@ -178,15 +177,17 @@ def _resolves(state: SearchState) -> str:
     return "A sensor in that lump, an input that drives it alone, or a finer network there would resolve it."
 
 
-def doubts(system: System) -> list[str]:
+def doubts(system: System, remainder: bool) -> list[str]:
     """What to hold against a name beside a remainder, a sentence each: the suite of foreign truth found these wrong.
 
     Parameters
     ----------
     system : System
-        Nominal system.
+        Nominal system that was diagnosed.
+    remainder : bool
+        Whether a name stands beside a remainder.
     """
-    if not system.modules:
+    if not system.modules or not remainder:
         return []
     return ["A module has no inside of its own in this test. On simulated stacks with a module 2 of 7 such names were "
             "wrong, and both records with nothing missing got one: confirm this name on the machine."]

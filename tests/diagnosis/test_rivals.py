@@ -116,6 +116,6 @@ def test_a_rival_that_leaves_the_gap_of_the_validation_data_is_none():
 
 
 def test_a_name_beside_a_remainder_on_a_machine_with_modules_says_that_it_is_doubtful():
-    assert doubts(bar()) == []
-    said = doubts(rt.systems.two_module())
+    assert doubts(bar(), True) == doubts(rt.systems.two_module(), False) == []
+    said = doubts(rt.systems.two_module(), True)
     assert len(said) == 1 and "module" in said[0] and "confirm" in said[0]
