@@ -65,7 +65,7 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
         points.append([exact(get(table, name, where), f"{where}[{short(name)}]") for name in names])
     return Problem(network, {name: kelvin(given[name], "region.ambient") for name in network.ambients},
                    {k: interval(loads[name], "region.heat") for k, name in enumerate(network.lumps) if name in loads},
-                   matrix(get(system, "gain", "system"), m, n, "system.gain"), *points,
+                   matrix(get(system, "gain", "system"), m, n, "system.gain"), points[0], points[1],
                    positive(get(region, "level", "region"), "region.level"),
                    positive(get(region, "rate", "region"), "region.rate"),
                    not_negative(get(region, "offset", "region"), "region.offset"),
@@ -191,7 +191,7 @@ def _falls(problem: Problem) -> Answer:
     links = [[share(entries) for entries in both] for both in nonlinear]
     for pieces in _PIECES:
         points = [list(dict.fromkeys(_corners(problem, k, pieces))) for k in range(len(network.modules))]
-        total = math.prod(map(len, [*points, *links]))
+        total = math.prod([len(own) for own in points]) * math.prod([len(both) for both in links])
         check_work(total, n)
         modules = [[share(_entries(problem, k, point)) for point in own] for k, own in enumerate(points)]
         if first_failure(Share(scaling.matrix(start), 1), [*links, *modules]) is None:
