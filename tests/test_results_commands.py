@@ -243,7 +243,7 @@ def test_explain_says_what_an_engineer_asks(run: Run) -> None:
     for words in ("over a box of temperatures and currents", "Assumed, not proven", "stay in the box"):
         assert words in said.out
     said = run("explain", "ambiguous")
-    assert "the answer is no" in said.out and "next_experiment" in said.out
+    assert "the answer is no" in said.out and "next experiment" in said.out
 
 
 def test_an_unknown_name_gets_the_nearest_ones(run: Run) -> None:

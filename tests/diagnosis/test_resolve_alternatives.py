@@ -69,7 +69,7 @@ def test_strong_validation_inputs_decide(plant: rt.System, train: rt.Record, str
     answers = ranking(found).set_index("candidate")["answer"]
     assert answers["input_lag(heater)"].endswith("the validation records could")
     verdict, _, predicted = diagnosis_claims(Diagnosed(found, (), (), ()))
-    assert "but input_lag(heater)" in verdict.how and "not corrected" in predicted.how
+    assert "but the lag of input heater" in verdict.how and "not corrected" in predicted.how
 
 
 def test_weak_validation_inputs_do_not(plant: rt.System, train: rt.Record, delayed: Run) -> None:
