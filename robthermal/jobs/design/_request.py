@@ -121,7 +121,7 @@ class DesignRequest:
             if not low <= points[name].temperature(value) <= high:
                 raise InputError(f"{name} at {celsius(value)} is outside of the box {celsius(low)} to {celsius(high)}",
                                  where="--setpoint", expected="a set-point inside it",
-                                 remedy="Widen the box (--temperature; in [design]: temperature) or move the set-point.")
+                                 remedy="Widen the box (--temperature; in [design] temperature) or move the set-point.")
         if self.margins is not None:
             checked_margins(self.margins)
         unknown = [name for name in self.export if name not in FORMATS]
