@@ -67,9 +67,15 @@ class LocalBasis:
 
     def denominator(self, bins: Array) -> Array:
         """D = prod(z - gamma_i) at (fractional) bins; one when there are no poles."""
-        D = np.ones(np.shape(bins), dtype=complex)
-        for pole in self.poles:  # z - gamma = gamma expm1(j theta - p T_s): no cancellation for slow poles at low bins
-            D *= np.exp(pole) * np.expm1(1j * self.step * bins - pole)
+        return np.asarray(np.exp(0.5j * self.poles.size * self.step * bins) * self.rotated_denominator(bins))
+
+    def rotated_denominator(self, bins: Array) -> Array:
+        """D/z^(n/2) for n poles, the product of (1 - gamma) cos(theta/2) + j (1 + gamma) sin(theta/2), z = e^(j theta):
+        no cancellation for slow poles at low bins."""
+        D, half = np.ones(np.shape(bins), dtype=complex), 0.5 * self.step * bins
+        cosine, sine = np.cos(half), np.sin(half)
+        for pole in self.poles:
+            D *= -np.expm1(pole) * cosine + 1j * (1.0 + np.exp(pole)) * sine
         return D
 
     def weights(self, bins: Array, offsets: Array) -> Array:

@@ -20,7 +20,6 @@ from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
 
 _CHUNK_BYTES = 2**22  # columns of a chunk of interior bins: small enough for the cache
-_CHUNKS = 4  # that share the small computations at the end
 _CHUNK_MOST = 4096  # and not so many bins that threads would wait for each other
 _FEW_WEAK = 1 / 32  # part of the bins that are rather solved exactly one by one than all of them orthogonalized
 _EXACT_BYTES = 2**25  # regressors of the exact solver held at a time
@@ -150,14 +149,14 @@ class LocalEstimate:
         first, last = self.basis.half_width + 1, self.n_bins - self.basis.half_width + 1
         points = len(self.spectra) * self.basis.n_points
         chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
-        normal = None if self.basis.poles.size else NormalKernel(self.spectra, self.basis)
-        block = normal.chunk if normal else chunk * _CHUNKS
+        normal = NormalKernel(self.spectra, self.basis)
+        block = normal.chunk
         full = found.noise is not None
 
         def solve(a: int) -> None:  # always whole blocks of the record: a bin has the same digits in every request
             b = min(a + block, last)
-            fit = normal.solve(a, b, full_noise=full) if normal else None
-            if fit is None or fit.doubtful.mean() > _FEW_WEAK:
+            fit = normal.solve(a, b, full_noise=full)
+            if fit.doubtful.mean() > _FEW_WEAK:
                 fit = kernel.solve(a, b, chunk=chunk, full_noise=full)
             low, high = max(a, start), min(b, start + exact.size)
             part, mine = slice(low - start, high - start), slice(low - a, high - a)

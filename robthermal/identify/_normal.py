@@ -2,8 +2,9 @@
 
 With real functions phi_s(r) whose products phi_s phi_t = psi_(s+t) depend on s + t alone, the normal equations of
 every window are sums over it of |U|^2, U_i* U_j, U_i* Y_o, |Y|^2, U and Y times fixed functions (`Moments`). What the
-transient explains is taken away by its constant orthonormal functions; the regressors are eliminated for all bins of
-a chunk at a time.
+transient explains is taken away by its orthonormal functions (`_transients`); the regressors are eliminated for all
+bins of a chunk at a time. With prescribed poles every U is multiplied by w at its bin first, and G is w times what the
+regressor w U says.
 
 Normal equations square the condition number. What that costs is known bin by bin, from the energy that is left of
 each regressor and of each output: where it is too much, `_kernel` orthogonalizes instead.
@@ -21,10 +22,14 @@ from ._basis import LocalBasis
 from ._kernel import BlockFit, fit_of_triangle
 from ._moments import BLOCK, Moments, in_blocks, ordered
 from ._records import Spectrum
+from ._transients import ConstantTransient, WeightedTransient, Weights
 
 _WEAK_PIVOT = 1e-6  # energy left of a regressor, relative to its input: rounding costs 1e-16/1e-6 of G
 _WEAK_RESIDUAL = 1e-8  # energy left of an output, relative to it: rounding costs 1e-15/1e-8 of the noise variance
-_WIDEST, _BYTES = 4096, 2**22  # bins of a chunk, and bytes of its normal equations: calls are long, memory is near
+_WEAK_BOTH = 1e-10  # their product: large coefficients amplify the rounding of what is left, 1e-16/1e-10
+# Bins of a chunk, and bytes of its normal equations: calls are long, memory is near, rows do not share cache lines
+# as they would 2**k bytes apart.
+_WIDEST, _BYTES = 4112, 2**23
 
 
 class _Work:
@@ -41,7 +46,7 @@ class _Work:
         self.real_sums, self.sums = np.empty((2 * size - 1, width)), np.empty((2 * size - 1, width), dtype=complex)
         self.transient, self.conjugate = np.empty((2, n, size, width), dtype=complex)
         self.term, self.scaled = np.empty((2, n, width), dtype=complex)
-        self.inverse = np.empty(width, dtype=complex)
+        self.inverse = np.zeros(width, dtype=complex)  # its imaginary part stays zero
         self.triangle = np.empty((n_u, n_u + n_y, width), dtype=complex)
 
     def power_of(self, sequence: Array) -> Array:
@@ -72,10 +77,10 @@ class NormalKernel:
         self.n_u, self.n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
         self._n_k = self.n_u * basis.size
         functions = basis.real_functions()
-        transient = np.linalg.qr(functions.T)[0].T
         self._products, self._functions = Moments(basis.real_products()), Moments(functions)
-        self._one, self._transient = Moments(np.ones((1, basis.n_points))), Moments(transient)
-        self._transient_of_powers = Moments((functions[:0:-1, None] * transient).reshape(-1, basis.n_points))
+        self._one = Moments(np.ones((1, basis.n_points)))
+        self._constant = None if basis.poles.size else ConstantTransient(basis)
+        self._weighted = WeightedTransient(basis) if basis.poles.size else None
         self.degrees_of_freedom = len(spectra) * (basis.n_points - basis.size) - self._n_k
         self._local = threading.local()
 
@@ -93,19 +98,34 @@ class NormalKernel:
         width, n_k = -(-count // BLOCK) * BLOCK, self._n_k
         work = self._work(width)
         part = slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
-        for place, spectrum in enumerate(self.spectra):
-            U, Y = _padded(spectrum.U[:, part], width - count), _padded(spectrum.Y[:, part], width - count)
-            if place:
-                before = work.H.copy(), work.energy.copy()
-            self._multiply(U, Y, work, full_noise)
-            self._remove_transient(U, Y, work, full_noise)
-            if place:
-                work.H += before[0]
-                work.energy += before[1]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            weak = self._eliminate(work, full_noise)
+            known = self._weighted.weights(start, width, work.real_blocks) if self._weighted else None
+            for place, spectrum in enumerate(self.spectra):
+                U, Y = _padded(spectrum.U[:, part], width - count), _padded(spectrum.Y[:, part], width - count)
+                if place:
+                    before = work.H.copy(), work.energy.copy()
+                self._add_up(U, Y, known, work, full_noise)
+                if place:
+                    work.H += before[0]
+                    work.energy += before[1]
+            weak = self._eliminate(work, known.least if known else np.ones(width), full_noise)
             response, gram = fit_of_triangle(ordered(work.triangle, count))
+        if known:
+            w = known.sequence[self.basis.half_width : self.basis.half_width + count]
+            response *= w
+            gram *= w.real**2 + w.imag**2
         return BlockFit(response, gram, self._noise(work.H[n_k:, n_k:], count, full_noise), ordered(weak, count))
+
+    def _add_up(self, U: Array, Y: Array, known: Weights | None, work: _Work, full_noise: bool) -> None:
+        """Products of all columns of one record, without what the transient explains."""
+        if self._weighted and known:
+            U = U * known.sequence
+            self._multiply(U, Y, work, full_noise)
+            self._weighted.project(known, U, Y, work.transient, work.blocks, work.conjugate)
+        elif self._constant:
+            self._multiply(U, Y, work, full_noise)
+            self._constant.project(U, Y, work.transient, work.blocks)
+        self._remove_transient(work, full_noise)
 
     def _noise(self, left: Array, count: int, full: bool) -> Array:
         """E[V_o V_p*] from the upper triangle of what is left of the products Y_o* Y_p, or its diagonal."""
@@ -155,18 +175,9 @@ class NormalKernel:
             for p in range(o + 1, n_y if full_noise else 0):
                 self._one(work.product_of(Y[o].conj(), Y[p]), H[n_k + o, n_k + p, None])
 
-    def _remove_transient(self, U: Array, Y: Array, work: _Work, full_noise: bool) -> None:
+    def _remove_transient(self, work: _Work, full_noise: bool) -> None:
         """Take away what the orthonormal functions of the transient explain."""
-        n_u, n_k, size, H, found = self.n_u, self._n_k, self.basis.size, work.H, work.transient
-        degree, (n, width) = size - 1, H.shape[1:]
-        for i in range(n_u):
-            blocks = in_blocks(U[i], work.blocks)
-            if degree:
-                part = found[i * degree : (i + 1) * degree]
-                self._transient_of_powers(blocks, part.reshape(degree * size, width))
-            self._transient(blocks, found[n_u * degree + i])
-        for o, output in enumerate(Y):
-            self._transient(in_blocks(output, work.blocks), found[n_k + o])
+        n_k, size, H, found, n = self._n_k, self.basis.size, work.H, work.transient, len(work.H)
         np.conjugate(found, out=work.conjugate)
         for c in range(n):
             stop = n if full_noise or c < n_k else c + 1
@@ -174,14 +185,14 @@ class NormalKernel:
             for a in range(size):
                 np.subtract(row, np.multiply(work.conjugate[c, a], found[c:stop, a], out=term), out=row)
 
-    def _eliminate(self, work: _Work, full_noise: bool) -> Array:
-        """Eliminate the regressors from the upper triangle, in place; which bins are weak."""
+    def _eliminate(self, work: _Work, least: Array, full_noise: bool) -> Array:
+        """Eliminate the regressors from the upper triangle, in place; which bins are weak, with `least` before."""
         n_u, n_k, H, degree, n = self.n_u, self._n_k, work.H, self.basis.degree, len(work.H)
-        weak, conjugates = np.zeros(H.shape[-1], dtype=bool), work.conjugate[:, 0]
+        conjugates = work.conjugate[:, 0]
         for c in range(n_k):
             pivot, constant = H[c, c].real, c - n_u * degree
-            weak |= ~(pivot > _WEAK_PIVOT * work.energy[constant if constant >= 0 else c // degree])
-            np.divide(1.0, H[c, c], out=work.inverse)
+            least = np.minimum(least, pivot / work.energy[constant if constant >= 0 else c // degree])
+            np.divide(1.0, pivot, out=work.inverse.real)
             row = H[c, c + 1 :]
             scaled = np.multiply(row, work.inverse, out=work.scaled[c + 1 :])
             conjugate = np.conjugate(row, out=work.term[c + 1 :])
@@ -192,10 +203,12 @@ class NormalKernel:
                 np.subtract(own, np.multiply(conjugates[d], scaled[d - c - 1 : stop - c - 1], out=work.term[d:stop]),
                             out=own)
             if constant >= 0:
-                np.multiply(H[c, c:], np.sqrt(work.inverse), out=work.triangle[constant, constant:])
+                np.multiply(H[c, c:], np.sqrt(work.inverse.real), out=work.triangle[constant, constant:])
+        fine = least > _WEAK_PIVOT  # not where least is NaN
         for o in range(self.n_y):
-            weak |= ~(H[n_k + o, n_k + o].real > _WEAK_RESIDUAL * work.energy[n_u + o])
-        return weak
+            left = H[n_k + o, n_k + o].real / work.energy[n_u + o]
+            fine &= (left > _WEAK_RESIDUAL) & (left * least > _WEAK_BOTH)
+        return np.logical_not(fine)
 
     def _column(self, i: int, s: int) -> int:
         """Place of the regressor phi_s U_i: the constants of G come last."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from flint import acb, ctx
 
 import robthermal as rt
+from robthermal.identify._basis import LocalBasis
 
 
 def record_of(n_u: int, n_y: int, noise: float, n: int = 2500, seed: int = 0) -> rt.Record:
@@ -22,16 +24,29 @@ def record_of(n_u: int, n_y: int, noise: float, n: int = 2500, seed: int = 0) ->
     return rt.Record(sample_time=1.0, inputs=U, outputs=Y, input_names=names[0], output_names=names[1])
 
 
-def least_squares(records: list[rt.Record], k: int, half_width: int, degree: int) -> tuple[np.ndarray, ...]:
+def powers(half_width: int, degree: int) -> np.ndarray:
+    """1, r, ... r^degree of the scaled offsets."""
+    return np.vander(np.arange(-half_width, half_width + 1.0) / half_width, degree + 1, increasing=True)
+
+
+def fractions(half_width: int, poles: np.ndarray, k: int, n: int) -> np.ndarray:
+    """(z/z_k - 1)^s D(z_k)/D(z) of the window at bin k, scaled: the constant and one function per pole [1/sample]."""
+    z = np.exp(2j * np.pi * np.arange(k - half_width, k + half_width + 1) / n)
+    D = np.prod(z[:, None] - np.exp(poles), axis=1)
+    x = (z / z[half_width] - 1.0) / abs(z[-1] - z[half_width])
+    return np.vander(x, poles.size + 1, increasing=True) * (D[half_width] / D)[:, None]
+
+
+def least_squares(records: list[rt.Record], k: int, functions: np.ndarray) -> tuple[np.ndarray, ...]:
     """G, its gram block and the noise covariance at bin k, by numpy.linalg.lstsq on the whole window."""
     rows, outputs, n_r = [], [], len(records)
-    r = np.arange(-half_width, half_width + 1.0) / half_width
+    half_width, size = len(functions) // 2, functions.shape[1]
     for place, record in enumerate(records):
         part = slice(k - half_width, k + half_width + 1)
         U, Y = (np.fft.fft(x - x.mean(axis=0), axis=0, norm="ortho")[part] for x in (record.inputs, record.outputs))
-        transients = np.zeros((r.size, n_r * (degree + 1)))
-        transients[:, place * (degree + 1) : (place + 1) * (degree + 1)] = np.vander(r, degree + 1, increasing=True)
-        plant = [r[:, None] ** s * U for s in range(degree + 1)]
+        transients = np.zeros((len(functions), n_r * size), dtype=complex)
+        transients[:, place * size : (place + 1) * size] = functions
+        plant = [one[:, None] * U for one in functions.T]
         rows.append(np.hstack([*plant, transients]))
         outputs.append(Y)
     K, Y = np.vstack(rows), np.vstack(outputs)
@@ -49,17 +64,47 @@ def test_every_digit_that_is_promised(n_u, n_y, n_r, half_width, degree, noise):
     records = [record_of(n_u, n_y, noise, seed=seed) for seed in range(n_r)]
     G = rt.identify.lpm(records, degree=degree, half_width=half_width)
     for k in (10, 37, 500, 1100):
-        response, gram, covariance = least_squares(records, k, half_width, degree)
+        response, gram, covariance = least_squares(records, k, powers(half_width, degree))
         at = k - 1
         assert abs(G.response[..., at] - response).max() < 1e-8 * abs(response).max()
         assert abs(G.gram[..., at] - gram).max() < 1e-8 * abs(gram).max()
         assert abs(G.noise_covariance[..., at] - covariance).max() < 1e-6 * abs(covariance).max()
 
 
+@pytest.mark.parametrize(("n_u", "n_y", "n_r", "half_width", "poles"),
+                         [(1, 1, 1, 8, [-1e-3, -0.1, -0.5]), (2, 2, 1, 8, [-0.1, -0.5]),
+                          (1, 2, 2, 6, [-0.02 + 0.3j, -0.02 - 0.3j]), (2, 1, 3, 7, [-2e-4, -2e-4, -3.0])])
+@pytest.mark.parametrize("noise", [1e-3, 0.05])
+def test_every_digit_also_with_prescribed_poles(n_u, n_y, n_r, half_width, poles, noise):
+    """Real, complex, double, slow and fast poles [1/s], at bins below, at and above them."""
+    records = [record_of(n_u, n_y, noise, seed=seed) for seed in range(n_r)]
+    G = rt.identify.lrmp(records, poles=poles, half_width=half_width)
+    for k in (10, 11, 37, 119, 500, 1100):
+        functions = fractions(half_width, np.array(poles, dtype=complex), k, 2500)
+        response, gram, covariance = least_squares(records, k, functions)
+        at = k - 1
+        assert abs(G.response[..., at] - response).max() < 1e-8 * abs(response).max()
+        assert abs(G.gram[..., at] - gram).max() < 1e-8 * abs(gram).max()
+        assert abs(G.noise_covariance[..., at] - covariance).max() < 1e-6 * abs(covariance).max()
+
+
+@pytest.mark.parametrize("pole", [-1e-3, -0.5 + 1e-3j])
+def test_the_denominator_has_all_digits_also_beside_its_zero(pole):
+    """D and D/z^(n/2) in ball arithmetic, at the lowest bins of a long record, where z - gamma cancels in doubles."""
+    n, basis = 10**6, LocalBasis(3, 2, 10**6, poles=np.array([pole, pole / 7], dtype=complex))
+    bins = np.array([1.0, 2.0, 159.0, 499_000.0])
+    with ctx.workprec(200):
+        z = [(acb(0, 2) * acb.pi() * int(k) / n).exp() for k in bins]
+        true = [(x - acb(complex(pole)).exp()) * (x - acb(complex(pole / 7)).exp()) for x in z]
+        turned = [complex(d / x) for d, x in zip(true, z, strict=True)]
+    np.testing.assert_allclose(basis.denominator(bins), [complex(d) for d in true], rtol=1e-13)
+    np.testing.assert_allclose(basis.rotated_denominator(bins), turned, rtol=1e-13)
+
+
 def test_clean_data_are_orthogonalized():
     """Without noise, what is left of |Y|^2 is rounding of the normal equations: 1e-9 of the swing must not be noise."""
     G = rt.identify.lpm(record_of(1, 1, 0.0), degree=3)
-    response, _, covariance = least_squares([record_of(1, 1, 0.0)], 900, 8, 3)
+    response, _, covariance = least_squares([record_of(1, 1, 0.0)], 900, powers(8, 3))
     assert abs(G.response[..., 899] - response).max() < 1e-10
     assert G.noise_covariance[0, 0, 899].real == pytest.approx(covariance[0, 0].real, rel=0.05, abs=1e-26)
 
