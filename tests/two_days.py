@@ -79,6 +79,8 @@ class Day:
         Conductance of a path from the block to the room that no file has [W/K].
     draught : float
         Heat into the plate that comes and goes at random, a few minutes at a time [W]: in no catalog.
+    power : float
+        Factor on the heat that is asked for, and recorded.
     drift : float
         How much more the block's sensor reads at the end of the record than at its start [K]: in no catalog.
     """
@@ -89,6 +91,7 @@ class Day:
     loss: float = 0.0
     draught: float = 0.0
     drift: float = 0.0
+    power: float = 1.0
 
 
 HEALTHY = Day()
@@ -105,7 +108,7 @@ def record(seed: int, day: Day = HEALTHY, *, scatter: float = 0.03, length: int 
     capacity = np.array([60.0 * factor["block"], 90.0, 250.0 * factor["sink"]]) * off[3:]
     said = ROOM + 3.0 * rng.standard_normal() if room else ROOM
     there = said + day.room
-    heater = np.repeat(rng.choice([0.0, 5.0, 10.0, 20.0, 30.0], -(-length // 40)), 40)[:length]
+    heater = day.power * np.repeat(rng.choice([0.0, 5.0, 10.0, 20.0, 30.0], -(-length // 40)), 40)[:length]
     flows = np.array([[-g1 - day.loss, g1, 0.0], [g1, -g1 - g2, g2], [0.0, g2, -g2 - g3]])
     rate = np.zeros((6, 6))
     rate[:3, :3] = flows / capacity[:, None]

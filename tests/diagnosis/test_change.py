@@ -15,7 +15,7 @@ from robthermal.fitting import chosen_ranges
 
 SIZES: dict[str, Any] = {"length": 300}
 FEW = ["sensor_offset", "missing_ambient_link", "input_gain", "heat_source"]
-FAN = "links.sink-room.conductance"
+FAN, CONTACT = "links.sink-room.conductance", "links.block-plate.conductance"
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +121,37 @@ def test_what_was_missing_on_all_days_is_no_change(rig: rt.System) -> None:
                         effects=FEW)
     assert found.verdict == "consistent" and found.reference is not None
     assert found.reference.remainder > 0.05
+
+
+@pytest.fixture(scope="module")
+def lossy(rig: rt.System) -> list[rt.Record]:
+    """Healthy days of a machine with a path that no file has: a remainder of half a kelvin on every day."""
+    return [record(seed, Day(loss=0.15), **SIZES) for seed in (1000, 1001, 1002, 1003)]
+
+
+@pytest.mark.parametrize(("factors", "where"), [({"fan": 0.5}, FAN), ({"contact": 0.6}, CONTACT)])
+def test_a_change_beside_a_remainder_is_named(rig: rt.System, lossy: list[rt.Record], factors: dict[str, float],
+                                              where: str) -> None:
+    """The remainder grows with the temperatures that the change raises: it is the old one still, not a new fault."""
+    found = rt.diagnose(rig, record(1999, Day(factors, loss=0.15), **SIZES), reference=lossy, effects=FEW)
+    (one,) = found.effects
+    assert found.verdict == "named_with_remainder" and (one.effect, one.where) == ("parameter_change", (where,))
+    (true,) = factors.values()
+    value, std, _ = one.values["relative"]
+    assert abs(value - (true - 1.0)) < 3 * std and std < 0.2
+    assert found.remainder is not None and found.remainder.gaps["train"].rms > 0.1
+
+
+def test_a_hotter_healthy_day_is_no_change(rig: rt.System, lossy: list[rt.Record]) -> None:
+    """Three times the heat, three times the remainder."""
+    found = rt.diagnose(rig, record(1998, Day(loss=0.15, power=3.0), **SIZES), reference=lossy, effects=FEW)
+    assert found.verdict == "consistent" and found.reference is not None
+
+
+def test_gusts_beside_a_remainder_are_not_named(rig: rt.System, lossy: list[rt.Record]) -> None:
+    found = rt.diagnose(rig, record(1997, Day(loss=0.15, draught=6.0), **SIZES), reference=lossy,
+                        effects=[*FEW, "periodic_load"])
+    assert found.verdict == "unexplained" and found.effects == ()
 
 
 def test_random_effects_are_those_of_exact_records() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,17 +72,34 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
         What healthy records show.
     """
     each, n = reference.each, len(reference.each)
-    logs = np.log([max(_variance(fit), _FREE / reference.scatter.inflation) for fit in each])
+    noise = _FREE / reference.scatter.inflation
+    logs = np.log([max(_variance(fit), noise) for fit in each])
     freedom = COUNTS + n - 1
     spread = math.sqrt((COUNTS * _ASSUMED**2 + float(np.sum((logs - logs.mean()) ** 2))) / freedom * (1.0 + 1.0 / n))
     limit = math.exp(float(scipy.stats.t.isf(_SURE, freedom)) * spread)
-    structure = new.structure
+    structure, usual = new.structure, math.exp(float(logs.mean()))
+    expected = noise + (usual - noise) * _louder(new, each)
     if not isinstance(structure, Held) or not structure.n_parameters:
-        return Excess(_variance(new) / math.exp(float(logs.mean())), limit, 1.0)
+        return Excess(_variance(new) / expected, limit, 1.0)
     rows = slice(new.n_readings, new.n_readings + structure.n_priors)
     far = float(np.sum(new.z[rows] ** 2))
-    return Excess(_variance(new) / math.exp(float(logs.mean())), limit,
+    return Excess(_variance(new) / expected, limit,
                   float(scipy.stats.f.sf(far / structure.n_priors, structure.n_priors, freedom)))
+
+
+def _louder(new: Refit, each: Sequence[Refit]) -> float:
+    """By how much more the mean square of a relative error of the model shows than on the reference records; 1 or more.
+
+    A remainder grows with the temperatures that drive it, as the derivatives by the parameters do.
+    """
+    usual = float(np.mean([_shown(fit) for fit in each]))
+    return max(1.0, _shown(new) / usual) if usual > 0.0 else 1.0
+
+
+def _shown(fit: Refit) -> float:
+    """Mean square of the whitened derivatives of the readings by the relative parameters."""
+    p = fit.structure.n_parameters
+    return float(np.mean((fit.J[:fit.n_readings, :p] * fit.structure.ranges.unit) ** 2)) if p else 0.0
 
 
 def _variance(fit: Refit) -> float:

@@ -13,6 +13,7 @@ from ..effects import Candidate, candidates
 from ..evidence import ALIAS, Scores, score_candidates
 from ..fit import Refit, relinearized
 from ..search import Accepted, Entry, refit_short_list
+from ._excess import excess_of
 from ._parameter_change import NAME, parameter_changes, says_again
 from ._reference import Reference
 from ._yardstick import chance, inflation, squares, within_scatter
@@ -42,7 +43,7 @@ class Search:
 
 
 def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> Search:
-    """Accept changes while any is beyond the scatter of the reference records.
+    """Accept changes while any is beyond the scatter of the reference records, and something is left to explain.
 
     Parameters
     ----------
@@ -63,8 +64,8 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
             break
         rounds.append(found)
         fit = found.best.fit
-        if len(rounds) == MOST_CHANGES:
-            break
+        if len(rounds) == MOST_CHANGES or not excess_of(fit, reference).reasons:
+            break  # what is left is within the scatter of healthy records: nothing more to find
         taken = {candidate.key for candidate in fit.structure.effects}
         scores = score_candidates(fit, [candidate for candidate in _tested(fit, catalog) if candidate.key not in taken])
     return Search(fit, tuple(rounds), first)
