@@ -7,7 +7,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _scheduled, _stability
+from . import (
+    _contraction,
+    _ellipsoid,
+    _gain,
+    _invariance,
+    _network,
+    _observer,
+    _polytope,
+    _runaway,
+    _scheduled,
+    _stability,
+)
 from ._document import Unreadable, load, sections
 from ._exact import Malformed, NotCovered, short
 from ._result import NOT_COVERED, NOT_VALID, VALID, Answer
@@ -19,6 +30,7 @@ KINDS: dict[str, Kind] = {
     "runaway": (_runaway.read, _runaway.check), "network": (_network.read, _network.check),
     "stability": (_stability.read, _stability.check), "gain": (_gain.read, _gain.check),
     "observer": (_observer.read, _observer.check), "polytope": (_polytope.read, _polytope.check),
+    "ellipsoid": (_ellipsoid.read, _ellipsoid.check),
     "scheduled": (_scheduled.read, _scheduled.check)}
 OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop")
 

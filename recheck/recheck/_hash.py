@@ -35,6 +35,10 @@ def machine_hash(system: Mapping[str, Any]) -> str:
     """Return the hash of the numbers and names of a "system" section; notes are left out."""
     if "lumps" in system:
         return short_hash(_thermal(system))
+    if "vertices" in system and "gain" not in system:
+        return short_hash([Name("ellipsoid"), system["vertices"],
+                           *(system.get(name, {}) for name in ("measured", "controller", "performance")),
+                           system["sample_time"]])
     if "vertices" in system:
         return short_hash([Name("polytope"), *(system[name] for name in ("vertices", "gain", "sample_time"))])
     keys = ("A", "B", "C", "D", "sample_time"), ("capacity", "rows", "cols", "values")

@@ -6,7 +6,18 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from . import _contraction, _gain, _invariance, _network, _observer, _polytope, _runaway, _scheduled, _stability
+from . import (
+    _contraction,
+    _ellipsoid,
+    _gain,
+    _invariance,
+    _network,
+    _observer,
+    _polytope,
+    _runaway,
+    _scheduled,
+    _stability,
+)
 from ._exact import Interval, short
 from ._hash import machine_hash, short_hash
 from ._thermal import Network
@@ -218,6 +229,52 @@ def _polytope_measure(problem: _polytope.Problem, sampled: bool) -> str:
     return f"all eigenvalues of its loop have {' and '.join(words)}"
 
 
+def _ellipsoid_claim(problem: _ellipsoid.Problem, parts: Parts) -> str:
+    sampled, k, q = problem.sample_time > 0, problem.controls, problem.hidden
+    time = f"sampled at {decimal(problem.sample_time)} s" if sampled else "continuous"
+    sizes = ", ".join([_plural(problem.states, "state"), _plural(problem.inputs, "input"),
+                       *([f"the last {k} for control"] if k else [])])
+    words = f", with the controller as given ({_plural(q, 'state')})" if k else ""
+    if problem.saturation is not None:
+        words += f", its controls limited to {', '.join(map(decimal, problem.saturation))} on both sides"
+    both = ", x the states of plant and controller" if q else ""
+    return (f"Of every plant, constant or varying with time in any way, in the convex hull of "
+            f"{_plural(len(problem.vertices), 'vertex', 'vertices')} as given, {time} ({sizes}) (machine "
+            f"{machine_hash(parts['system'])}), nominal parameters{words}, the ellipsoid x'Px <= "
+            f"{decimal(problem.level)}, P of table {short_hash(parts['evidence']['matrix'])}{both}, is never left"
+            f"{_ellipsoid_disturbed(problem, sampled)}{_ellipsoid_kept(problem, parts, sampled)}.")
+
+
+def _ellipsoid_disturbed(problem: _ellipsoid.Problem, sampled: bool) -> str:
+    if problem.disturbance is not None:
+        words = "Euclidean norm" if problem.joint else "absolute values"
+        return (f" once x is in it, under disturbances of {words} at most "
+                f"{', '.join(map(decimal, problem.disturbance))} at every moment")
+    if problem.bound is not None and problem.performance is not None:
+        return (f" from x = 0 under disturbances w of energy ({'sum' if sampled else 'integral'} of |w|²) at most "
+                f"{decimal(problem.level)}, and the energy of the {_plural(len(problem.performance[0]), 'output')} z "
+                f"is at most {decimal(problem.bound)}² times that of w")
+    if sampled:
+        speed = (f"shrinks at least by the factor {decimal(1 - problem.rate)}² per sample" if problem.rate > 0 else
+                 "shrinks strictly with every sample")
+    else:
+        speed = (f"falls at least as exp(-2 rate t), rate = {decimal(problem.rate)} 1/s" if problem.rate > 0 else
+                 "falls strictly")
+    return f" once x is in it, without disturbance, and there x'Px {speed}"
+
+
+def _ellipsoid_kept(problem: _ellipsoid.Problem, parts: Parts, sampled: bool) -> str:
+    words, region = "", parts["region"]
+    if problem.limits is not None:
+        count = len(problem.limits[2])
+        words += (f"; in it {_plural(count, 'limit')} of region table {short_hash(region['limits'])} "
+                  f"{'is' if count == 1 else 'are'} kept")
+    if problem.cost is not None:
+        words += (f"; the {'sum' if sampled else 'integral'} of the cost of region table "
+                  f"{short_hash(region['cost'])} from then on is at most x'Px")
+    return words
+
+
 def _scheduled_claim(problem: _scheduled.Problem, parts: Parts) -> str:
     network = problem.network
     outside = [f"ambient {short(name)} in {_span(box)} K" for name, box in problem.ambient.items()]
@@ -235,5 +292,6 @@ def _scheduled_claim(problem: _scheduled.Problem, parts: Parts) -> str:
 
 _KINDS: dict[str, Callable[[Any, Parts], str]] = {
     "contraction": _contraction_claim, "invariance": _invariance_claim, "gain": _gain_claim,
-    "observer": _observer_claim, "polytope": _polytope_claim, "scheduled": _scheduled_claim,
+    "observer": _observer_claim, "polytope": _polytope_claim, "ellipsoid": _ellipsoid_claim,
+    "scheduled": _scheduled_claim,
     "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ._closed_loop import CLOSED_LOOP
 from ._contraction import CONTRACTION
+from ._ellipsoid import ELLIPSOID
 from ._frequency import FREQUENCY
 from ._gain import GAIN
 from ._hinf import HINF
@@ -21,4 +22,4 @@ from ._stability import STABILITY
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
                                                        REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP,
-                                                       CLOSED_LOOP, POLYTOPE, SCHEDULED)}
+                                                       CLOSED_LOOP, POLYTOPE, ELLIPSOID, SCHEDULED)}

@@ -15,14 +15,15 @@ import numpy as np
 from _timing import header
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
-import mutant_feedback  # noqa: E402 - beside the tests, not on the path before
+import mutant_ellipsoid  # noqa: E402 - beside the tests, not on the path before
+import mutant_feedback  # noqa: E402 - the same
 import mutant_linear  # noqa: E402 - the same
 import mutant_scheduled  # noqa: E402 - beside the tests, not on the path before
 import mutant_thermal  # noqa: E402
 from mutants import ALARMS, run  # noqa: E402
 
 SUBJECTS = (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS, *mutant_feedback.SUBJECTS,
-            *mutant_scheduled.SUBJECTS)
+            *mutant_ellipsoid.SUBJECTS, *mutant_scheduled.SUBJECTS)
 
 
 def main(count: int, seed: int) -> int:

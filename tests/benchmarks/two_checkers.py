@@ -15,15 +15,17 @@ from _timing import header
 
 _ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(_ROOT / "tests" / "verification"), str(_ROOT / "tests" / "second"), str(_ROOT / "recheck")]
-import mutant_feedback  # noqa: E402 - beside the tests, not on the path before
+import mutant_ellipsoid  # noqa: E402 - beside the tests, not on the path before
+import mutant_feedback  # noqa: E402 - the same
 import mutant_linear  # noqa: E402 - the same
 import mutant_scheduled  # noqa: E402 - beside the tests, not on the path before
 import mutant_thermal  # noqa: E402
 from agreement import both, cases  # noqa: E402
 
-COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope", "scheduled")
+COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope", "ellipsoid",
+           "scheduled")
 SUBJECTS = [subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS, *mutant_feedback.SUBJECTS,
-            *mutant_scheduled.SUBJECTS)
+            *mutant_ellipsoid.SUBJECTS, *mutant_scheduled.SUBJECTS)
             if subject.kind in COVERED]
 
 

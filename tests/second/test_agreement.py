@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import certificate_truth
+import mutant_ellipsoid
 import mutant_feedback
 import mutant_linear
 import mutant_scheduled
@@ -25,9 +26,10 @@ from robthermal.verification import establish
 from robthermal.verification._kinds import KINDS
 
 SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
-                                                  *mutant_feedback.SUBJECTS, *mutant_scheduled.SUBJECTS)}
+                                                  *mutant_feedback.SUBJECTS, *mutant_ellipsoid.SUBJECTS,
+                                                  *mutant_scheduled.SUBJECTS)}
 COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope",
-           "scheduled")
+           "ellipsoid", "scheduled")
 
 
 def document_of(certificate) -> dict:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mutant_ellipsoid
 import mutant_feedback
 import mutant_linear
 import mutant_scheduled
@@ -13,7 +14,8 @@ from mutants import ALARMS, FALSE, Subject, judge, run
 from robthermal.verification._kinds import KINDS
 
 SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
-                                                  *mutant_feedback.SUBJECTS, *mutant_scheduled.SUBJECTS)}
+                                                  *mutant_feedback.SUBJECTS, *mutant_ellipsoid.SUBJECTS,
+                                                  *mutant_scheduled.SUBJECTS)}
 
 
 def test_every_kind_has_a_falsifier():
@@ -45,6 +47,9 @@ def test_falsifiers_find_what_is_false(kind):
             region["rate"] = 0.999
     elif kind == "scheduled":
         region["level"] = 4 * region["level"]
+    elif kind == "ellipsoid":
+        region.update({"rate": 0.999 if document["system"]["sample_time"] else 1e3} if "rate" in region else
+                      {"bound": region["bound"] / 4} if "bound" in region else {"level": region["level"] / 100})
     elif kind == "closed_loop":
         region["rate" if region["measure"] == "stability" else "bound"] = (
             (0.999 if document["system"]["sample_time"] else 1e6) if region["measure"] == "stability"

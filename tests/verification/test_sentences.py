@@ -9,6 +9,7 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 
 import certificate_truth as truth
+import mutant_ellipsoid
 import mutant_feedback
 import mutant_linear
 import mutant_scheduled
@@ -29,7 +30,8 @@ ROD = {"name": "rod", "lumps": {"rod": {"capacity": 10.0}}, "ambients": ["room"]
 LAG = {"A": [[-2]], "B": [[1]], "C": [[2]], "D": [[0]], "sample_time": 0}
 HALF = {"A": [["0.5"]], "B": [[1]], "C": [["0.5"]], "D": [[0]], "sample_time": 1}
 SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS,
-                                                  *mutant_feedback.SUBJECTS, *mutant_scheduled.SUBJECTS)}
+                                                  *mutant_feedback.SUBJECTS, *mutant_ellipsoid.SUBJECTS,
+                                                  *mutant_scheduled.SUBJECTS)}
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]\d+)?")
 
 

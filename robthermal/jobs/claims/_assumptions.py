@@ -53,6 +53,9 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
                     "beyond those of the plant."),
     "polytope": ("The plant is linear at every moment and lies in the convex hull of the vertices; its states are "
                  "measured.", "The gain runs with the numbers of the certificate file, without limits or delays."),
+    "ellipsoid": ("The plant is linear at every moment and lies in the convex hull of the vertices; disturbances stay "
+                  "within what the sentence says.", "The controller runs with the numbers of the certificate file, "
+                  "without delays, and without limits other than those of the sentence."),
     "scheduled": (
         "The feedback reads all lump temperatures at every moment and the currents follow without delay.",
         "The machine starts inside the ellipsoid; ambients and heats stay in their stated ranges.",

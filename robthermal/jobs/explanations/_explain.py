@@ -16,7 +16,7 @@ from ..claims import ARITHMETIC, GateCode, kind_assumptions
 from ._codes import outcome_codes, package_of
 
 _PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency", "closed_loop",
-                                            "polytope"),
+                                            "polytope", "ellipsoid"),
                                            "linear_certificates")}
 _ERRORS = {cls.__name__: cls for cls in (errors.InputError, errors.Diverged)}
 _REASONS = {code.code: code for code in GateCode}
