@@ -6,6 +6,8 @@ For any linear plant; thermal front ends are in `robthermal.design`, which also 
 from ._anti_windup import anti_windup as anti_windup
 from ._design import Design as Design
 from ._design import RobustAgainst as RobustAgainst
+from ._ellipsoid import InvariantEllipsoid as InvariantEllipsoid
+from ._ellipsoid import invariant_ellipsoid as invariant_ellipsoid
 from ._feedback import FeedbackDesign as FeedbackDesign
 from ._feedback import polytopic_feedback as polytopic_feedback
 from ._frf_pid import FrfDesign as FrfDesign
@@ -17,5 +19,6 @@ from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 
-__all__ = ["Design", "FeedbackDesign", "FrfDesign", "RobustAgainst", "SynthesisCode", "anti_windup", "frf_pid",
-           "h2", "hinf", "mixed", "mu_synthesis", "output_feedback", "polytopic_feedback"]
+__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "RobustAgainst", "SynthesisCode",
+           "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid", "mixed", "mu_synthesis", "output_feedback",
+           "polytopic_feedback"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from robthermal.errors import InputError
@@ -93,7 +94,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Ellipsoid:
 
 
 def _read_disturbance(value: Any, count: int) -> fmpq | tuple[fmpq, ...]:
-    if isinstance(value, (list, tuple)) or hasattr(value, "shape"):
+    if isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim):
         return _numbers(value, count, "region.disturbance")
     return positive(value, "region.disturbance")
 
