@@ -11,6 +11,7 @@ from robthermal.errors import InputError
 
 SLOW, FAST = np.array([[0, 1], [-1.0, -1]]), np.array([[0, 1], [-2.0, -1]])
 ONE = np.array([[0.0], [1.0]])
+CHAIN, INTO = np.array([[-1.0, 2, 0], [0, -2, 1], [0.5, 0, -3]]), np.array([[1.0, 0], [0, 1], [1, 1]])
 
 
 def smallest_by_scan(A, B, dt):
@@ -24,8 +25,8 @@ def smallest_by_scan(A, B, dt):
     return min(found)
 
 
-@pytest.mark.parametrize(("A", "B", "dt"), [(SLOW, ONE, 0.0), (expm(0.3 * SLOW), 0.3 * ONE, 0.3), (
-    np.array([[-1.0, 2, 0], [0, -2, 1], [0.5, 0, -3]]), np.array([[1.0, 0], [0, 1], [1, 1]]), 0.0)])
+@pytest.mark.parametrize(("A", "B", "dt"), [(SLOW, ONE, 0.0), (expm(0.3 * SLOW), 0.3 * ONE, 0.3),
+                                            (CHAIN, INTO, 0.0)])
 def test_one_plant_has_the_volume_of_its_lyapunov_equation(A, B, dt):
     e = rt.design.invariant_ellipsoid(A, B, sample_time=dt)
     assert e.holds and rt.verify(e.certificates[0]).valid
@@ -60,9 +61,10 @@ def test_the_worst_disturbance_on_the_worst_plant_does_not_leave_the_set(togethe
 
 
 def test_limits_shape_the_set_or_are_named():
-    free = rt.design.invariant_ellipsoid([SLOW, FAST], ONE, disturbance=0.5)
-    tight = rt.design.invariant_ellipsoid([SLOW, FAST], ONE, disturbance=0.5, limits=[0.98 * free.extent[0], np.inf])
-    assert tight.holds and tight.extent[0] <= 0.98 * free.extent[0] and tight.extent[1] > free.extent[1]
+    free = rt.design.invariant_ellipsoid(CHAIN, INTO)
+    tight = rt.design.invariant_ellipsoid(CHAIN, INTO, limits=[0.96 * free.extent[0], np.inf, np.inf])
+    assert tight.holds and tight.extent[0] <= 0.96 * free.extent[0] and tight.extent[1] > free.extent[1]
+    assert "1 limit of region table" in tight.certificates[0].claim and "limit" not in free.certificates[0].claim
     rows = rt.design.invariant_ellipsoid([SLOW, FAST], ONE, disturbance=0.5, limits=([[1.0, 1.0]], [3.0]))
     assert rows.holds and np.sqrt(np.ones(2) @ np.linalg.solve(rows.matrix, np.ones(2))) <= 3.0
     far = rt.design.invariant_ellipsoid([SLOW, FAST], ONE, disturbance=0.5, limits=[2.0, 0.1])
