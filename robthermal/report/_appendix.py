@@ -17,6 +17,7 @@ class Resting:
     answer: str
     numbers: list[tuple[int, int]]  # runs, first and last: "1–6, 9"
     evidence: Evidence | None
+    margin: str = ""  # as on the card of the claim
 
 
 def numbered_assumptions(report: Report) -> list[str]:
@@ -29,14 +30,15 @@ def resting(report: Report) -> list[Resting]:
     number = {text: i for i, text in enumerate(numbered_assumptions(report), 1)}
     common = [number[text] for text in report.assumptions]
     shown = {one.file for one in report.evidence}
-    rows = [Resting(one.title, _answer(one), _runs({*common, *(number[text] for text in one.assumptions)}), one)
-            for one in report.evidence]
-    return rows + [Resting(claim.title, claim.status.lower(), _runs(common), None) for claim in report.claims
-                   if claim.file not in shown]
+    stated = {claim.file: claim.margin for claim in report.claims if claim.file}
+    rows = [Resting(one.title, _answer(one), _runs({*common, *(number[text] for text in one.assumptions)}), one,
+                    stated.get(one.file, "")) for one in report.evidence]
+    return rows + [Resting(claim.title, claim.status.lower(), _runs(common), None, claim.margin)
+                   for claim in report.claims if claim.file not in shown]
 
 
 def margins(evidence: Evidence) -> list[str]:
-    """Margins for a cell of a table."""
+    """Slack of the inequalities that were checked, for a cell of a table."""
     return [f"{name} {value:.3g}" for name, value in evidence.margins.items()]
 
 

@@ -209,6 +209,8 @@ class Report:
         The answer in a sentence, beside the verdict; the reasons then stand with the claims only.
     numbers : sequence of (str, str, str), optional
         The number that matters: what it is, the number, and what to compare it with.
+    identity : mapping, optional
+        Which machine and which document, by name: serial number, operator, revision, date.
 
     Examples
     --------
@@ -236,6 +238,7 @@ class Report:
     stages: Sequence[Stage] = ()
     headline: str = ""
     numbers: Sequence[tuple[str, str, str]] = ()
+    identity: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 from ..errors import InputError
 
+_ENLARGED = 1.25  # so much larger than drawn a figure may be shown; its letters are then as large as the text
 _FORBIDDEN = {"script", "style", "foreignObject", "iframe", "animate", "set"}
 
 
@@ -106,7 +107,7 @@ def inline(figure: Figure, prefix: str) -> str:
     head, rest = re.match(r"\s*<svg([^>]*)>(.*)", svg, re.DOTALL).groups()  # type: ignore[union-attr]  # parsed before
     width = re.search(r'\swidth="([\d.]+)pt"', head)
     head = re.sub(r'\s(?:width|height|role|aria-label|version)="[^"]*"', "", head)
-    limit = f' style="max-width: {width.group(1)}pt"' if width else ""
+    limit = f' style="max-width: {_ENLARGED * float(width.group(1)):.0f}pt"' if width else ""
     return f'<svg{head} fill="currentColor" role="img" aria-label="{_attribute(figure.alt)}"{limit}>{rest}'
 
 

@@ -14,7 +14,7 @@ from ._appendix import margins, numbered_assumptions, resting
 from ._content import Claim, Report, Section
 from ._figure import Figure, inline
 from ._save import printable, save_text
-from ._usable import Bound, rounded_down, shown
+from ._usable import LIMITED_BY, Bound, rounded_down, shown
 
 
 def write_html(report: Report, path: str | Path) -> Path:
@@ -64,8 +64,33 @@ def write_html(report: Report, path: str | Path) -> Path:
         about=": about the model, which the data contradict" if report.contradicted else "",
         machine={one.file: one.machine for one in report.evidence},
         twice={one.file for one in report.evidence if one.good and one.second == "valid"},
-        claimed=[one for one in report.evidence if one.file in files], style=_template("report.css").render())
+        claimed=[one for one in report.evidence if one.file in files], identity_names=_IDENTITY, limits=LIMITED_BY,
+        style=_template("report.css").render(running_head=css_text(report.label, 90),
+                                             running_foot=css_text(_running_foot(report), 110)))
     return save_text(printable(page), path)
+
+
+_IDENTITY = ("serial number", "revision", "operator", "date")  # on the page to sign; the others are filled by hand
+
+
+def _running_foot(report: Report) -> str:
+    """What stands below every printed page: the machine, and which one."""
+    stated = (report.identity.get(name, "") for name in ("serial number", "revision"))
+    return ", ".join(filter(None, (report.title, *stated)))
+
+
+def css_text(text: str, most: int) -> str:
+    """Text as the inside of a CSS string; what is neither letter, digit nor plain punctuation is written as its number.
+
+    Parameters
+    ----------
+    text : str
+        Text of any kind, cut to `most` characters.
+    most : int
+        Characters of it that are kept.
+    """
+    short = text if len(text) <= most else f"{text[:most - 1]}…"
+    return re.sub(r"[^A-Za-z0-9 .,:;()_-]", lambda found: f"\\{ord(found.group()):06x}", printable(short))
 
 
 BOUNDS = "Certify"  # chapter in which the four bounds of the current stand
@@ -94,7 +119,7 @@ def _cards(claims: Sequence[Claim]) -> list[Claim]:
 
 _OWN = ("top", "numbers", "usable", "usable-title", "claims", "claims-title", "bounds",
         "contents", "contents-title", "appendix", "assumptions", "resting", "exact",
-        "provenance", "check")
+        "provenance", "check", "sign")
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ._style import canvas, house_style, look, plain
+from ._style import canvas, house_style, legend_above, look, plain
 from ._traces import thin, time_unit
 
 
@@ -62,10 +62,8 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
                 ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
             ax.set(ylabel=f"measured −\nmodel [{unit}]", title=what)
             ax.margins(x=0.01)
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
+        legend_above(figure, axes[0].get_lines(), title)
         axes[-1].set(xlabel=f"time [{shown}]")
-        if title:
-            figure.suptitle(plain(title), x=0.02, ha="left")
     return figure
 
 
@@ -112,10 +110,8 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
                 ax.loglog(f, np.asarray(values, dtype=float), color=color, linestyle=dashes, linewidth=0.8,
                           label=plain(name))
             ax.set(ylabel=f"|measured −\nmodel| [{unit}]", title=what)
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(len(before), 6), borderaxespad=0.1)
+        legend_above(figure, axes[0].get_lines(), title)
         axes[-1].set(xlabel="frequency [Hz]")
-        if title:
-            figure.suptitle(plain(title), x=0.02, ha="left")
     return figure
 
 

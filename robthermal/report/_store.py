@@ -61,6 +61,7 @@ class _Stored(_Strict):
     stages: list[Stage] = []
     headline: str = ""
     numbers: list[tuple[str, str, str]] = []
+    identity: dict[str, str] = {}
     digest: str
 
 
@@ -99,7 +100,8 @@ def write_content(report: Report, path: str | Path) -> Path:
                "gate": [asdict(one) for one in report.gate], "gates": list(report.gates),
                "usable": [asdict(one) for one in report.usable], "first": _stored(report.first),
                "data": dict(report.data), "stages": [asdict(one) for one in report.stages],
-               "headline": report.headline, "numbers": [list(one) for one in report.numbers]}
+               "headline": report.headline, "numbers": [list(one) for one in report.numbers],
+               "identity": dict(report.identity)}
     return save_json({**content, "digest": _digest(content)}, path)
 
 
@@ -185,7 +187,8 @@ def read_content(path: str | Path) -> Report:
                              for one in part) for part in (stored.sections, stored.first))
     return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
                   stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
-                  stored.gates, stored.usable, first, stored.data, stored.stages, stored.headline, stored.numbers)
+                  stored.gates, stored.usable, first, stored.data, stored.stages, stored.headline, stored.numbers,
+                  stored.identity)
 
 
 def _printed(table: Table | Printed) -> Printed:

@@ -8,7 +8,8 @@ from typing import Any
 
 from .._drawing import COLORS
 
-WIDTH = 7.2  # inch: the text width of an A4 page and of the report's column
+_LETTERS = 66  # of a legend's line across a figure
+WIDTH = 5.2  # inch: letters of 9 points are then as large as the text in the report's column, and read on a phone
 
 # Black and white become the ink and paper of the page (see _figure.inline), so that dark mode works.
 _STYLE: Any = {  # names are checked by matplotlib when they are set
@@ -65,3 +66,11 @@ def canvas(height: float, rows: int = 1, **options: Any) -> tuple[Any, Any]:
 
     drawing = Drawing(figsize=(WIDTH, height), layout="constrained")
     return drawing, drawing.subplots(rows, 1, **options)
+
+
+def legend_above(figure: Any, lines: Sequence[Any], title: str = "") -> None:
+    """Legend over the whole figure, with the figure's title, above those of its axes: never on data or on letters."""
+    widths = [len(line.get_label()) + 5 for line in lines]  # letters, with the sample of the line
+    columns = len(lines) if sum(widths) <= _LETTERS else max(1, min(len(lines), _LETTERS // max(widths)))
+    figure.legend(handles=list(lines), loc="outside upper left", ncols=columns, borderaxespad=0.0, columnspacing=1.2,
+                  handlelength=1.4, title=plain(title) or None, alignment="left")

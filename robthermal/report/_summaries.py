@@ -94,7 +94,7 @@ def write_json(report: Report, path: str | Path) -> Path:
         data["certify"] = {**data["certify"], "nominal": _answers(report, "nominal"),
                            "robust": _answers(report, "ranges")}
     stages = {one.name: {"status": one.status, "seconds": one.seconds, "hash": one.hash} for one in report.stages}
-    summary = {"format": FORMAT, "title": report.title, "label": report.label,
+    summary = {"format": FORMAT, "title": report.title, "label": report.label, "identity": dict(report.identity),
                "verdict": None if report.failed else report.verdict, "holds": report.holds,
                "reasons": [one.to_dict() for one in report.reasons], **({"stages": stages} if stages else {}), **data,
                "currents": currents(report.usable), "claims": [_claim(claim) for claim in report.claims],

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._celsius import ZERO_CELSIUS
 from ..errors import InputError
 from ..fitting import residual as residual_of
-from ._style import canvas, house_style, look, plain
+from ._style import canvas, house_style, legend_above, look, plain
 
 _BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures
 
@@ -68,11 +68,11 @@ def measured_against_model(time: ArrayLike, measured: Mapping[str, ArrayLike], m
         for name, (data, answer) in pairs.items():
             color, dashes = look(name, list(pairs), order)
             _dots(above, *thin(t / scale, data - zero), color)
-            above.plot(*thin(t / scale, answer - zero), dashes, color=color, label=plain(name))
+            above.plot(*thin(t / scale, answer - zero), dashes, color=color, linewidth=1.0, label=plain(name))
             if residual:
                 below.plot(*thin(t / scale, residual_of(data, answer)), dashes, color=color, linewidth=0.8)
         above.set(ylabel=label, title=plain(title))
-        _legend(above, len(pairs))
+        _legend(figure, above)
         if residual:
             below.axhline(0.0, color="black", linewidth=0.6)
             below.set(ylabel=f"measured −\nmodel [{unit}]")
@@ -92,7 +92,7 @@ def _dots(axes: Any, time: Array, values: Array, color: str) -> None:
     points = np.repeat(np.column_stack([time[good], values[good]]), 2, axis=0)
     path = Path(points, np.tile([Path.MOVETO, Path.LINETO], int(good.sum())))
     path.should_simplify = False  # it would remove the strokes
-    axes.add_patch(PathPatch(path, fill=False, edgecolor=color, linewidth=2.4, alpha=0.4, capstyle="round"))
+    axes.add_patch(PathPatch(path, fill=False, edgecolor=color, linewidth=4.5, alpha=0.3, capstyle="round"))
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
@@ -109,13 +109,12 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
     return time[keep], values[keep]
 
 
-def _legend(axes: Any, count: int) -> None:
-    # Grey stand-ins say once what dots and lines are; the colors name the sensors. Above the data, never on them.
-    kinds = [axes.plot([], [], ".", color="#888888", label="measured")[0],
-             axes.plot([], [], "-", color="#888888", label="model")[0]]
+def _legend(figure: Any, axes: Any) -> None:
+    # Grey stand-ins say once what dots and lines are; the colors name the sensors. Above the title, never on the data.
+    kinds = [axes.plot([], [], ".", color="#888888", markersize=8.0, alpha=0.6, label="measured")[0],
+             axes.plot([], [], "-", color="#888888", linewidth=1.0, label="model")[0]]
     lines = [line for line in axes.get_lines() if not line.get_label().startswith("_") and line not in kinds]
-    axes.legend(handles=[*kinds, *lines], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(count + 2, 6),
-                borderaxespad=0.1, columnspacing=1.2, handlelength=1.4)
+    legend_above(figure, [*kinds, *lines])
 
 
 def _pairs(

@@ -17,6 +17,13 @@ MEANINGS = {
     "runaway": "runaway limit I* of the network",
     "rating": "declared rating",
 }
+LIMITED_BY = {  # in a sentence, with what the word means
+    "contraction": "the contraction limit inside the box, up to which any two temperature histories approach each "
+                   "other there",
+    "invariance": "the certified box, a range of temperatures that is never left",
+    "runaway": "the runaway limit I* of the network, beyond which more current takes less heat from the cold side",
+    "rating": "the declared rating",
+}
 Parameters = Literal["", "nominal", "ranges"]
 
 

@@ -223,9 +223,13 @@ def test_an_edited_report_is_not_believed(limit: float, tmp_path: Path) -> None:
         data = json.loads(file.read_text(encoding="utf-8"))
         data["claims"][0][place] = words
         file.write_text(json.dumps(data), encoding="utf-8")
+    data = json.loads(file.read_text(encoding="utf-8"))
+    data |= {"headline": "15 A proven.", "numbers": [["usable", "15 A", ""]], "identity": {"revision": "15 A"}}
+    file.write_text(json.dumps(data), encoding="utf-8")
     again = rt.jobs.rebuild_report(tmp_path / "out")
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "15 A" not in page.replace("\u00a0", " ")
+    assert "report.json was changed" in page, "the reason is on the page, whatever headline was written into the file"
     assert again.verdict == "FAIL" and {one.code for one in again.reasons} == {"report_changed"}
     assert all(claim.good for claim in again.claims), "the certificates are as good as they were"
 

@@ -19,9 +19,12 @@ PROBE = """<!DOCTYPE html><meta charset="utf-8"><iframe id="frame" src="report.h
 <p id="result">waiting</p><script>
 document.getElementById("frame").onload = event => {
   const page = event.target.contentDocument, root = page.documentElement;
-  const box = page.querySelector("figure .scroll");
+  const beyond = [...page.querySelectorAll(".scroll")].map(box => box.scrollWidth - box.clientWidth);
+  const letters = [...page.querySelectorAll("figure svg")].map(svg =>
+    8.5 * svg.getBoundingClientRect().width / svg.viewBox.baseVal.width);  // smallest, 8.5 units of the drawing
   document.getElementById("result").textContent =
-    `width ${root.scrollWidth} of ${root.clientWidth}; figure ${box.scrollWidth} in ${box.clientWidth}; ` +
+    `width ${root.scrollWidth} of ${root.clientWidth}; boxes ${beyond.length}, beyond ${Math.max(...beyond)}; ` +
+    `letters ${letters.length}, ${Math.round(10 * Math.min(...letters))}; ` +
     `badge ${Math.round(page.querySelector(".badge").getBoundingClientRect().bottom)}`;
 };</script>"""
 
@@ -63,11 +66,13 @@ def test_the_console_is_really_read(folder: Path) -> None:
 
 def test_page_does_not_scroll_sideways_on_a_phone(folder: Path) -> None:
     run = chromium(folder, "phone.html", "--allow-file-access-from-files", "--virtual-time-budget=5000", "--dump-dom")
-    found = re.search(r"width (\d+) of (\d+); figure (\d+) in (\d+); badge (\d+)", run.stdout)
+    found = re.search(r"width (\d+) of (\d+); boxes (\d+), beyond (-?\d+); letters (\d+), (\d+); badge (\d+)",
+                      run.stdout)
     assert found, run.stdout[-500:]
-    width, room, figure, box, badge = map(int, found.groups())
+    width, room, boxes, beyond, drawings, letters, badge = map(int, found.groups())
     assert width <= room <= 390
-    assert figure > box, "figures keep a readable size and scroll in their own box"
+    assert boxes > 4 and beyond <= 0, "tables become lists, and no drawing has to be moved sideways"
+    assert drawings >= 4 and letters >= 70, "letters of drawings are at least 7 px high"
     assert badge < 800, "the verdict is on the first screen"
 
 

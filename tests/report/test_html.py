@@ -118,7 +118,7 @@ def test_page_is_accessible(page: Page) -> None:
     assert len(page.all("svg")) == 4
     assert all(svg["role"] == "img" and svg["aria-label"] for svg in page.all("svg"))
     assert page.all("th") and all(th["scope"] in {"col", "row"} for th in page.all("th"))
-    assert len(page.all("caption")) == len(page.all("table")) == 3
+    assert len(page.all("caption")) == len(page.all("table")) == 5
     assert [a["href"] for a in page.all("a")][0] == "#claims", "skip link comes first"
 
 

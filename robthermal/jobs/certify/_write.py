@@ -57,7 +57,7 @@ def certification_report(result: Certification, files: tuple[Path, ...]) -> Repo
     """
     return Report(title=result.system.name, subtitle=subtitle(result.system), label="",
                   claims=required_claims(result.checked, stays_usable(result)),
-                  sections=(network_section(result.system), *certification_sections(result)),
+                  sections=tuple(certification_sections(result)), first=(network_section(result.system),),
                   provenance=provenance(files), generated=now(),
                   assumptions=machine_assumptions(result.system, result.parameters is not None),
                   gate=certification_reasons(result), gates=CERTIFY_GATES, usable=result.usable,

@@ -56,7 +56,7 @@ def assemble(context: Context, stages: Sequence[Stage], system: System) -> Repor
         provenance=provenance(project.files), assumptions=common, generated=now(),
         evidence=tuple(one for _, report in parts for one in _resting(report, common)), checker=checker(),
         gate=applied(reasons, project.gate), usable=certified.report.usable if certified else (),
-        first=(*_notes(project), *_first(context, facts)), data=data,
+        first=(*_notes(project), *_first(context, facts)), data=data, identity=project.identity,
         stages=tuple(replace(one, gates=_gates(one.name, context)) for one in stages))
 
 

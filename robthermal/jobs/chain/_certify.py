@@ -11,6 +11,7 @@ import pandas as pd
 
 from ...calibration import Estimates
 from ...report import Report, Section, Table
+from .._parameter_words import parameter_label
 from ..certify import certification_report, certify_system, claim_ranges
 from ..evidence import with_evidence
 from ..request import Project
@@ -55,8 +56,8 @@ def _ranges(ranges: Mapping[str, tuple[float, float]] | None, estimates: Estimat
         return
     values = {own: value for name, value in (estimates.parameters if estimates else {}).items()
               for own in name.split(" = ")}
-    rows = [{"parameter": name, "estimate": values.get(name, float("nan")), "lowest": low, "highest": high}
-            for name, (low, high) in ranges.items()]
+    rows = [{"parameter": name, "quantity": parameter_label(name), "estimate": values.get(name, float("nan")),
+             "lowest": low, "highest": high} for name, (low, high) in ranges.items()]
     origin = (f"They cover the true values of all parameters at once with a probability of {confidence:g}, if the "
               "structure of the model is right." if estimates else "They are those of the project file.")
     yield Section("Ranges of the parameters", "The claims for the parameter ranges hold for all of them from lowest to "

@@ -59,7 +59,8 @@ def below(report: Report, folder: str, stage: str) -> Report:
     evidence: list[Evidence] = [replace(one, file=moved(one.file)) for one in report.evidence]
     claims = [replace(claim, file=moved(claim.file), stage=stage, parameters=claim.parameters if paired else "")
               for claim in report.claims]
-    return replace(report, claims=tuple(claims), evidence=tuple(evidence))
+    return replace(report, claims=tuple(claims), evidence=tuple(evidence), sections=(*report.first, *report.sections),
+                   first=(), numbers=())  # the first screen of a chain is about the machine
 
 
 def facts_of(context: Context) -> DataFacts:

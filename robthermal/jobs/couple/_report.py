@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..._digits import in_table
 from ...coupling import NORMS, Filters, Norm
 from ...export import plain
 from ...report import Reason, Report, Section, Table
@@ -74,6 +75,7 @@ def coupling_report(result: Coupling) -> Report:
     job = result.job
     return Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
                   claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
+                  first=tuple(_first(result)), numbers=tuple(_numbers(result)),
                   provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now(),
                   gate=tuple(_gate(result)), data={"couple": _summary(result)})
 
@@ -123,11 +125,25 @@ def _sections(result: Coupling) -> Iterator[Section]:
                   "among them.", figures=tuple(spectrum_figures(result.spectra)), anchor="spectra")
     if result.worst_case is not None:
         yield _robustness_section(result)
-    if result.simulation is not None:
+    yield _filter_section(result.filters)
+
+
+def _first(result: Coupling) -> Iterator[Section]:
+    """The synchronization error over time, without and with coupling."""
+    if result.found and result.simulation is not None:
         yield Section("Over time", "Plants, controllers, coupling controller and disturbances run sample by sample "
                       "from rest; the first half is not shown. Both traces have the same noise.",
                       figures=(time_figure(result.simulation),), anchor="time")
-    yield _filter_section(result.filters)
+
+
+def _numbers(result: Coupling) -> Iterator[tuple[str, str, str]]:
+    """What coupling does to the synchronization error of the model."""
+    p = result.filters.performance
+    if result.found and result.filters.problem.samples:
+        for what, before, after in (("moving average of e12 = y2 − y1, 3σ", p.ma_before, p.ma_after),
+                                    ("moving standard deviation of e12, 3σ", p.msd_before, p.msd_after)):
+            yield (what, f"{in_table(before, 3)} → {in_table(after, 3)} m", "without → with coupling; computed for the "
+                   "model, not proven")
 
 
 def _performance_section(result: Coupling) -> Section:

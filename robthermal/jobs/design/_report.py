@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..._celsius import ZERO_CELSIUS
+from ..._digits import in_table, inward
 from ...design import ClosedLoop, GainObserver
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
@@ -87,6 +88,7 @@ def design_report(result: ControllerDesign, files: tuple[Path, ...]) -> Report:
     system = result.certification.system
     return Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
                   claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
+                  first=(_step_section(result),), numbers=tuple(_numbers(result)),
                   provenance=provenance(files), generated=now(), gate=tuple(_reasons(result)), gates=_GATES,
                   assumptions=(*machine_assumptions(system, bool(result.request.parameters)), *_ASSUMPTIONS),
                   data={"design": _summary(result)})
@@ -170,7 +172,6 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
 def _sections(result: ControllerDesign) -> Iterator[Section]:
     yield _controller_section(result)
     yield margin_section(result)
-    yield _step_section(result)
     if result.collapse is not None:
         yield _linearity_section(result)
     yield _observer_section(result.certification.system, result.observer, result.loop)
@@ -181,6 +182,17 @@ def _sections(result: ControllerDesign) -> Iterator[Section]:
                       "certified. Cool the hot side better, move the set-points, or narrow the room's range.",
                       anchor="no-box")
     yield from certification_sections(result.certification)
+
+
+def _numbers(result: ControllerDesign) -> Iterator[tuple[str, str, str]]:
+    """What the set-points need of the current limits, and the margins of the loop that has least."""
+    law, needed = result.law, result.reach.current
+    for name, low, high in zip(law.names, law.current_low, law.current_high, strict=True):
+        yield (f"current of {name} that holds its set-point", f"{in_table(needed[name], 3)} A",
+               f"computed; the controller keeps to {inward(float(low), float(high))} A")
+    least, loop = min((result.margins.worst(loop).phase, loop) for loop in result.margins.loops)
+    yield ("least phase margin", f"{least:.3g}°" if np.isfinite(least) else "no crossover",
+           f"loop of {loop}; computed, not proven")
 
 
 def _controller_section(result: ControllerDesign) -> Section:
@@ -195,8 +207,9 @@ def _controller_section(result: ControllerDesign) -> Section:
         "limit, and the largest current with which a box below the upper end of the temperature box is never left; the "
         "lower ones are the largest with which that box is still never left.")
     text = ("A linearizing feedback law turns the heat that the PI asks for into a current, within the limits; the PI "
-            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of {result.bandwidth:.4g} "
-            f"rad/s. {result.tuning}{own}\n\ndesign.json has every number with its unit, and the equations to program.")
+            f"works on a linear cold side, every {c.sample_time:g} s, with a crossover of {result.bandwidth:.4g} rad/s."
+            f"{' ' * bool(result.tuning)}{result.tuning}{own}\n\n"
+            "design.json has every number with its unit, and the equations to program.")
     table = Table(pd.DataFrame(rows), "Limits and gains.")
     return Section("The controller", text, tables=(table,), anchor="controller")
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found, Gap
-from ._change_words import change_in_words, nothing_changed, parameter_in_words
+from .._parameter_words import parameter_in_words
+from ._change_words import change_in_words, nothing_changed
 
 _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",
           "radiation": "radiation from {0} to {1}", "natural_convection": "natural convection from {0} to {1}",

@@ -3,28 +3,7 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found
-
-_FIELDS = {"conductance": "the conductance of {0}", "capacity": "the heat capacity of {0}", "gain": "the gain of {0}",
-           "drive.gain": "the gain of {0}", "conductance.value": "the conductance of {0}",
-           "resistance.value": "the resistance of {0}", "seebeck.value": "the Seebeck coefficient of {0}",
-           "time_constant": "the lag of {0}", "radiation": "the radiation along {0}",
-           "natural.gain": "the natural convection along {0}"}
-
-
-def parameter_in_words(name: str) -> str:
-    """A number of the system, as "the conductance of sink-room".
-
-    Parameters
-    ----------
-    name : str
-        Dotted name of the number.
-    """
-    table, _, rest = name.partition(".")
-    for field, words in sorted(_FIELDS.items(), key=lambda item: -len(item[0])):
-        if rest.endswith(f".{field}"):
-            part = rest.removesuffix(f".{field}")
-            return words.format(f"link {part}" if table == "links" else part)
-    return name
+from .._parameter_words import parameter_in_words
 
 
 def change_in_words(found: Found) -> str:

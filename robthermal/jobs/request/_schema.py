@@ -14,6 +14,7 @@ from ...signals import celsius_to_kelvin, declared
 from ...thermal import FitRange, System, fit_in_kelvin, read_system
 from ..measured import ReadTable
 from ._claim_names import check_ends, check_names
+from ._project_table import ProjectTable
 from ._stage_tables import (
     FILE_NAME,
     CoupleTable,
@@ -40,18 +41,6 @@ Ranges = Mapping[str, tuple[float, float]]
 METHODS: tuple[Method, ...] = ("energy", "sum", "max", "lyapunov")
 STRUCTURES: tuple[Structure, ...] = ("full", "block")
 DIRECTIONS: tuple[Direction, ...] = ("symmetric", "cooling", "heating")
-
-
-class ProjectTable(Table):
-    """[project]: files are relative to the project file."""
-
-    name: str
-    system: str
-    train: list[str | RecordEntry] = []
-    validation: list[str | RecordEntry] = []
-    label: str = ""
-    notes: Annotated[str, Field(max_length=20_000)] = ""
-    median_filter: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
 
 
 class CalibrateTable(Table):
@@ -222,6 +211,8 @@ class Project:
         What the reader of the report should know about machine and measurement, paragraphs between blank lines.
     max_iterations : int
         After how many iterations a calibration stops.
+    identity : mapping
+        Serial number, operator, revision and date, as far as stated: for the head of the report and the page to sign.
     """
 
     name: str
@@ -247,6 +238,7 @@ class Project:
     couple: CoupleTable | None = None
     notes: str = ""
     max_iterations: int = 50
+    identity: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_project(path: str | Path) -> Project:
@@ -289,7 +281,7 @@ def read_project(path: str | Path) -> Project:
                    data.calibrate.loss, _boxes(system, data.certify, data.gate.confidence, path, asked.adopt),
                    (path, system_file, *measured), _gate(system, data.gate, path), data.diagnose is not None,
                    asked.session_gain, reading, path, system_file, identify, responses, asked.adopt, data.design,
-                   data.couple, head.notes.strip(), data.calibrate.max_iterations)
+                   data.couple, head.notes.strip(), data.calibrate.max_iterations, head.identity)
 
 
 def _identification(name: str, table: IdentifyTable, system: System, path: Path, data: _File,

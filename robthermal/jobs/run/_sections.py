@@ -8,6 +8,7 @@ import pandas as pd
 
 from ...calibration import Estimates, Fit
 from ...report import Figure, Section, Table, house_style, measured_against_model
+from .._parameter_words import parameter_label
 from ..certify import converged
 from ._misfit import Misfit
 from ._result import Comparison
@@ -124,19 +125,26 @@ def response_sections(fit: Fit) -> Iterator[Section]:
                   anchor="responses")
 
 
+_COLUMNS = {"std": "standard deviation", "lower": "lower bound", "upper": "upper bound",
+            "prior": "standard deviation of the prior", "at_bound": "at a bound"}
+
+
 def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] | None) -> Section:
     """Calibrated parameters with their uncertainty, and what the data do not determine."""
     text = "Estimated from the training records; standard deviations are for the residuals as they are."
-    frame = fit.table()
+    frame = fit.table().rename(columns=_COLUMNS)
     if ranges:
         text += " The claims for the parameter ranges hold for all of them from lowest to highest, in any combination."
-        frame.insert(2, "lowest", [ranges[name][0] if name in ranges else float("nan") for name in frame.index])
-        frame.insert(3, "highest", [ranges[name][1] if name in ranges else float("nan") for name in frame.index])
+        nothing = (float("nan"), float("nan"))
+        for side, column in enumerate(("lowest of the range", "highest of the range")):
+            frame.insert(2 + side, column, [ranges.get(name, nothing)[side] for name in frame.index])
     if not converged(fit):
-        text = f"**{fit.outcome}** The numbers below are where the optimizer stopped: they are no estimates."
+        text = f"{fit.outcome} The numbers below are where the optimizer stopped: they are no estimates."
     if fit.undetermined:
         text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
-    table = Table(frame.reset_index(names="parameter"), "Calibrated parameters.", digits=6)
+    frame.insert(0, "quantity", [parameter_label(name) for name in frame.index])
+    table = Table(frame.reset_index(names="parameter"), "Calibrated parameters, each with its name in the files.",
+                  digits=6)
     return Section("Calibrated parameters", text, tables=(table,), anchor="parameters")
 
 

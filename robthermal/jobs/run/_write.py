@@ -67,7 +67,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
                     provenance=provenance(project.files), generated=now(),
                     assumptions=machine_assumptions(result.system, certified.parameters is not None),
                     gate=result.reasons, gates=GATES, usable=certified.usable, first=first,
-                    data=summary_tables(result))
+                    data=summary_tables(result), identity=project.identity)
     with output_folder(out) as folder:
         report = write_certification(result.certification.checked, report, folder)
         write_system(result.system, folder / "calibrated.toml")
