@@ -25,9 +25,9 @@ CODES = {
     "design": """+as_declared +certified +certified_sampled_model +collapsed +designed +found -limited +margins
         -moving -none -not_certified -not_contracting -not_found -not_held -not_tuned -ran_away
         +reachable -reversed +settled +tuned -undecided -unreachable -unstable""",
-    "diagnosis": """+adequate -ambiguous +consistent +converged +declared -doubtful +estimated +found -inadequate
-        -inexact +named +named_with_remainder -none -not_converged -not_predicted +nothing +predicted +selected
-        -unexplained""",
+    "diagnosis": """+adequate -ambiguous +consistent +converged +declared -doubtful +estimated +finer +found
+        -inadequate -inexact +named +named_with_remainder -none -not_converged -not_finer -not_predicted +nothing
+        +predicted +selected -unexplained""",
     "fleet": "+done -failed",
     "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
     "jobs": "-bins_left_out -circles_left_out -frf_without_covariance",

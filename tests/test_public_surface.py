@@ -50,7 +50,7 @@ SURFACE = {
     """,
     "diagnosis": """
         Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
-        JointCheck JointSelection Left
+        JointCheck JointSelection Left Refinement Resolving Split
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder
         Response Scores ShortList Stability UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
         forget_effect hold_out locate next_experiment noise_floor refit refit_short_list register_effect score
@@ -102,11 +102,12 @@ SURFACE = {
         AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
         Feedthrough FitRange Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
         Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties Rating Reduction
-        Sensor SheetInversion SinkSize SteadyState Step Stepper System ThermalCode Trajectory add_effect effects
+        Sensor SheetInversion SinkSize SplitLump SteadyState Step Stepper System ThermalCode Trajectory add_effect
+        effects
         fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials
         module_from_datasheet module_from_polynomials module_point parse_system read_matrices read_system reduce
-        simulate size_sink steady_state system_from_matrices time_constants trajectory voltage_slopes write_modelica
-        write_system
+        simulate size_sink split_lump steady_state system_from_matrices time_constants trajectory voltage_slopes
+        ways_to_split write_modelica write_system
     """,
     "verification": """
         Certificate Verdict claim_sentence establish machine_hash not_certified same_system verify

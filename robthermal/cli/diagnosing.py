@@ -36,6 +36,8 @@ def diagnose(system: SystemFile,
                  "the next option, may repeat.", metavar="OLD.csv...")] = None,
              session_gain: Annotated[bool, typer.Option(
                  "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
+             refine: Annotated[bool, typer.Option(
+                 "--refine", help="Split the lump in which something is left in two, and diagnose again.")] = False,
              operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
              out: Out = Path("robthermal-diagnosis"), as_json: Json = False) -> None:
     """Find where records and simulation part: the missing effect, the system with it, the gap before and after.
@@ -52,11 +54,13 @@ def diagnose(system: SystemFile,
                                     for paths in (records, validation or [], reference or []))
         files = (system, *records, *(validation or []), *(reference or []))
         result = rt.jobs.diagnose_records(found, files, train, held_out, stage, operating_point=point,
-                                          session_gain=session_gain, reference=healthy)
+                                          session_gain=session_gain, reference=healthy, refine=refine)
         stage("writing the report")
         rt.jobs.write_diagnosis(result, out)
     summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),
                "report": str(out / "report.html")}
-    answer(summary, as_json, lambda: say(str(result.diagnosis), f"augmented system: {out / 'augmented.toml'}",
+    split = ["finer network: no lump was split, nothing is left beyond the noise"] * (
+        refine and result.diagnosis.remainder is None)
+    answer(summary, as_json, lambda: say(str(result.diagnosis), *split, f"augmented system: {out / 'augmented.toml'}",
                                          f"report: {out / 'report.html'}"))
     exit_unless(result.holds)

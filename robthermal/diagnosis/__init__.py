@@ -2,6 +2,8 @@
 
 from ._changed import Compared as Compared
 from ._outcomes import DiagnosisCode as DiagnosisCode
+from ._refinement import Refinement as Refinement
+from ._refinement import Split as Split
 from .data import NoiseEstimate as NoiseEstimate
 from .data import noise_floor as noise_floor
 from .diagnose import diagnose as diagnose
@@ -37,6 +39,7 @@ from .fit import refit as refit
 from .path import LinearizedRecord as LinearizedRecord
 from .plan import Measurement as Measurement
 from .plan import NextExperiment as NextExperiment
+from .plan import Resolving as Resolving
 from .plan import next_experiment as next_experiment
 from .search import Decision as Decision
 from .search import EffectSet as EffectSet
@@ -50,8 +53,8 @@ from .search import select_jointly as select_jointly
 
 __all__ = ["Adequacy", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet",
            "Entry", "Evidence", "Found", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left", "LinearizedRecord",
-           "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refit",
-           "Remainder", "Response", "Scores", "ShortList", "Stability", "UnknownHeat", "ValidationResiduals",
-           "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect", "hold_out", "locate",
-           "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect", "score",
-           "select_jointly", "unknown_heat"]
+           "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refinement",
+           "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split", "Stability", "UnknownHeat",
+           "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect",
+           "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect",
+           "score", "select_jointly", "unknown_heat"]

@@ -22,6 +22,8 @@ class DiagnosisCode(OutcomeCode):
                 "Correct it: every test below rests on it.")
     ESTIMATED = (True, "The noise was estimated, from third differences of the readings or with the frequency "
                  "response.")
+    FINER = (True, "A lump split in two removes most of what the network left.",
+             "Look where heaters and sensors really sit before you keep the split: refined.toml holds it.")
     FOUND = (True, "An unknown heat into the lump would explain the residual; it is located, not named.")
     INADEQUATE = (False, "Something is left: the model with these effects does not explain the records.",
                   "Look for further effects with rt.diagnose.")
@@ -32,6 +34,8 @@ class DiagnosisCode(OutcomeCode):
                             "noise is stated, and has no name.")
     NONE = (False, "The records are as likely without any extra heat into the lump.",
             "Look at another lump: rt.diagnosis.locate ranks them.")
+    NOT_FINER = (False, "No lump split in two removes enough of what the network leaves.",
+                 "Measure more there: a sensor in that lump, or an input that drives it alone.")
     NOTHING = (True, "No candidate stands out of the noise.")
     NOT_CONVERGED = (False, "The fit stopped without converging.",
                      "Narrow the bounds, or give priors (sigma) to parameters the data do not determine.")

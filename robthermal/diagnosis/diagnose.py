@@ -13,6 +13,7 @@ from ..thermal import System
 from ._changed import changed
 from ._graded import evidence_of, graded
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
+from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor
@@ -31,10 +32,8 @@ from .evidence import (
     unknown_heat,
 )
 from .fit import Refit, SessionGain, exact, refit
-from .plan import NextExperiment, next_experiment, rivals, trial_conditions
+from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
-
-_NOISE_ONLY = 1.5  # whitened variance
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -43,7 +42,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
              parameters: Choice = None, effects: Iterable[str] | None = None,
              noise: Mapping[str, float] | float | None = None, operating_point: Mapping[str, float] | None = None,
              session_gain: SessionGain = False, reference: Measured | Sequence[Measured] | None = None,
-             progress: Progress = lambda stage: None) -> Diagnosis:
+             refine: bool = False, progress: Progress = lambda stage: None) -> Diagnosis:
     """Find where records and simulation part, name the missing effect, add it, and test it on validation records.
 
     Parameters
@@ -71,6 +70,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         Of the healthy machine, on days of their own. Then the question is what has changed since: every parameter of
         the fit table may have another value (`parameter_change`), and a change counts beyond the scatter among these
         records.
+    refine : bool
+        Where something is left beyond the noise, split the lump in which it sits in two, and diagnose again: what that
+        does is `refinement`. Takes about twice as long, and some seconds for every way to split.
     progress : callable, optional
         Called with a sentence before every stage.
 
@@ -106,6 +108,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if validation is not None:
         refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
     if reference is not None:
+        if refine:
+            raise InputError("refine is given with reference records", where="argument refine",
+                             remedy="Refine the network on the reference records alone first.")
         if operating_point is not None:
             raise InputError("operating_point is given with reference records", where="argument operating_point",
                              remedy="Leave it out: a record brings its own inputs.")
@@ -120,7 +125,17 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     judged = judge(searched(nominal, names, checked, progress), checked, progress)
     judged = graded(reconsider_noise(judged, checked), checked, progress)
     progress("locating the misfit and planning the next experiment")
-    return concluded(judged)
+    found = concluded(judged)
+    if not refine:
+        return found
+    progress("splitting the lump in which the remainder sits")
+    return replace(found, refinement=refined(
+        found, system, parameters,
+        fitted=lambda split, chosen: refit(split, records, floor, parameters=chosen, operating_point=operating_point,
+                                           session_gain=session_gain),
+        again=lambda split, chosen: diagnose(split, records, validation=validation, parameters=chosen, effects=names,
+                                             noise=noise, operating_point=operating_point, session_gain=session_gain,
+                                             progress=progress)))
 
 
 def concluded(judged: Judged) -> Diagnosis:
@@ -142,6 +157,7 @@ def concluded(judged: Judged) -> Diagnosis:
     where = locate(nominal)
     with_rest = unexplained or (judged.plain is not None and judged.verdict != "named")
     rest = _beyond_noise(fit, gap) if with_rest else None
+    resolves = None if rest is None else resolving(rest, nominal.system)
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),
@@ -150,8 +166,8 @@ def concluded(judged: Judged) -> Diagnosis:
         next_experiment=_plan(state.rounds) if named else None, outcome=judged.outcome,
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
-        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest)
-    said = [judged.outcome.text, *([] if rest is None else [str(rest), _resolves(state)]), *fit.contradictions,
+        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves)
+    said = [judged.outcome.text, *map(str, filter(None, (rest, resolves))), *fit.contradictions,
             *doubts(nominal.system, judged.plain is not None)]
     return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
 
@@ -168,13 +184,6 @@ def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:
         evidence = evidence_of(state.rounds, state.fit, state.nominal)
     return tuple(_found(state.fit, i, round_, evidence[i] if named else None, judged.plain is not None)
                  for i, round_ in enumerate(state.rounds))
-
-
-def _resolves(state: SearchState) -> str:
-    """What would resolve the remainder."""
-    if state.fit.structure.n_coarse and state.fit.variance < _NOISE_ONLY:
-        return "A finer network would resolve it: split that lump."
-    return "A sensor in that lump, an input that drives it alone, or a finer network there would resolve it."
 
 
 def doubts(system: System, remainder: bool) -> list[str]:

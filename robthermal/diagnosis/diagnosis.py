@@ -15,11 +15,12 @@ from ..thermal import System
 from ._changed import Compared
 from ._file import write_json
 from ._judge import Name, Verdict
+from ._refinement import Refinement
 from .data import NoiseEstimate
 from .effects import Candidate
 from .evidence import Adequacy, Evidence, Gap, HoldOut, Location, Remainder, Scores, UnknownHeat
 from .fit import Refit
-from .plan import NextExperiment
+from .plan import NextExperiment, Resolving
 from .search import Accepted, JointCheck, ruled_out
 
 
@@ -91,8 +92,13 @@ class Diagnosis:
         If nothing known explains the records: the heat into the most suspect lump that would; None otherwise.
     remainder : Remainder or None
         What is left beyond the noise; None if nothing is.
+    resolving : Resolving or None
+        Which sensor, which input and which lump to split would resolve the remainder; None without one.
     reference : Compared or None
         What the records of the healthy machine say; None without any.
+    refinement : Refinement or None
+        What splitting a lump does to the remainder, if it was asked for and there is one; the rest of the answer is of
+        the network as it is.
     """
 
     verdict: Verdict
@@ -115,7 +121,9 @@ class Diagnosis:
     joint: JointCheck | None = None
     unknown_heat: UnknownHeat | None = None
     remainder: Remainder | None = None
+    resolving: Resolving | None = None
     reference: Compared | None = None
+    refinement: Refinement | None = None
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
@@ -133,6 +141,7 @@ class Diagnosis:
             lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
                          f"[{gap.unit}]")
         lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
+        lines += [] if self.refinement is None else [f"finer network: {self.refinement}"]
         return "\n".join([*lines, str(self.outcome)])
 
     def _repr_html_(self) -> str:
@@ -182,8 +191,10 @@ class Diagnosis:
                 "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
             "provisional": [_plain(found) for found in self.provisional],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
+            "resolving": None if self.resolving is None else self.resolving.to_dict(),
             "outcome": vars(self.outcome),
             **({} if self.reference is None else {"reference": vars(self.reference)}),
+            **({} if self.refinement is None else {"refinement": self.refinement.to_dict()}),
             **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
         }
 

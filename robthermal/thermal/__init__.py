@@ -59,6 +59,9 @@ from ._sheet_columns import invert_datasheet as invert_datasheet
 from ._simulate import Trajectory as Trajectory
 from ._simulate import simulate as simulate
 from ._simulate import trajectory as trajectory
+from ._split import SplitLump as SplitLump
+from ._split import split_lump as split_lump
+from ._split import ways_to_split as ways_to_split
 from ._steady import Equilibrium as Equilibrium
 from ._steady import SteadyState as SteadyState
 from ._steady import steady_state as steady_state
@@ -70,13 +73,13 @@ from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Ef
 from .effects import add_effect as add_effect
 from .effects import effects as effects
 
-__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive",
-           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
-           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
-           "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
-           "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SteadyState", "Step", "Stepper", "System",
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
+           "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion", "Layer", "Lead",
+           "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters",
+           "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties", "Rating", "Reduction",
+           "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState", "Step", "Stepper", "System",
            "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
            "format_system", "hinf_error", "invert_datasheet", "linearize", "load_curve", "materials",
            "module_from_datasheet", "module_from_polynomials", "module_point", "parse_system", "read_matrices",
-           "read_system", "reduce", "simulate", "size_sink", "steady_state", "system_from_matrices", "time_constants",
-           "trajectory", "voltage_slopes", "write_modelica", "write_system"]
+           "read_system", "reduce", "simulate", "size_sink", "split_lump", "steady_state", "system_from_matrices",
+           "time_constants", "trajectory", "voltage_slopes", "ways_to_split", "write_modelica", "write_system"]

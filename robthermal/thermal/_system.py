@@ -265,7 +265,8 @@ class System(Part):
         names, targets = list(self.lumps), [index[name] for name in sources]
         if not targets:
             return {}
-        edges = [(index[a], index[b], 1.0 / max(g, 1e-12)) for a, b, g in self._paths() if a in index and b in index]
+        edges = [(index[a], index[b], 1.0 / max(g, 1e-12)) for a, b, g in conducting_paths(self)
+                 if a in index and b in index]
         rows, columns, weights = zip(*edges, strict=True) if edges else ((), (), ())
         graph = csr_array((np.array(weights, float), (rows, columns)), shape=(len(names), len(names)))
         _, _, origin = dijkstra(graph, directed=False, indices=targets, min_only=True, return_predecessors=True)
@@ -286,10 +287,12 @@ class System(Part):
         """
         return draw_network(self, ax)
 
-    def _paths(self) -> list[tuple[str, str, float]]:
-        links = [(*link.between, link.conductance + (link.natural.gain if link.natural else 0.0)
-                  + 4 * (link.radiation or 0.0) * 300.0**3) for link in self.links]
-        return links + [(m.hot, m.cold, m.conductance.value) for m in self.modules.values()]
+
+def conducting_paths(system: System) -> list[tuple[str, str, float]]:
+    """Both ends of every link and module, and its conductance near 300 K and a difference of 1 K [W/K]."""
+    links = [(*link.between, link.conductance + (link.natural.gain if link.natural else 0.0)
+              + 4 * (link.radiation or 0.0) * 300.0**3) for link in system.links]
+    return links + [(m.hot, m.cold, m.conductance.value) for m in system.modules.values()]
 
 
 def equations(system: System) -> Equations:

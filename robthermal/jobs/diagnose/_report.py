@@ -24,6 +24,7 @@ from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._ranking import NOT_NEEDED, ranking
+from ._refinement_section import refinement_section
 
 _DRAWN = 6  # sensors: as many as there are colors
 
@@ -37,7 +38,7 @@ def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
         Diagnosis, as `diagnose_records` returns it.
     out : str or Path
         Output folder: diagnosis.json, augmented.toml, report.html, report.json, junit.xml, summary.json;
-        next_experiment.csv if one was found.
+        next_experiment.csv if one was found, refined.toml if a lump was split.
 
     Returns
     -------
@@ -85,7 +86,7 @@ def diagnosis_report(result: Diagnosed) -> Report:
 
 
 def save_diagnosis(found: Diagnosis, folder: Path) -> None:
-    """Write diagnosis.json, augmented.toml, and next_experiment.csv if one was found.
+    """Write diagnosis.json, augmented.toml, refined.toml if a lump was split, next_experiment.csv if one was found.
 
     Parameters
     ----------
@@ -96,6 +97,8 @@ def save_diagnosis(found: Diagnosis, folder: Path) -> None:
     """
     found.save(folder / "diagnosis.json")
     write_system(found.system, folder / "augmented.toml")
+    if found.refinement is not None:
+        write_system(found.refinement.system, folder / "refined.toml")
     _write_experiment(found, folder / "next_experiment.csv")
 
 
@@ -137,6 +140,8 @@ def _sections(result: Diagnosed) -> Iterator[Section]:
                   tables=_candidate_tables(ranking(found)), anchor="candidates")
     yield _located_section(found)
     yield _validation_section(found)
+    if found.refinement is not None:
+        yield refinement_section(found.refinement)
     yield _next_section(found)
 
 
