@@ -14,6 +14,7 @@ from ._multisine import multisine as multisine
 from ._outcomes import SignalsCode as SignalsCode
 from ._record import Record as Record
 from ._staircase import staircase as staircase
+from ._thermistor import Thermistor as Thermistor
 from ._units import celsius_to_kelvin as celsius_to_kelvin
 from ._units import kelvin_to_celsius as kelvin_to_celsius
 from .importing import Declared as Declared
@@ -33,6 +34,7 @@ __all__ = [
     "ImportOptions",
     "Record",
     "SignalsCode",
+    "Thermistor",
     "celsius_to_kelvin",
     "crest_factor",
     "declared",

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
 from ._columns import Channel, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
 from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short
+from ._units import split_header
 
 _CODES = (-127.0, -127.94, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)
 _DOUBTED = 85.0  # what a DS18B20 says after power-up, and what a plate may have
@@ -186,3 +188,38 @@ def _in_si(channel: Channel, raw: Array) -> Array:
     if channel.unit == channel.unit_read.name:
         return raw
     return channel.unit_read.to_si(raw) * kept_factor(channel)
+
+
+def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:
+    """What is said of names that differ from their headers and of units that are converted."""
+    found = []
+    for c in channels:
+        header = table.headers[c.place]
+        if split_header(header)[0] != c.name and header != c.name:
+            found.append(Action("mapped", 1, f"{c.name} is column {header!r}", header))
+        if c.thermistor is not None:
+            found.append(Action("converted", len(table.lines), f"{c.name} to K: {c.thermistor}", header))
+        elif c.scaled:
+            found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
+        elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
+            found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
+    return found
+
+
+def from_thermistor(table: Table, channel: Channel, raw: Array) -> None:
+    """Kelvin from ohms or readings of a divider, in place; an open or shorted thermistor is missing, and said."""
+    assert channel.thermistor is not None
+    known = ~np.isnan(raw)
+    for part in spans(len(raw)):
+        raw[part] = channel.thermistor.temperature(channel.scale * raw[part] + channel.offset)
+    coldest, hottest = channel.thermistor.range
+    header = table.headers[channel.place]
+    faults = (("an open", "below", coldest, known & ~(raw >= coldest + ZERO_CELSIUS)),
+              ("a shorted", "above", hottest, raw > hottest + ZERO_CELSIUS))
+    for what, side, limit, hit in faults:
+        if hit.any():
+            n = int(hit.sum())
+            text = (f"{channel.name}: {n} reading{'s' * (n > 1)} of {what} thermistor, {side} {limit:g} °C, taken as "
+                    "missing")
+            table.actions.append(Action("fault_code", n, text, header, table.lines.of(hit)))
+            raw[hit] = np.nan

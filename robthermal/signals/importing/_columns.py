@@ -8,8 +8,9 @@ from typing import Any, Protocol
 
 from ...errors import InputError
 from .._names import misspelt, suggestion
+from .._thermistor import Thermistor
 from ._options import ColumnChoice, Declared
-from ._table import Action, Table
+from ._table import Table
 from ._tokens import short
 from ._units import Unit, split_header, unit_of
 
@@ -64,6 +65,8 @@ class Channel:
         Value = scale · cell + offset, before a unit is converted; declared, or 1 and 0.
     scaled : bool
         Whether scale or offset were declared.
+    thermistor : Thermistor or None
+        Characteristic of what the cells are read from.
     """
 
     name: str
@@ -74,6 +77,7 @@ class Channel:
     scale: float = 1.0
     offset: float = 0.0
     scaled: bool = False
+    thermistor: Thermistor | None = None
 
 
 def channels_of_system(table: Table, system: SystemLike, choice: Declared, time: Sequence[int]) -> tuple[Channel, ...]:
@@ -139,8 +143,9 @@ def channels_of_names(
         written = split_header(table.headers[place])[1]
         own = written is not None and unit_of(written) is None and (picked is None or picked.unit is None)
         unit = None if own else _unit(table, name, place, picked)
-        sensor = name in outputs and not own and (unit is None or unit.quantity == "temperature")
-        if sensor and (unit is not None or choice.record.temperature_unit is not None):
+        resistive = picked is not None and picked.thermistor is not None
+        sensor = name in outputs and not own and (unit is None or unit.quantity == "temperature" or resistive)
+        if sensor and (resistive or unit is not None or choice.record.temperature_unit is not None):
             found.append(
                 _channel(table, name, "sensor", place, choice, choice.record.temperature_unit or "K", None, 1.0)
             )
@@ -216,6 +221,8 @@ def _channel(
     unit = _unit(table, name, place, picked)
     header, scaling = table.headers[place], _scaling(picked)
     where = f"{table.where}, column {header!r}"
+    if picked is not None and picked.thermistor is not None:
+        return _thermistor(name, role, place, unit, picked.thermistor, scaling, where)
     if role in ("sensor", "ambient"):
         unit = unit or unit_of(choice.record.temperature_unit or default)
         if unit is None or unit.quantity != "temperature":
@@ -240,6 +247,19 @@ def _channel(
             )
         return Channel(name, role, place, unit, kept, *scaling)
     return _input(name, place, unit, own, gain, scaling, where)
+
+
+def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteristic: Thermistor,
+                scaling: tuple[float, float, bool], where: str) -> Channel:
+    """A temperature whose cells are ohms, or volts or counts of a divider."""
+    wanted = "ohm" if characteristic.divider is None else "V, mV, or counts without a unit"
+    fits = unit is None or unit.quantity == ("resistance" if characteristic.divider is None else "voltage")
+    if role not in ("sensor", "ambient") or not fits:
+        what = f"{name!r} is a {_KINDS.get(role, role)}" if role not in ("sensor", "ambient") else (
+            f"the column is in {unit.name if unit else '?'}")
+        raise InputError(f"{what}, and a thermistor is declared for it", where=where,
+                         expected=f"a sensor or ambient, cells in {wanted}", remedy="Remove thermistor, or the unit.")
+    return Channel(name, role, place, unit, "K", *scaling, characteristic)
 
 
 def _input(
@@ -361,20 +381,6 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
         expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
         remedy=remedy.strip(),
     )
-
-
-def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:
-    """What is said of names that differ from their headers and of units that are converted."""
-    found = []
-    for c in channels:
-        header = table.headers[c.place]
-        if split_header(header)[0] != c.name and header != c.name:
-            found.append(Action("mapped", 1, f"{c.name} is column {header!r}", header))
-        if c.scaled:
-            found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
-        elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
-            found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
-    return found
 
 
 def kept_factor(channel: Channel) -> float:

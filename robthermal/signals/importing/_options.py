@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from ...errors import InputError
 from .._names import suggestion
+from .._thermistor import Thermistor
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -32,13 +33,16 @@ class ColumnChoice(_Table):
     unit : str, optional
         Unit of the cells, where the header does not say it.
     scale, offset : float, optional
-        Value = scale · cell + offset, in the unit of the system (W for heaters, A, K).
+        Value = scale · cell + offset, in the unit of the system (W for heaters, A, K); ohms before a `thermistor`.
+    thermistor : Thermistor, optional
+        The cells are resistances, or readings of a divider, and become temperatures.
     """
 
     column: str
     unit: str | None = None
     scale: Finite | None = None
     offset: Finite | None = None
+    thermistor: Thermistor | None = None
 
 
 class ImportOptions(_Table):
@@ -221,7 +225,7 @@ def from_text(record: Sequence[str] = (), column: Sequence[str] = ()) -> tuple[d
     Parameters
     ----------
     record, column : sequence of str
-        Command-line values, each KEY=VALUE or NAME=HEADER.
+        Command-line values, each KEY=VALUE or NAME=HEADER; for HEADER also a table of [columns], written as JSON.
 
     Returns
     -------
@@ -250,8 +254,19 @@ def from_text(record: Sequence[str] = (), column: Sequence[str] = ()) -> tuple[d
         name, equals, header = text.partition("=")
         if not equals or not name.strip() or not header.strip():
             raise InputError(f"{text[:60]!r}", where="--column", expected="NAME=HEADER, for example 'T1=NTC 1'")
-        columns[name.strip()] = header.strip()
+        columns[name.strip()] = _table_or_header(name.strip(), header.strip())
     return options, columns
+
+
+def _table_or_header(name: str, text: str) -> Any:
+    """A header, or what stands in [columns] as a table, written as JSON."""
+    if not text.startswith("{"):
+        return text
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        raise InputError(f"{name}={text[:60]}", where="--column", expected="a header, or a table as JSON, for example "
+                         f"""'{name}={{"column": "NTC", "unit": "ohm"}}'""") from None
 
 
 def _value(key: str, text: str) -> Any:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from .._plausible import check_temperature, limit_notes
-from ._cells import NumberReader, refuse_codes, refuse_faults, take_codes, to_si
-from ._columns import Channel, SystemLike, mapped_actions
+from ._cells import NumberReader, from_thermistor, mapped_actions, refuse_codes, refuse_faults, take_codes, to_si
+from ._columns import Channel, SystemLike
 from ._options import Declared
 from ._parts import Part, parts_of, say_resampled
 from ._samples import runs, single
@@ -97,9 +97,12 @@ def read_values(
     for channel in ordered:
         raw = values.column(channel)
         take_codes(table, channel.place, raw, choice.record)
+        if channel.thermistor is not None:
+            from_thermistor(table, channel, raw)
         values.missing[channel.place] = int(np.isnan(raw).sum())
         _check(table, channel, raw, choice, clock)
-        to_si(channel, raw)
+        if channel.thermistor is None:
+            to_si(channel, raw)
         values.ranges[channel.name] = float(np.nanmin(raw)), float(np.nanmax(raw))
     return values, clock
 
@@ -126,6 +129,8 @@ def _check(table: Table, channel: Channel, raw: Array, choice: Declared, clock: 
             expected="numbers",
             remedy="Leave it out, or name another column with --column.",
         )
+    if channel.thermistor is not None:
+        return  # its faults are already out, and a resistance or count may have any number
     if channel.role != "voltage":  # a voltage may jump anywhere with its current
         refuse_codes(table, header, raw, choice.record, channel.unit == "K")
     unit = channel.unit_read.name if channel.unit_read is not None else ""
