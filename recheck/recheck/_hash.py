@@ -35,12 +35,13 @@ def machine_hash(system: Mapping[str, Any]) -> str:
     """Return the hash of the numbers and names of a "system" section; notes are left out."""
     if "lumps" in system:
         return short_hash(_thermal(system))
-    if "vertices" in system and "gain" not in system:
+    if "vertices" in system and not {"gain", "n_meas"} & set(system):
         return short_hash([Name("ellipsoid"), system["vertices"],
                            *(system.get(name, {}) for name in ("measured", "controller", "performance")),
                            system["sample_time"]])
     if "vertices" in system:
-        return short_hash([Name("polytope"), *(system[name] for name in ("vertices", "gain", "sample_time"))])
+        own = ("controller", "n_meas", "n_ctrl") if "n_meas" in system else ("gain",)
+        return short_hash([Name("polytope"), *(system[name] for name in ("vertices", *own, "sample_time"))])
     keys = ("A", "B", "C", "D", "sample_time"), ("capacity", "rows", "cols", "values")
     for kind, names in zip(("linear", "network"), keys, strict=True):
         if names[0] in system:

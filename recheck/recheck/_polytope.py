@@ -1,4 +1,4 @@
-"""Kind "polytope": the loops A + B F at the vertices of a hull of plants, with one matrix or with a slack matrix."""
+"""Kind "polytope": the loops at the vertices of a hull of plants, with one matrix or with a slack matrix."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from itertools import product
 from operator import mul
 from typing import Any
 
-from ._document import get, mapping, matrix, not_negative, numbers, only, positive, sequence
+from ._document import get, matrix, not_negative, numbers, only, positive, sequence
 from ._exact import ZERO, Malformed, NotCovered, short
 from ._lyapunov import check_work, decide
+from ._polytope_loops import Loop, Loops, Matrix, plus, read_loops, times
 from ._result import Answer, not_covered, not_valid, valid
 
-Matrix = list[list[Fraction]]
 MEASURES = {"stability": ("rate", "parameter_rates"), "hinf": ("bound",), "h2": ("bound",),
             "region": ("decay", "damping", "radius")}
 _MOST_MOVING = 6
@@ -23,18 +23,20 @@ _MOST_ROWS = 120
 
 @dataclass(frozen=True)
 class Problem:
-    """What one certificate claims; ``loops``: A, B1, C, D1 of the closed loop at every vertex."""
+    """What one certificate claims."""
 
-    loops: list[tuple[Matrix, Matrix, Matrix, Matrix]]
-    inputs: int
-    controls: int
-    outputs: int
+    closed: Loops
     sample_time: Fraction
     measure: str
     numbers: Mapping[str, Fraction]
     rates: list[Fraction] | None
     matrices: list[Matrix]
     slack: Matrix | None
+
+    @property
+    def loops(self) -> list[Loop]:
+        """A, B1, C, D1 of the closed loop at every vertex."""
+        return self.closed.at
 
 
 def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
@@ -45,51 +47,14 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     if not isinstance(measure, str) or measure not in MEASURES:
         raise Malformed(f"region.measure: {short(measure)}")
     only(region, ["measure", *MEASURES[measure]], "region")
-    bounded = measure in ("hinf", "h2")
-    only(system, ["vertices", "gain", "sample_time"], "system")
     time = not_negative(get(system, "sample_time", "system"), "system.sample_time")
-    rows = sequence(get(system, "gain", "system"), "system.gain")
-    k, n = len(rows), len(sequence(rows[0], "system.gain")) if rows else 0
-    items = sequence(get(system, "vertices", "system"), "system.vertices")
-    if not n or not items:
-        raise Malformed("system: no vertex, or an empty gain")
-    F = matrix(rows, k, n, "system.gain")
-    if len(items) * n**3 > 300_000_000:
-        raise Malformed("system.vertices: too many")
-    loops, sizes = [], set()
-    for i, item in enumerate(items):
-        loop, m, p = _loop(item, F, f"system.vertices[{i}]", bounded)
-        loops.append(loop)
-        sizes.add((m, p))
-    if len(sizes) > 1:
-        raise Malformed("system.vertices: they differ in size")
-    (m, p), = sizes
-    if bounded and (m == k or not p):
-        raise Malformed("system.vertices: no disturbance or no performance output")
+    closed = read_loops(system, measure in ("hinf", "h2"))
     stated = {key: (not_negative if key == "rate" else positive)(region[key], f"region.{key}")
               for key in MEASURES[measure] if key in region and key != "parameter_rates"}
     _check_region(measure, stated, bool(time > 0))
-    matrices, slack, rates = _evidence(evidence, region, len(items), n, measure, bool(time > 0))
-    return Problem(loops, m, k, p, time, measure, stated, rates, matrices, slack)
-
-
-def _loop(item: Any, F: Matrix, where: str, bounded: bool) -> tuple[tuple[Matrix, Matrix, Matrix, Matrix], int, int]:
-    part, k, n = mapping(item, where), len(F), len(F[0])
-    only(part, ["A", "B", "C", "D"], where)
-    A, lines = matrix(get(part, "A", where), n, n, f"{where}.A"), sequence(get(part, "B", where), f"{where}.B")
-    m = len(sequence(lines[0], f"{where}.B")) if lines else 0
-    B = matrix(lines, n, m, f"{where}.B")
-    if m < k:
-        raise Malformed(f"{where}.B: fewer inputs than controls")
-    C: Matrix = []
-    D: Matrix = []
-    if bounded or "C" in part or "D" in part:
-        p = len(sequence(get(part, "C", where), f"{where}.C"))
-        C, D = matrix(part["C"], p, n, f"{where}.C"), matrix(get(part, "D", where), p, m, f"{where}.D")
-    w = m - k
-    closed = _plus(A, times([row[w:] for row in B], F))
-    seen = _plus(C, times([row[w:] for row in D], F))
-    return (closed, [row[:w] for row in B], seen, [row[:w] for row in D]), m, len(C)
+    matrices, slack, rates = _evidence(evidence, region, len(closed.at), len(closed.at[0][0]), measure,
+                                        bool(time > 0))
+    return Problem(closed, time, measure, stated, rates, matrices, slack)
 
 
 def _check_region(measure: str, stated: Mapping[str, Fraction], sampled: bool) -> None:
@@ -156,7 +121,7 @@ def _unproven(status: bool | None, name: str) -> Answer:
     return not_valid(f"{words} positive definite") if status is False else not_covered(f"{words} proven so")
 
 
-def _bounded_energy(problem: Problem, loop: tuple[Matrix, Matrix, Matrix, Matrix], P: Matrix) -> Answer | None:
+def _bounded_energy(problem: Problem, loop: Loop, P: Matrix) -> Answer | None:
     _, B, _, D = loop
     if not problem.sample_time and any(entry != 0 for row in D for entry in row):
         return not_valid("a direct path: the H2 norm is infinite")
@@ -166,12 +131,12 @@ def _bounded_energy(problem: Problem, loop: tuple[Matrix, Matrix, Matrix, Matrix
     return None if total < problem.numbers["bound"] ** 2 else not_valid("the trace is not below the bound squared")
 
 
-def _forms(problem: Problem, loop: tuple[Matrix, Matrix, Matrix, Matrix], P: Matrix) -> Iterator[tuple[str, Matrix]]:
+def _forms(problem: Problem, loop: Loop, P: Matrix) -> Iterator[tuple[str, Matrix]]:
     """Yield what has to be positive definite at one vertex."""
     A, B, C, D = loop
     sampled, stated, n = problem.sample_time > 0, problem.numbers, len(A)
     PA = times(P, A)
-    both, inner = _plus(PA, turned(PA)), times(turned(A), PA)
+    both, inner = plus(PA, turned(PA)), times(turned(A), PA)
     if problem.measure == "region":
         if "damping" in stated:
             raise NotCovered("a damping ratio")
@@ -208,7 +173,7 @@ def _slack_forms(problem: Problem, A: Matrix, P: Matrix, slack: Matrix, rate: Fr
     n = len(A)
     minus = [[Fraction(-int(i == j)) for j in range(n)] for i in range(n)]
     half = times(slack, [[*row, *other] for row, other in zip(A, minus, strict=True)])
-    both, zero = _plus(half, turned(half)), [[ZERO] * n for _ in range(n)]
+    both, zero = plus(half, turned(half)), [[ZERO] * n for _ in range(n)]
     sampled = problem.sample_time > 0
     for way in _ways(problem.rates) if problem.rates is not None else [[ZERO] * len(problem.matrices)]:
         change = _scaled_sum(*zip(way, problem.matrices, strict=True))
@@ -228,19 +193,9 @@ def _ways(rates: list[Fraction]) -> Iterator[list[Fraction]]:
                 yield [*way[:free], rest, *way[free:]]
 
 
-def times(a: Matrix, b: Matrix) -> Matrix:
-    """Return a product."""
-    columns = list(zip(*b, strict=True))
-    return [[sum(map(mul, row, column), ZERO) for column in columns] for row in a]
-
-
 def turned(a: Matrix) -> Matrix:
     """Return the transpose."""
     return [list(column) for column in zip(*a, strict=True)]
-
-
-def _plus(a: Matrix, b: Matrix) -> Matrix:
-    return [[x + y for x, y in zip(row, other, strict=True)] for row, other in zip(a, b, strict=True)]
 
 
 def _scaled_sum(*terms: tuple[Fraction | int, Matrix]) -> Matrix:

@@ -198,12 +198,19 @@ def _polytope_claim(problem: _polytope.Problem, parts: Parts) -> str:
     else:
         plants = ("every plant, constant or varying with time, its weights of the vertices no faster than "
                   f"{', '.join(map(decimal, rates))} 1/s,")
-    sizes = ", ".join([_plural(len(problem.loops[0][0]), "state"), _plural(problem.inputs, "input"),
-                       f"the last {problem.controls} for control",
-                       *([_plural(problem.outputs, "output")] if problem.outputs else [])])
-    time = f"sampled at {decimal(problem.sample_time)} s" if sampled else "continuous"
-    return (f"The state feedback u = F x as given, {time}, stabilizes {plants} in the convex hull of "
-            f"{_plural(len(problem.loops), 'vertex', 'vertices')} as given ({sizes}) (machine "
+    closed, time = problem.closed, f"sampled at {decimal(problem.sample_time)} s" if sampled else "continuous"
+    sizes = [_plural(closed.states, "state"), _plural(closed.inputs, "input"),
+             f"the last {closed.controls} for control",
+             *([_plural(closed.outputs, "output")] if closed.outputs else [])]
+    who = f"The state feedback u = F x as given, {time},"
+    if closed.measured:
+        own = len(closed.at[0][0]) - closed.states
+        who = (f"The controller u = K(w) y, {time}, the average of {_plural(len(closed.at), 'controller')} as given "
+               "with the weights w of the plant,")
+        sizes.append(f"the last {closed.measured} measured; controllers of {_plural(own, 'state')}; x: states of "
+                     "plant and controller")
+    return (f"{who} stabilizes {plants} in the convex hull of "
+            f"{_plural(len(closed.at), 'vertex', 'vertices')} as given ({', '.join(sizes)}) (machine "
             f"{machine_hash(parts['system'])}), nominal parameters: {_polytope_measure(problem, sampled)}.")
 
 

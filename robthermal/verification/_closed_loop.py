@@ -208,33 +208,41 @@ def prove(problem: ClosedLoop) -> Proof:
 
 
 def form_loop(problem: ClosedLoop) -> LinearSystem | None:
-    """Return the loop from the chosen disturbances to the chosen outputs, exactly; None where it is not well-posed.
+    """Return the loop from the chosen disturbances to the chosen outputs, exactly; None where it is not well-posed."""
+    loop = join_loop(problem.plant, problem.controller, problem.n_meas, problem.n_ctrl)
+    if loop is None or problem.measure in ("stability", "region"):  # no disturbance is needed
+        return loop
+    chosen = problem.channels
+    return LinearSystem(loop.A, tuple(tuple(row[j] for j in chosen.inputs) for row in loop.B),
+                        tuple(loop.C[i] for i in chosen.outputs),
+                        tuple(tuple(loop.D[i][j] for j in chosen.inputs) for i in chosen.outputs), loop.sample_time)
 
-    With E = (1 - D_K D22)⁻¹: u = E (D_K C2 x + C_K x_K + D_K D21 w), y = C2 x + D21 w + D22 u.
+
+def join_loop(p: LinearSystem, k: LinearSystem, n_meas: int, n_ctrl: int) -> LinearSystem | None:
+    """Return the loop of a plant and u = +K y from w to z, exactly; None where it is not well-posed.
+
+    With E = (1 - D_K D22)⁻¹: u = E (D_K C2 x + C_K x_K + D_K D21 w), y = C2 x + D21 w + D22 u. One row and one column
+    of zeros stand where there is no w or z.
     """
-    p, k = problem.plant, problem.controller
-    n, m, q = p.states, p.inputs - problem.n_ctrl, p.outputs - problem.n_meas
+    n, m, q = p.states, p.inputs - n_ctrl, p.outputs - n_meas
     B1, B2 = _part(p.B, range(n), range(m)), _part(p.B, range(n), range(m, p.inputs))
     C1, C2 = _part(p.C, range(q), range(n)), _part(p.C, range(q, p.outputs), range(n))
     D11, D12 = _part(p.D, range(q), range(m)), _part(p.D, range(q), range(m, p.inputs))
     D21, D22 = _part(p.D, range(q, p.outputs), range(m)), _part(p.D, range(q, p.outputs), range(m, p.inputs))
     A, AK, BK = _part(p.A, range(n), range(n)), _whole(k.A, k.states), _whole(k.B, k.inputs)
     CK, DK = _whole(k.C, k.states), _whole(k.D, k.inputs)
-    open_loop = _identity(problem.n_ctrl) - DK * D22
+    open_loop = _identity(n_ctrl) - DK * D22
     if open_loop.det() == 0:
         return None
     E = open_loop.inv()
     ux, uk, uw = E * DK * C2, E * CK, E * DK * D21
     yx, yk, yw = C2 + D22 * ux, D22 * uk, D21 + D22 * uw
     A_loop = _join([[A + B2 * ux, B2 * uk], [BK * yx, AK + BK * yk]])
-    if problem.measure in ("stability", "region"):  # no disturbance is needed
-        size = problem.states
+    if not m or not q:
+        size = n + k.states
         return LinearSystem(A_loop, ((fmpq(0),),) * size, ((fmpq(0),) * size,), ((fmpq(0),),), p.sample_time)
-    B_loop, C_loop = _join([[B1 + B2 * uw], [BK * yw]]), _join([[C1 + D12 * ux, D12 * uk]])
-    D_loop, chosen = _join([[D11 + D12 * uw]]), problem.channels
-    return LinearSystem(A_loop, tuple(tuple(row[j] for j in chosen.inputs) for row in B_loop),
-                        tuple(C_loop[i] for i in chosen.outputs),
-                        tuple(tuple(D_loop[i][j] for j in chosen.inputs) for i in chosen.outputs), p.sample_time)
+    return LinearSystem(A_loop, _join([[B1 + B2 * uw], [BK * yw]]), _join([[C1 + D12 * ux, D12 * uk]]),
+                        _join([[D11 + D12 * uw]]), p.sample_time)
 
 
 def _part(matrix: Rows, rows: range, columns: range) -> fmpq_mat:

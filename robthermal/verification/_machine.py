@@ -92,12 +92,13 @@ def _content(section: Any) -> list[Any]:
         return [Name("closed_loop"), *(get(mapping(get(table, part, "system"), f"system.{part}"), key, f"system.{part}")
                                        for part in ("plant", "controller") for key in "ABCD"),
                 *(get(table, key, "system") for key in ("n_meas", "n_ctrl", "sample_time"))]
-    if "vertices" in table and "gain" not in table:
+    if "vertices" in table and not {"gain", "n_meas"} & set(table):
         return [Name("ellipsoid"), get(table, "vertices", "system"),
                 *(table.get(key, {}) for key in ("measured", "controller", "performance")),
                 get(table, "sample_time", "system")]
     if "vertices" in table:
-        return [Name("polytope"), *(get(table, key, "system") for key in ("vertices", "gain", "sample_time"))]
+        keys = ["controller", "n_meas", "n_ctrl"] if "n_meas" in table else ["gain"]
+        return [Name("polytope"), *(get(table, key, "system") for key in ("vertices", *keys, "sample_time"))]
     for family, keys in _SIZES.items():
         if keys[0] in table:
             return [Name(family), *(get(table, key, "system") for key in keys)]

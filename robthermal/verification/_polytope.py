@@ -1,8 +1,9 @@
-"""Kind "polytope": one state feedback for every plant in the convex hull of some vertices.
+"""Kind "polytope": one state feedback, or one scheduled controller, for every plant in the hull of some vertices.
 
-The file holds the vertices and the gain as they were returned; the loops A + B F are formed here, in rational numbers.
-With one matrix P every inequality is affine or convex in the loop, so that the vertices decide, and the plant may vary
-with time. With one matrix per vertex and a slack matrix it is constant, or its weights move no faster than stated.
+The file holds the vertices and the gain or the controllers as they were returned; the loops are formed here, in
+rational numbers. With one matrix P every inequality is affine or convex in the loop, so that the vertices decide, and
+the plant may vary with time. With one matrix per vertex and a slack matrix it is constant, or its weights move no
+faster than stated.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from flint import arb, arb_mat, fmpq, fmpq_mat
+from flint import arb, arb_mat, fmpq
 
 from robthermal.errors import InputError
 
@@ -23,21 +24,18 @@ from ._kind import Kind, Proof, working_precision
 from ._lti import LinearSystem, Rows, balls, expect_shape, read_matrix
 from ._lyapunov import asymmetry
 from ._numbers import decimal, name_of
+from ._polytope_loops import Loops, read_loops
 
 _KEYS = {"stability": ["rate", "parameter_rates"], "hinf": ["bound"], "h2": ["bound"],
          "region": ["decay", "damping", "radius"]}
 _MOST_MOVING = 6  # vertices whose weights may move at stated rates: their extremes are listed
-_MOST_WORK = 3e8  # vertices times n³
 
 
 @dataclass(frozen=True)
 class Polytope:
-    """The exact problem of one certificate; ``loops``: the closed loop at every vertex."""
+    """The exact problem of one certificate."""
 
-    loops: tuple[LinearSystem, ...]
-    inputs: int
-    n_ctrl: int
-    outputs: int
+    closed: Loops
     measure: str
     rate: fmpq
     bound: fmpq
@@ -47,8 +45,13 @@ class Polytope:
     slack: Rows | None
 
     @property
+    def loops(self) -> tuple[LinearSystem, ...]:
+        """The closed loop at every vertex."""
+        return self.closed.at
+
+    @property
     def states(self) -> int:
-        return self.loops[0].states
+        return self.closed.states
 
     @property
     def discrete(self) -> bool:
@@ -63,8 +66,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Polytope:
     if not isinstance(measure, str) or measure not in _KEYS:
         raise InputError(f"measure {name_of(measure)}", where="region.measure", expected=f"one of {list(_KEYS)}")
     no_other(asked, ["measure", *_KEYS[measure]], "region")
-    loops, inputs, n_ctrl, outputs = _read_loops(table, measure in ("hinf", "h2"))
-    count, n, discrete = len(loops), loops[0].states, loops[0].discrete
+    closed = read_loops(table, measure in ("hinf", "h2"))
+    count, n, discrete = len(closed.at), closed.states, closed.at[0].discrete
     rate = not_negative(asked.get("rate", 0), "region.rate")
     if discrete and rate >= 1:
         raise InputError("rate of 1 or more", where="region.rate", expected="below 1 for sampled plants")
@@ -88,65 +91,7 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Polytope:
         slack = read_matrix(get(found, "slack", "evidence"), "evidence.slack")
         expect_shape(slack, 2 * n, n, "evidence.slack")
         moving = _read_rates(asked["parameter_rates"], count, discrete) if "parameter_rates" in asked else None
-    return Polytope(loops, inputs, n_ctrl, outputs, measure, rate, bound, poles, moving, matrices, slack)
-
-
-def _read_loops(table: Mapping[str, Any], bounded: bool) -> tuple[tuple[LinearSystem, ...], int, int, int]:
-    """Return the loops, and how many inputs, controls and outputs the plants have."""
-    no_other(table, ["vertices", "gain", "sample_time"], "system")
-    time = not_negative(get(table, "sample_time", "system"), "system.sample_time")
-    gain = read_matrix(get(table, "gain", "system"), "system.gain")
-    listed = sequence(get(table, "vertices", "system"), "system.vertices")
-    if not listed or not gain or not gain[0]:
-        raise InputError("no vertex, or an empty gain", where="system", expected="at least one vertex, control, state")
-    k, n = len(gain), len(gain[0])
-    expect_shape(gain, k, n, "system.gain")
-    if len(listed) * n**3 > _MOST_WORK:
-        raise InputError(f"{len(listed)} vertices of {n} states", where="system.vertices", expected="fewer: too many")
-    F = _dense(gain, k, n)
-    loops, sizes = [], set()
-    for i, item in enumerate(listed):
-        where = f"system.vertices[{i}]"
-        part = mapping(item, where)
-        no_other(part, ["A", "B", "C", "D"], where)
-        matrices = {key: read_matrix(get(part, key, where), f"{where}.{key}")
-                    for key in ("A", "B", *(key for key in "CD" if "C" in part or "D" in part or bounded))}
-        m, p = len(matrices["B"][0]) if matrices["B"] else 0, len(matrices.get("C", ()))
-        sizes.add((m, p))
-        for key, rows, columns in (("A", n, n), ("B", n, m), ("C", p, n), ("D", p, m)):
-            if key in matrices:
-                expect_shape(matrices[key], rows, columns, f"{where}.{key}")
-        if len(sizes) > 1 or m < k or (bounded and (m == k or p == 0)):
-            raise InputError(f"{m} inputs and {p} outputs", where=where,
-                             expected=f"the same at every vertex, {k} inputs for control"
-                                      + (", a disturbance and a performance output" if bounded else ""))
-        loops.append(_loop(matrices, F, m - k, time))
-    (m, p), = sizes
-    return tuple(loops), m, k, p
-
-
-def _loop(matrices: Mapping[str, Rows], F: fmpq_mat, w: int, time: fmpq) -> LinearSystem:
-    """Return A + B2 F, B1, C + D2 F, D1, exactly; one row and column of zeros where there is no w or z."""
-    n = len(matrices["A"])
-    B1, B2 = _columns(matrices["B"], w)
-    A = _rows(_dense(matrices["A"], n, n) + _dense(B2, n, F.nrows()) * F)
-    p = len(matrices.get("C", ()))
-    if not w or not p:
-        return LinearSystem(A, ((fmpq(0),),) * n, ((fmpq(0),) * n,), ((fmpq(0),),), time)
-    D1, D2 = _columns(matrices["D"], w)
-    return LinearSystem(A, B1, _rows(_dense(matrices["C"], p, n) + _dense(D2, p, F.nrows()) * F), D1, time)
-
-
-def _columns(matrix: Rows, count: int) -> tuple[Rows, Rows]:
-    return tuple(row[:count] for row in matrix), tuple(row[count:] for row in matrix)
-
-
-def _dense(matrix: Rows, rows: int, columns: int) -> fmpq_mat:
-    return fmpq_mat(rows, columns, [entry for row in matrix for entry in row])
-
-
-def _rows(matrix: fmpq_mat) -> Rows:
-    return tuple(tuple(row) for row in matrix.tolist())
+    return Polytope(closed, measure, rate, bound, poles, moving, matrices, slack)
 
 
 def _square(value: Any, n: int, where: str) -> Rows:
@@ -175,12 +120,19 @@ def _read_region(table: Mapping[str, Any], discrete: bool) -> Region:
 
 def claim(problem: Polytope, machine: str) -> str:
     """Return the one sentence the data give."""
+    closed = problem.closed
     time = f"sampled at {decimal(problem.loops[0].sample_time)} s" if problem.discrete else "continuous"
-    sizes = (f"{_plural(problem.states, 'state')}, {_plural(problem.inputs, 'input')}, the last {problem.n_ctrl} for "
-             "control")
-    sizes += f", {_plural(problem.outputs, 'output')}" if problem.outputs else ""
-    return (f"The state feedback u = F x as given, {time}, stabilizes {_say_plants(problem)} in the convex hull "
-            f"of {_plural(len(problem.loops), 'vertex', 'vertices')} as given ({sizes}) (machine {machine}), nominal "
+    who = f"The state feedback u = F x as given, {time},"
+    sizes = (f"{_plural(closed.plant_states, 'state')}, {_plural(closed.inputs, 'input')}, the last {closed.n_ctrl} "
+             "for control")
+    sizes += f", {_plural(closed.outputs, 'output')}" if closed.outputs else ""
+    if closed.measured:
+        who = (f"The controller u = K(w) y, {time}, the average of {_plural(len(problem.loops), 'controller')} as "
+               "given with the weights w of the plant,")
+        sizes += (f", the last {closed.measured} measured; controllers of "
+                  f"{_plural(closed.states - closed.plant_states, 'state')}; x: states of plant and controller")
+    return (f"{who} stabilizes {_say_plants(problem)} in the convex hull of "
+            f"{_plural(len(problem.loops), 'vertex', 'vertices')} as given ({sizes}) (machine {machine}), nominal "
             f"parameters: {_say_measure(problem)}.")
 
 

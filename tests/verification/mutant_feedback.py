@@ -1,4 +1,4 @@
-"""Certificates of state feedback over hulls that just hold; falsifiers: plants drawn from the hull, moving weights."""
+"""Certificates of feedback over hulls that just hold; falsifiers: plants drawn from the hull, moving weights."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ def _array(value: object) -> np.ndarray:
 
 def loops(system: Document, weights: np.ndarray | None = None) -> list[Document]:
     """Loops at the vertices, or at plants of the hull with these weights (rows), in floats."""
+    if "controller" in system:
+        return _scheduled_loops(system, weights)
     F, k = _array(system["gain"]), len(system["gain"])
     vertices = [{key: _array(one[key]) for key in one} for one in system["vertices"]]
     weights = np.eye(len(vertices)) if weights is None else weights
@@ -30,10 +32,64 @@ def loops(system: Document, weights: np.ndarray | None = None) -> list[Document]
     return found
 
 
-def make_polytope(rng: np.random.Generator) -> Document:
+def _scheduled_loops(system: Document, weights: np.ndarray | None) -> list[Document]:
+    """Plants and controllers are averaged, then joined: whether that is the average of the loops is not presumed."""
+    q, k = int(truth.number(system["n_meas"])), int(truth.number(system["n_ctrl"]))
+    weights, found = np.eye(len(system["vertices"])) if weights is None else weights, []
+    for row in weights:
+        (A, B, C, D), (AK, BK, CK, DK) = (
+            [sum(w * _shaped(one, key) for w, one in zip(row, system[name], strict=True)) for key in "ABCD"]
+            for name in ("vertices", "controller"))
+        m, p, n, s = B.shape[1] - k, len(C) - q, len(A), len(AK)
+        E = np.linalg.inv(np.eye(k) - DK @ D[p:, m:])
+        u = np.hstack([E @ DK @ C[p:], E @ CK, E @ DK @ D[p:, :m]])
+        y = np.hstack([C[p:], np.zeros((q, s)), D[p:, :m]]) + D[p:, m:] @ u
+        moved = np.vstack([np.hstack([A, np.zeros((n, s)), B[:, :m]]) + B[:, m:] @ u,
+                           np.hstack([np.zeros((s, n)), AK, np.zeros((s, m))]) + BK @ y])
+        seen = np.hstack([C[:p], np.zeros((p, s)), D[:p, :m]]) + D[:p, m:] @ u
+        found.append({"A": moved[:, :n + s], "B": moved[:, n + s:], "C": seen[:, :n + s], "D": seen[:, n + s:]})
+    return found
+
+
+def _shaped(one: Document, key: str) -> np.ndarray:
+    p, m, n = len(one["D"]), len(one["D"][0]), len(one["A"])
+    return _array(one[key]).reshape({"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}[key])
+
+
+def _scheduled_system(rng: np.random.Generator, measure: str, dt: float) -> Document:
+    """Plants and controllers that vary; of factors that meet in a product one is common to all vertices."""
+    n, s, count, q, k = (int(rng.integers(low, high)) for low, high in ((1, 3), (0, 3), (1, 4), (1, 3), (1, 3)))
+    m, p, spread = 1, 1, 0.05
+    A, B, C = (rng.standard_normal(shape) for shape in ((n, n), (n, m + k), (p + q, n)))
+    A = 0.6 * A / max(np.abs(np.linalg.eigvals(A)).max(), 0.1) if dt else A - (
+        np.linalg.eigvals(A).real.max() + 0.8) * np.eye(n)
+    D = 0.3 * rng.standard_normal((p + q, m + k))
+    D[p:, m:] = 0
+    if measure == "h2" and not dt:
+        D[:, :m] = 0
+    AK = (0.4 if dt else -0.9) * np.eye(s)
+    BK, CK, DK = (0.2 * rng.standard_normal(shape) for shape in ((s, q), (k, s), (k, q)))
+    if rng.random() < 0.3:
+        DK, D[p:, m:] = 0 * DK, 0.3 * rng.standard_normal((q, k))
+    acts = rng.random() < 0.5  # B2 and D12 vary, or C_K
+    vertices, controllers = [], []
+    for _ in range(count):
+        other = [part + spread * rng.standard_normal(part.shape) for part in (A, B, C, D)]
+        if not acts:
+            other[1][:, m:], other[3][:p, m:] = B[:, m:], D[:p, m:]
+        other[2][p:], other[3][p:] = C[p:], D[p:]
+        if measure == "h2" and not dt:
+            other[3][:p, :m] = 0
+        vertices.append({key: np.round(part, 3).tolist() for key, part in zip("ABCD", other, strict=True)})
+        own = [AK + spread * rng.standard_normal(AK.shape), BK + spread * rng.standard_normal(BK.shape),
+               CK + (0 if acts or D[p:, m:].any() else spread) * rng.standard_normal(CK.shape), DK]
+        controllers.append({key: np.round(part, 3).tolist() for key, part in zip("ABCD", own, strict=True)})
+    return {"vertices": vertices, "controller": controllers, "n_meas": q, "n_ctrl": k, "sample_time": dt}
+
+
+def _feedback_system(rng: np.random.Generator, measure: str, dt: float) -> Document:
     n, k, count = int(rng.integers(1, 4)), int(rng.integers(1, 3)), int(rng.integers(1, 4))
-    m, p, dt = int(rng.integers(1, 3)), int(rng.integers(1, 3)), float(rng.choice([0.0, 0.2]))
-    measure = str(rng.choice(["stability", "stability", "hinf", "h2", "region"]))
+    m, p = int(rng.integers(1, 3)), int(rng.integers(1, 3))
     A, B = rng.standard_normal((n, n)), rng.standard_normal((n, m + k))
     modes = np.linalg.eigvals(A)
     A = 0.7 * A / max(np.abs(modes).max(), 0.1) if dt else A - (modes.real.max() + 0.6) * np.eye(n)
@@ -46,8 +102,14 @@ def make_polytope(rng: np.random.Generator) -> Document:
         if measure in ("hinf", "h2"):
             one |= {"C": np.round(C, 3).tolist(), "D": np.round(D, 3).tolist()}
         vertices.append(one)
-    system = {"vertices": vertices, "gain": F.tolist(), "sample_time": dt}
+    return {"vertices": vertices, "gain": F.tolist(), "sample_time": dt}
+
+
+def make_polytope(rng: np.random.Generator) -> Document:
+    measure, dt = str(rng.choice(["stability", "stability", "hinf", "h2", "region"])), float(rng.choice([0.0, 0.2]))
+    system = (_scheduled_system if rng.random() < 0.5 else _feedback_system)(rng, measure, dt)
     closed = loops(system)
+    n, count = len(closed[0]["A"]), len(closed)
     P = gramian(sum(one["A"] for one in closed) / count, np.eye(n), dt > 0)
     if not np.linalg.eigvalsh(P)[0] > 0:
         return make_polytope(rng)

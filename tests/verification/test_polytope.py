@@ -63,6 +63,87 @@ def test_a_hull_with_an_unstable_plant_inside_is_never_certified():
         assert not made(system, {"rate": 0}, {"matrices": P, "slack": rng.standard_normal((4, 2)).tolist()}).holds
 
 
+# x' = a x + w + u, z = y = x, a from -2 to 2; x_K' = -2 x_K + 3 y, u = -x_K - (1 + a) y: the same loop everywhere
+SCHEDULED = {"vertices": [{"A": [[a]], "B": [[1, 1]], "C": [[1], [1]], "D": [[0, 0], [0, 0]]} for a in (-2, 2)],
+             "controller": [{"A": [[-2]], "B": [[3]], "C": [[-1]], "D": [[d]]} for d in (1, -3)],
+             "n_meas": 1, "n_ctrl": 1, "sample_time": 0}
+
+
+def test_bounds_of_a_scheduled_loop_are_decided_to_a_thousandth():
+    """P by a Riccati equation of the loop [[-1, -1], [3, -2]], its norm by its transfer function."""
+    from scipy.linalg import solve_continuous_are
+    A, B, C = np.array([[-1.0, -1], [3, -2]]), np.array([[1.0], [0]]), np.array([[1.0, 0]])
+    w = np.linspace(0, 20, 20001)
+    norm = max(abs((1j * w + 2) / ((1j * w + 1) * (1j * w + 2) + 3)))
+    bound = 1.001 * norm
+    P = solve_continuous_are(A, B, C.T @ C + 1e-9 * np.eye(2), -(bound * (1 - 1e-5)) ** 2 * np.eye(1))
+    region = {"measure": "hinf", "bound": bound}
+    held = made(SCHEDULED, region, {"matrix": ((P + P.T) / 2).tolist()})
+    assert held.holds and "The controller u = K(w) y, continuous, the average of 2 controllers" in held.claim
+    assert "the last 1 measured; controllers of 1 state; x: states of plant and controller" in held.claim
+    for scale in np.geomspace(0.3, 3, 15):
+        assert not made(SCHEDULED, {"measure": "hinf", "bound": 0.999 * norm},
+                        {"matrix": (scale * (P + P.T) / 2).tolist()}).holds
+
+
+def changed(path, value):
+    system = copy.deepcopy(SCHEDULED)
+    place = system
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return system
+
+
+@pytest.mark.parametrize(("path", "value", "words"), [
+    (("vertices", 1, "B"), [[1, 2]], r"\[B2; D12\] D_K \[C2 D21\]|more than one factor"),
+    (("vertices", 1, "C"), [[1], [2]], "product .B2; D12. D_K .C2 D21. has more than one"),
+    (("vertices", 1, "D"), [[0, 0], [1, 0]], "product .B2; D12. D_K .C2 D21. has more than one"),
+    (("vertices", 0, "D"), [[0, 0], [0, 1]], "neither D22 nor D_K"),
+    (("controller", 1), {"A": [[-2]], "B": [[3]], "C": [[-1]], "D": [[-3, 0]]}, "different sizes|columns|numbers"),
+    (("n_meas",), 2, "1 inputs|2 measurements"), (("n_meas",), 3, "1 to 2"), (("n_ctrl",), 0.5, "whole number"),
+    (("controller",), [SCHEDULED["controller"][0]], "one per vertex"), (("vertices",), [], "at least one vertex"),
+    (("gain",), [[1]], "unknown key")])
+def test_scheduled_loops_that_are_no_averages_are_refused(path, value, words):
+    system = changed(path, value)
+    if path == ("vertices", 1, "B"):
+        system["controller"][1] |= {"C": [[-2]], "D": [[1]]}
+    with pytest.raises(InputError, match=words):
+        made(system, {"rate": 0}, {"matrix": [[1, 0], [0, 1]]})
+
+
+def test_each_product_may_have_one_factor_that_varies():
+    """B2 varies with C_K and D_K common, C2 with B_K and D_K common, D22 with D_K = 0 and B_K, C_K common."""
+    for path, value in ((("vertices", 1, "A"), [[1]]), (("controller", 1, "D"), [[-4]]),
+                        (("controller", 1, "C"), [[-0.5]]), (("controller", 1, "B"), [[2.5]])):
+        assert made(changed(path, value), {"rate": 0}, {"matrix": [[3, 0], [0, 1]]}).holds, path
+    common = changed(("controller", 1), SCHEDULED["controller"][1])
+    common["controller"] = [common["controller"][1]] * 2
+    for path, value in (("B", [[1, 1.5]]), ("C", [[1], [1.2]])):
+        common["vertices"][1][path] = value
+        assert made(common, {"rate": 0}, {"matrix": [[3, 0], [0, 1]]}).holds, path
+        common["vertices"][1][path] = SCHEDULED["vertices"][1][path]
+    passed = changed(("vertices", 1, "D"), [[0, 0], [0, 0.5]])
+    for own in passed["controller"]:
+        own |= {"B": [[0.5]], "D": [[0]]}
+    passed["vertices"][1]["A"] = [[-1]]
+    assert made(passed, {"rate": 0}, {"matrix": [[1, 0], [0, 1]]}).holds
+    passed["controller"][1]["B"] = [[0.25]]
+    with pytest.raises(InputError, match="B_K D22 C_K"):
+        made(passed, {"rate": 0}, {"matrix": [[1, 0], [0, 1]]})
+
+
+def test_controllers_that_only_work_at_their_vertices_are_never_certified():
+    """x' = a x + b u, b = 1 or -1, u = -3 b x: both loops decay, the mean of the plants with the mean gain does not."""
+    system = {"vertices": [{"A": [[1]], "B": [[b]], "C": [[1]], "D": [[0]]} for b in (1, -1)],
+              "controller": [{"A": [], "B": [], "C": [[]], "D": [[-3 * b]]} for b in (1, -1)],
+              "n_meas": 1, "n_ctrl": 1, "sample_time": 0}
+    with pytest.raises(InputError, match="more than one factor"):
+        made(system, {"rate": 0}, {"matrix": [[1]]})
+    system["controller"] = [system["controller"][0]] * 2  # one gain for both: the loops themselves say no
+    assert not made(system, {"rate": 0}, {"matrix": [[1]]}).holds
+
+
 def constant_only():
     """Stiffness 1 or 4: constant plants decay, one that switches in resonance grows; P_i and G found with a solver."""
     from robthermal.synthesis._slack_program import slack_matrices

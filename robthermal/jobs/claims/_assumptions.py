@@ -51,8 +51,10 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
     "frequency": (_LINEAR,),
     "closed_loop": (_LINEAR, "The controller runs with the numbers of the certificate file, without limits or delays "
                     "beyond those of the plant."),
-    "polytope": ("The plant is linear at every moment and lies in the convex hull of the vertices; its states are "
-                 "measured.", "The gain runs with the numbers of the certificate file, without limits or delays."),
+    "polytope": ("The plant is linear at every moment and lies in the convex hull of the vertices; the states that a "
+                 "state feedback reads are measured.",
+                 "Gain or controllers run with the numbers of the certificate file, without limits or delays; "
+                 "controllers are averaged with the weights of the plant at that moment."),
     "ellipsoid": ("The plant is linear at every moment and lies in the convex hull of the vertices; disturbances stay "
                   "within what the sentence says.", "The controller runs with the numbers of the certificate file, "
                   "without delays, and without limits other than those of the sentence."),
