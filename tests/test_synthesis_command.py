@@ -166,6 +166,33 @@ def test_state_feedback_for_vertices(run, tmp_path):
     assert far.status == 1 and "at the mean of vertices 1 and 2" in " ".join((far.out + far.err).split())
 
 
+LPV = """
+[plant]
+n_meas = 1
+n_ctrl = 1
+vertices = [
+    { A = [[-1.0]], B = [[1, 0, 1]], C = [[1], [0], [1]], D = [[0, 0, 0], [0, 0, 1], [0, 1, 0]] },
+    { A = [[1.0]], B = [[1, 0, 1]], C = [[1], [0], [1]], D = [[0, 0, 0], [0, 0, 1], [0, 1, 0]] },
+]
+[design]
+scheduling = { a = [-1.0, 1.0] }
+"""
+
+
+def test_a_scheduled_controller_for_vertices(run, tmp_path):
+    done = design_by(run, tmp_path, LPV, "lpv")
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    saved = rt.Certificate.load(tmp_path / "out" / "certificates" / "1_hinf.json")
+    assert rt.verify(saved).valid and len(design["controllers"]) == 2 and 2.73 < design["value"] < 2.77
+    assert saved.system["controller"][1]["A"] == design["controllers"][1]["A"]
+    assert "averaged with the weights of the plant" in (tmp_path / "out" / "report.html").read_text()
+    assert run("verify", "--second", str(tmp_path / "out" / "certificates" / "1_hinf.json")).status == 0
+    (tmp_path / "low").mkdir()
+    low = design_by(run, tmp_path / "low", LPV + "gamma = 2.5\n", "lpv")
+    assert low.status == 1 and "best achievable with one quadratic form" in " ".join((low.out + low.err).split())
+
+
 def test_scheduled_currents_of_a_system(run, tmp_path):
     (tmp_path / "setup.toml").write_text(SETUP)
     done = design_by(run, tmp_path, SCHEDULED, "tem")
@@ -185,6 +212,8 @@ def test_scheduled_currents_of_a_system(run, tmp_path):
 @pytest.mark.parametrize(("content", "method", "words"), [
     (VERTICES.replace("rate", "speed"), "polytope", "'speed'"), (VERTICES, "hinf", "needs a plant"),
     (VERTICES.replace("[[0.0], [1.0]] }, {", "[[0.0]] }, {"), "polytope", "vertices[0]"),
+    (LPV.replace("scheduling", "schedule"), "lpv", "'schedule'"),
+    (LPV.split("[design]")[0], "lpv", "design.scheduling"), (PLANT, "lpv", "vertices"), (LPV.replace("[-1.0, 1.0]", "[1.0]"), "lpv", "values for 2 plants"),
     (VERTICES.replace("n_ctrl = 1", "n_ctrl = 3"), "polytope", "n_ctrl = 3"), (VERTICES, "tem", "thermal system"),
     (SCHEDULED, "tem", "setup.toml"), (SCHEDULED.replace("current =", "currents ="), "tem", "currents"),
     (SCHEDULED.replace("file =", "path ="), "tem", "path"), (PLANT.replace("n_meas = 1", ""), "hinf", "n_meas")])

@@ -244,7 +244,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
                help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, mu, output-feedback, "
-               "frf-pid, polytope, tem: a synthesis for PLANT.toml (docs/command_line.md), no other options.")
+               "frf-pid, polytope, lpv, tem: a synthesis for PLANT.toml (docs/command_line.md), no other options.")
            ] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",

@@ -14,11 +14,13 @@ from ._frf_pid import FrfDesign as FrfDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
+from ._lpv import lpv as lpv
+from ._lpv_design import LpvDesign as LpvDesign
 from ._mixed import mixed as mixed
 from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 
-__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "RobustAgainst", "SynthesisCode",
-           "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid", "mixed", "mu_synthesis", "output_feedback",
-           "polytopic_feedback"]
+__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "RobustAgainst", "SynthesisCode",
+           "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid", "lpv", "mixed", "mu_synthesis",
+           "output_feedback", "polytopic_feedback"]

@@ -43,8 +43,11 @@ static inline void {p}_step({p}_state *s, const double y[{n_y}], double u[{n_u}]
 
 
 def export_design(controller: control.StateSpace, facts: Mapping[str, Any], certificates: Sequence[Certificate],
-                  path: str | Path, name: str) -> None:
-    """Write one file, or a folder with all of them; `facts`: what design.json says beside the controller."""
+                  path: str | Path, name: str, source: bool = True) -> None:
+    """Write one file, or a folder with all of them; `facts`: what design.json says beside the controller.
+
+    `source`: whether a folder gets C source of a sampled controller.
+    """
     content = document(controller, name) | dict(facts)
     if Path(path).suffix:
         if controller.dt:
@@ -62,7 +65,7 @@ def export_design(controller: control.StateSpace, facts: Mapping[str, Any], cert
     for k, certificate in enumerate(certificates):
         measure = certificate.region.get("measure", certificate.kind)
         certificate.save(folder / "certificates" / f"{k + 1}_{measure}.json")
-    if controller.dt:
+    if controller.dt and source:
         for suffix in (".c", ".h"):
             write(folder / f"controller{suffix}", program(controller, name).text().encode("ascii"))
 

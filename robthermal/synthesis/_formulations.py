@@ -5,6 +5,7 @@ Nothing here is evidence; what comes out is a number or gains. Continuous time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import cvxpy
@@ -27,18 +28,28 @@ def hinf_level(plant: GeneralizedPlant) -> float:
     Minimize γ over R, S = R', S' with [R 1; 1 S] >= 0 and, N_R, N_S bases of the kernels of [B2' D12'], [C2 D21]:
     diag(N_R, 1)' [AR + RA', RC1', B1; ., -γ, D11; ., ., -γ] diag(N_R, 1) <= 0 and its dual.
     """
-    p = balanced(plant)
-    n, m, q = len(p.A), p.B1.shape[1], len(p.C1)
+    return lpv_level([balanced(plant)])
+
+
+def lpv_level(plants: Sequence[GeneralizedPlant]) -> float:
+    """Smallest bound of any scheduled controller with one quadratic form: Apkarian, Gahinet and Becker (1995).
+
+    The inequalities of `hinf_level` at every vertex, with the same R and S; B2, C2, D12, D21 common, D22 = 0.
+    """
+    n = len(plants[0].A)
     R, S, level = cp.Variable((n, n), symmetric=True), cp.Variable((n, n), symmetric=True), cp.Variable()
-    controls = cp.bmat([[p.A @ R + R @ p.A.T, R @ p.C1.T, p.B1], [p.C1 @ R, -level * np.eye(q), p.D11],
-                        [p.B1.T, p.D11.T, -level * np.eye(m)]])
-    measured = cp.bmat([[p.A.T @ S + S @ p.A, S @ p.B1, p.C1.T], [p.B1.T @ S, -level * np.eye(m), p.D11.T],
-                        [p.C1, p.D11, -level * np.eye(q)]])
-    outer_R = _outer(np.hstack([p.B2.T, p.D12.T]), m)
-    outer_S = _outer(np.hstack([p.C2, p.D21]), q)
     eye = np.eye(n)
-    return _minimum(level, [_negative(outer_R.T @ controls @ outer_R), _negative(outer_S.T @ measured @ outer_S),
-                            cp.bmat([[R, eye], [eye, S]]) >> 0])
+    constraints = [cp.bmat([[R, eye], [eye, S]]) >> 0]
+    for p in plants:
+        m, q = p.B1.shape[1], len(p.C1)
+        controls = cp.bmat([[p.A @ R + R @ p.A.T, R @ p.C1.T, p.B1], [p.C1 @ R, -level * np.eye(q), p.D11],
+                            [p.B1.T, p.D11.T, -level * np.eye(m)]])
+        measured = cp.bmat([[p.A.T @ S + S @ p.A, S @ p.B1, p.C1.T], [p.B1.T @ S, -level * np.eye(m), p.D11.T],
+                            [p.C1, p.D11, -level * np.eye(q)]])
+        outer_R = _outer(np.hstack([p.B2.T, p.D12.T]), m)
+        outer_S = _outer(np.hstack([p.C2, p.D21]), q)
+        constraints += [_negative(outer_R.T @ controls @ outer_R), _negative(outer_S.T @ measured @ outer_S)]
+    return _minimum(level, constraints)
 
 
 def h2_level(plant: GeneralizedPlant) -> float:

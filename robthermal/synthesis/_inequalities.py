@@ -51,8 +51,8 @@ def solved_for(plant: GeneralizedPlant, aims: Aims, known: Plant) -> Plant | Non
     T = coordinates(plant, known)
     if T is None:
         return None
-    aims = replace(aims, norm2=_moved(aims.norm2, T), norminf=_moved(aims.norminf, T))
-    own = _moved(plant, T)
+    aims = replace(aims, norm2=moved(aims.norm2, T), norminf=moved(aims.norminf, T))
+    own = moved(plant, T)
     assert own is not None
     unknowns = _unknowns(own, aims)
     inequalities = [unknowns.inequality(form, _MARGIN) for form in _forms(aims, own)]
@@ -62,7 +62,7 @@ def solved_for(plant: GeneralizedPlant, aims: Aims, known: Plant) -> Plant | Non
         return None
     found = _apart(unknowns, inequalities, cost, first.value, len(own.A))
     for x in (found, first.x):
-        K = None if x is None else _controller(own, unknowns.matrices(x))
+        K = None if x is None else rebuilt(own, unknowns.matrices(x))
         if K is not None:
             return with_direct_path(K, plant.D22)
     return None
@@ -94,7 +94,8 @@ def coordinates(plant: GeneralizedPlant, K: Plant) -> Array | None:
     return T if np.isfinite(T).all() and np.linalg.cond(T) < 1e12 else None
 
 
-def _moved(plant: GeneralizedPlant | None, T: Array) -> GeneralizedPlant | None:
+def moved(plant: GeneralizedPlant | None, T: Array) -> GeneralizedPlant | None:
+    """The plant with states x = T x̂."""
     if plant is None:
         return None
     into = np.linalg.inv(T)
@@ -133,7 +134,7 @@ def _forms(aims: Aims, plant: GeneralizedPlant) -> Iterator[Callable[[Matrices],
         yield lambda v: _trace(two, v)
     if aims.norminf is not None:
         inf, level = aims.norminf, aims.level
-        yield lambda v: _bounded_real(inf, v, level)
+        yield lambda v: bounded_real(inf, v, level)
     if aims.poles:
         yield from _region(plant, aims.poles)
     yield lambda v: symmetric([[v["X"], np.eye(len(plant.A))], [v["Y"]]])
@@ -154,7 +155,8 @@ def _trace(plant: GeneralizedPlant, v: Matrices) -> Array:
     return symmetric([[v["Q"], C], [P]])
 
 
-def _bounded_real(plant: GeneralizedPlant, v: Matrices, level: float | None) -> Array:
+def bounded_real(plant: GeneralizedPlant, v: Matrices, level: float | None) -> Array:
+    """Positive where the norm of the loop stays below the level, or below the root of the unknown g."""
     P, A, B, C, D = _loop(plant, v)
     square = float(v["g"][0, 0]) if level is None else level**2  # with 1, level²: implies the gramian's of the H2 norm
     top, bottom = np.eye(B.shape[1]), square * np.eye(len(C))
@@ -198,13 +200,19 @@ def _vector(unknowns: Unknowns, v: Matrices) -> Array:
     return np.concatenate([v[name][rows, columns] for name, (_, rows, columns, _, _) in unknowns.places.items()])
 
 
-def _controller(plant: GeneralizedPlant, v: Matrices) -> Plant | None:
+def factors(X: Array, Y: Array) -> tuple[Array, Array] | None:
+    """N, M with N M' = 1 - YX; None where that is singular."""
+    U, sigma, Vt = svd(np.eye(len(X)) - Y @ X)
+    return None if sigma[-1] < 1e-9 else (U * np.sqrt(sigma), Vt.T * np.sqrt(sigma))
+
+
+def rebuilt(plant: GeneralizedPlant, v: Matrices) -> Plant | None:
     """K by N M' = 1 - YX; None where 1 - YX is singular or numbers are none."""
     X, Y, D = v["X"], v["Y"], v["D"]
-    U, sigma, Vt = svd(np.eye(len(X)) - Y @ X)
-    if sigma[-1] < 1e-9:
+    parts = factors(X, Y)
+    if parts is None:
         return None
-    N, M = U * np.sqrt(sigma), Vt.T * np.sqrt(sigma)
+    N, M = parts
     try:
         C = np.linalg.solve(M, (v["C"] - D @ plant.C2 @ X).T).T
         B = np.linalg.solve(N, v["B"] - Y @ plant.B2 @ D)

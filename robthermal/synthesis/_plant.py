@@ -47,9 +47,9 @@ def split(plant: Plant, n_meas: int, n_ctrl: int) -> GeneralizedPlant:
                             D[p:, :m], D[p:, m:], plant.dt)
 
 
-def read_generalized(system: Any, n_meas: int, n_ctrl: int) -> GeneralizedPlant:
+def read_generalized(system: Any, n_meas: int, n_ctrl: int, where: str = "argument P") -> GeneralizedPlant:
     """Check a generalized plant, and that some controller stabilizes it."""
-    plant = read_plant(system, "argument P")
+    plant = read_plant(system, where)
     for name, value, count, what in (("n_meas", n_meas, plant.D.shape[0], "outputs"),
                                      ("n_ctrl", n_ctrl, plant.D.shape[1], "inputs")):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
@@ -59,11 +59,11 @@ def read_generalized(system: Any, n_meas: int, n_ctrl: int) -> GeneralizedPlant:
                              expected=f"from 1 to {count - 1}, so that one is left for the performance",
                              remedy=f"The last {name} {what} of P belong to the controller.")
     found = split(plant, int(n_meas), int(n_ctrl))
-    check_modes(found)
+    check_modes(found, where)
     return found
 
 
-def check_modes(plant: GeneralizedPlant) -> None:
+def check_modes(plant: GeneralizedPlant, where: str = "argument P") -> None:
     """Refuse a plant with an unstable mode that the controls do not reach or the measurements do not see."""
     own = balanced(plant)
     for A, B, word, remedy in ((own.A, own.B2, "not stabilisable", "Add or move a control, or leave the mode out."),
@@ -71,7 +71,7 @@ def check_modes(plant: GeneralizedPlant) -> None:
         mode = hidden_mode(A, B, plant.dt)
         if mode is not None:
             cause = "no control reaches it" if word == "not stabilisable" else "no measurement sees it"
-            raise InputError(f"{word}: the mode at {say_mode(mode, plant.dt)}; {cause}", where="argument P",
+            raise InputError(f"{word}: the mode at {say_mode(mode, plant.dt)}; {cause}", where=where,
                              expected="every unstable mode within reach of the controls and seen by the measurements",
                              remedy=remedy)
 

@@ -97,8 +97,8 @@ def _content(section: Any) -> list[Any]:
                 *(table.get(key, {}) for key in ("measured", "controller", "performance")),
                 get(table, "sample_time", "system")]
     if "vertices" in table:
-        keys = ["controller", "n_meas", "n_ctrl"] if "n_meas" in table else ["gain"]
-        return [Name("polytope"), *(get(table, key, "system") for key in ("vertices", *keys, "sample_time"))]
+        own = ["controller", "n_meas", "n_ctrl"] if "n_meas" in table else ["gain"]
+        return [Name("polytope"), *(get(table, key, "system") for key in ("vertices", *own, "sample_time"))]
     for family, keys in _SIZES.items():
         if keys[0] in table:
             return [Name(family), *(get(table, key, "system") for key in keys)]

@@ -137,7 +137,7 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
         raise ValueError("one of the tables is there")
     if found.plant.vertices:
         plants = tuple(_vertex(place, k, one, float(found.plant.dt)) for k, one in enumerate(found.plant.vertices))
-        return SynthesisJob(None, 1, found.plant.n_ctrl, None, found.design, (place,), plants)
+        return SynthesisJob(None, found.plant.n_meas or 1, found.plant.n_ctrl, None, found.design, (place,), plants)
     if found.plant.n_meas is None:
         raise InputError("key plant.n_meas is missing", where=str(place), remedy=_REMEDY)
     plant, files = _plant(place, found.plant)

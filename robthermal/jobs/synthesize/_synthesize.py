@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from ...design import (
     frf_pid,
     h2,
     hinf,
+    lpv,
     mixed,
     mu_synthesis,
     output_feedback,
@@ -24,10 +25,18 @@ from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "tem")
+METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "lpv", "tem")
+
+
+def _lpv(plants: Sequence[Any], n_meas: int, n_ctrl: int, *, scheduling: Mapping[str, Sequence[float]],
+         rates: Mapping[str, float] | None = None, gamma: float | None = None) -> Design:
+    """`lpv` with its scheduling among the keys of table [design]."""
+    return lpv(plants, scheduling, n_meas, n_ctrl, rates=rates, gamma=gamma)
+
+
 _VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "mu": mu_synthesis,
                                            "output-feedback": output_feedback, "frf-pid": frf_pid,
-                                           "polytope": polytopic_feedback, "tem": tem_feedback}
+                                           "polytope": polytopic_feedback, "lpv": _lpv, "tem": tem_feedback}
 _TITLES = {"frequency": "Structured singular value", "hinf": "H-infinity norm", "h2": "H2 norm",
            "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain",
            "scheduled": "From every start in the ellipsoid"}
@@ -116,6 +125,11 @@ def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:
             raise InputError("method tem needs a thermal system", where=f"{job.files[0]}",
                              expected="a table [system] with file and box")
         return (job.system,)
+    if method == "lpv":
+        if not job.plants:
+            raise InputError("method lpv needs plants at vertices", where=f"{job.files[0]}",
+                             expected="a table [plant] with vertices, n_meas and n_ctrl")
+        return list(job.plants), job.n_meas, job.n_ctrl
     if method == "polytope" and (job.plants or job.plant is not None):
         return list(job.plants) or [job.plant], job.n_ctrl
     if job.plant is None:

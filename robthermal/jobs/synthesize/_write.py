@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...design import FeedbackDesign
+from ...design import Design, FeedbackDesign, LpvDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
 from ..claims import ARITHMETIC, GateCode, kind_assumptions, machine_assumptions
@@ -66,9 +66,14 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
                     gate=tuple(_remarks(result)), gates=(GateCode.AT_THE_BINS.code,), data=data)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
-        for name in ("design.json", *(("controller.c", "controller.h") if design.controller.dt else ())):
+        for name in ("design.json", *(("controller.c", "controller.h") if _programmed(design) else ())):
             design.export(folder / name)
     return report
+
+
+def _programmed(design: Design) -> bool:
+    """Whether there is C source: of one sampled controller, not of a scheduled one."""
+    return bool(design.controller.dt) and not isinstance(design, LpvDesign)
 
 
 def _assumed(result: Synthesis) -> tuple[str, ...]:
