@@ -92,7 +92,8 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign RobustAgainst SynthesisCode anti_windup frf_pid h2 hinf
+        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign RobustAgainst SynthesisCode anti_windup frf_pid h2
+        hinf
         invariant_ellipsoid lpv mixed mu_synthesis output_feedback polytopic_feedback
     """,
     "systems": """

@@ -213,7 +213,8 @@ def test_scheduled_currents_of_a_system(run, tmp_path):
     (VERTICES.replace("rate", "speed"), "polytope", "'speed'"), (VERTICES, "hinf", "needs a plant"),
     (VERTICES.replace("[[0.0], [1.0]] }, {", "[[0.0]] }, {"), "polytope", "vertices[0]"),
     (LPV.replace("scheduling", "schedule"), "lpv", "'schedule'"),
-    (LPV.split("[design]")[0], "lpv", "design.scheduling"), (PLANT, "lpv", "vertices"), (LPV.replace("[-1.0, 1.0]", "[1.0]"), "lpv", "values for 2 plants"),
+    (LPV.split("[design]")[0], "lpv", "design.scheduling"), (PLANT, "lpv", "vertices"),
+    (LPV.replace("[-1.0, 1.0]", "[1.0]"), "lpv", "values for 2 plants"),
     (VERTICES.replace("n_ctrl = 1", "n_ctrl = 3"), "polytope", "n_ctrl = 3"), (VERTICES, "tem", "thermal system"),
     (SCHEDULED, "tem", "setup.toml"), (SCHEDULED.replace("current =", "currents ="), "tem", "currents"),
     (SCHEDULED.replace("file =", "path ="), "tem", "path"), (PLANT.replace("n_meas = 1", ""), "hinf", "n_meas")])
