@@ -11,7 +11,8 @@ from typing import Any
 from ._document import get, mapping, matrix, not_negative, numbers, only, positive, sequence
 from ._exact import ONE, ZERO, Malformed, NotCovered
 from ._lyapunov import check_work, decide
-from ._polytope import times, turned
+from ._polytope import turned
+from ._polytope_loops import times
 from ._result import Answer, not_covered, not_valid, valid
 
 Matrix = list[list[Fraction]]
