@@ -45,8 +45,8 @@ SURFACE = {
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
-        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign RobustAgainst anti_windup frf_pid h2 hinf
-        invariant_ellipsoid lpv mixed mu_synthesis output_feedback polytopic_feedback
+        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst Terminal
+        anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
     """,
     "diagnosis": """
         Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
@@ -92,9 +92,9 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
-        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign RobustAgainst SynthesisCode anti_windup frf_pid h2
-        hinf
-        invariant_ellipsoid lpv mixed mu_synthesis output_feedback polytopic_feedback
+        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
+        SynthesisCode Terminal anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc
+        mu_synthesis output_feedback polytopic_feedback
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

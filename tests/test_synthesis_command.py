@@ -193,6 +193,60 @@ def test_a_scheduled_controller_for_vertices(run, tmp_path):
     assert low.status == 1 and "best achievable with one quadratic form" in " ".join((low.out + low.err).split())
 
 
+PREDICTIVE = """
+[plant]
+A = [[0.0, 1.0], [0.0, 0.0]]
+B = [[0.0], [1.0]]
+n_ctrl = 1
+[design]
+horizon = 15
+Q = [1.0, 0.1]
+R = 0.1
+sample_time = 0.2
+limits = { control = [-1.0, 1.0], state = [[-5.0, -1.2], [5.0, 1.2]] }
+"""
+WINDUP = """
+[plant]
+A = [[-0.1]]
+B = [[0.1, 1.0]]
+C = [[1.0], [-1.0]]
+D = [[0.0, 0.0], [0.0, 0.0]]
+n_ctrl = 1
+[controller]
+A = [[-1e-3]]
+B = [[1.0]]
+C = [[0.1]]
+D = [[0.5]]
+[design]
+limits = 1.0
+"""
+
+
+def test_predictive_control_writes_its_terminal_set(run, tmp_path):
+    done = design_by(run, tmp_path, PREDICTIVE, "mpc")
+    assert done.status == 0, done.out + done.err
+    design = json.loads((tmp_path / "out" / "design.json").read_text())
+    saved = rt.Certificate.load(tmp_path / "out" / "certificates" / "1_ellipsoid.json")
+    assert rt.verify(saved).valid and saved.region["level"] == design["terminal"]["level"] == design["value"]
+    assert saved.system["controller"]["D"] == design["terminal"]["K"]
+    assert not (tmp_path / "out" / "controller.c").exists()
+    assert "quadratic program of every sample" in (tmp_path / "out" / "report.html").read_text()
+    assert run("verify", "--second", str(tmp_path / "out" / "certificates" / "1_ellipsoid.json")).status == 0
+
+
+def test_anti_windup_from_a_file(run, tmp_path):
+    done = design_by(run, tmp_path, WINDUP, "anti-windup")
+    assert done.status == 0, done.out + done.err
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "no actuator saturates" not in report and "actuators that saturate" in report
+    (tmp_path / "no").mkdir()
+    missing = design_by(run, tmp_path / "no", WINDUP.replace("controller]", "other]"), "anti-windup")
+    assert missing.status == 2
+    (tmp_path / "none").mkdir()
+    none = design_by(run, tmp_path / "none", PREDICTIVE, "anti-windup")
+    assert none.status == 2 and "[controller]" in none.out + none.err
+
+
 def test_scheduled_currents_of_a_system(run, tmp_path):
     (tmp_path / "setup.toml").write_text(SETUP)
     done = design_by(run, tmp_path, SCHEDULED, "tem")

@@ -13,10 +13,11 @@ from ._inequalities import Inequality as Inequality
 from ._inequalities import inside as inside
 from ._norms import NormBounds as NormBounds
 from ._norms import smallest_bound as smallest_bound
+from ._quadratic import Ball as Ball
 from ._quadratic import least_quadratic as least_quadratic
 from ._solver import Point as Point
 from ._sparse import group_sparse as group_sparse
 from ._stacked import strictly as strictly
 
-__all__ = ["Candidate", "ConeBounds", "Form", "Inequality", "NormBounds", "Point", "group_sparse", "inside",
+__all__ = ["Ball", "Candidate", "ConeBounds", "Form", "Inequality", "NormBounds", "Point", "group_sparse", "inside",
            "largest_margin", "least_cost", "least_quadratic", "smallest_bound", "strictly"]

@@ -1,14 +1,38 @@
-"""Least quadratic cost under linear inequalities."""
+"""Least quadratic cost under linear inequalities and one ball."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ._solver import Array, Point, nonnegative, solved
+from ._solver import Array, Point, nonnegative, second_order, solved
 
 
-def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array) -> Point:
+@dataclass(frozen=True)
+class Ball:
+    """The constraint |rows x + center| <= radius, or radius plus one of the unknowns.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (p, n)
+        Linear part of what is limited.
+    center : ndarray, shape (p,)
+        Constant part of what is limited.
+    radius : float
+        Largest Euclidean norm.
+    slack : int, optional
+        Number of the unknown that is added to the radius.
+    """
+
+    rows: Array
+    center: Array
+    radius: float
+    slack: int | None = None
+
+
+def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array, *, ball: Ball | None = None) -> Point:
     """Find x with the least x'Px/2 + cost'x under rows x <= bounds: a convex quadratic program.
 
     Parameters
@@ -21,6 +45,8 @@ def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array) -
         Left-hand sides of the inequalities.
     bounds : ndarray, shape (k,)
         Right-hand sides of the inequalities.
+    ball : Ball, optional
+        One more constraint, of a Euclidean norm.
 
     Returns
     -------
@@ -32,8 +58,19 @@ def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array) -
     >>> found = least_quadratic(np.eye(2), np.array([-2.0, 0.0]), np.array([[1.0, 1.0]]), np.array([1.0]))
     >>> print(found.x.round(4))  # of (x - 2)² + y², x + y <= 1
     [ 1.5 -0.5]
+    >>> near = Ball(np.eye(2), np.zeros(2), 1.0)
+    >>> print(least_quadratic(np.eye(2), np.array([-3.0, -4.0]), np.zeros((0, 2)), np.zeros(0), ball=near).x.round(4))
+    [0.6 0.8]
     """
-    found = solved(cost, csc_matrix(rows), bounds, [nonnegative(len(bounds))], quadratic=quadratic)
+    left, right, cones = rows, bounds, [nonnegative(len(bounds))] if len(bounds) else []
+    if ball is not None:
+        top = np.zeros((1, len(cost)))
+        if ball.slack is not None:
+            top[0, ball.slack] = -1.0
+        left = np.vstack([rows, top, -ball.rows])
+        right = np.concatenate([bounds, [ball.radius], ball.center])
+        cones.append(second_order(1 + len(ball.center)))
+    found = solved(cost, csc_matrix(left), right, cones, quadratic=quadratic)
     if not found.solved:
         return Point(np.zeros(len(cost)), np.nan, found.status, False)
     return found

@@ -5,7 +5,10 @@ from ..synthesis import FeedbackDesign as FeedbackDesign
 from ..synthesis import FrfDesign as FrfDesign
 from ..synthesis import InvariantEllipsoid as InvariantEllipsoid
 from ..synthesis import LpvDesign as LpvDesign
+from ..synthesis import MpcDesign as MpcDesign
+from ..synthesis import MpcStep as MpcStep
 from ..synthesis import RobustAgainst as RobustAgainst
+from ..synthesis import Terminal as Terminal
 from ..synthesis import anti_windup as anti_windup
 from ..synthesis import frf_pid as frf_pid
 from ..synthesis import h2 as h2
@@ -13,6 +16,7 @@ from ..synthesis import hinf as hinf
 from ..synthesis import invariant_ellipsoid as invariant_ellipsoid
 from ..synthesis import lpv as lpv
 from ..synthesis import mixed as mixed
+from ..synthesis import mpc as mpc
 from ..synthesis import mu_synthesis as mu_synthesis
 from ..synthesis import output_feedback as output_feedback
 from ..synthesis import polytopic_feedback as polytopic_feedback
@@ -92,6 +96,6 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points",
            "simulate_loop", "state_feedback", "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi",
            "unobservable"]
-__all__ += ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "RobustAgainst",  # of synthesis
-            "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid", "lpv", "mixed", "mu_synthesis",
-            "output_feedback", "polytopic_feedback"]
+__all__ += ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign",  # of synthesis
+            "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
+            "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback"]

@@ -17,10 +17,14 @@ from ._hinf import hinf as hinf
 from ._lpv import lpv as lpv
 from ._lpv_design import LpvDesign as LpvDesign
 from ._mixed import mixed as mixed
+from ._mpc import MpcDesign as MpcDesign
+from ._mpc import mpc as mpc
+from ._mpc_step import MpcStep as MpcStep
+from ._mpc_terminal import Terminal as Terminal
 from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 
-__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "RobustAgainst", "SynthesisCode",
-           "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid", "lpv", "mixed", "mu_synthesis",
-           "output_feedback", "polytopic_feedback"]
+__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep",
+           "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
+           "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback"]

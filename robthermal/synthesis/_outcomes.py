@@ -20,3 +20,6 @@ class SynthesisCode(OutcomeCode):
                      "Scale the plant, ask for a tolerance of 0.05, or simplify the weights.")
     NOT_FOUND = (False, "No stabilizing controller was found in any precision.",
                  "Scale the plant, and check weights with poles at or near the boundary of stability.")
+    STEP = (True, "The controls of one step keep every limit over the horizon.")
+    NO_STEP = (False, "From this state no controls keep every limit over the horizon; the text says which is missed.",
+               "Start closer, allow more, or predict further.")

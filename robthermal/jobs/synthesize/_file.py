@@ -56,8 +56,16 @@ class _System(Table):
     box: _Box
 
 
+class _Controller(Table):
+    A: _Matrix
+    B: _Matrix
+    C: _Matrix
+    D: _Matrix
+
+
 class _File(Table):
     plant: _Plant | None = None
+    controller: _Controller | None = None
     frf: _Response | None = None
     system: _System | None = None
     design: dict[str, Any] = Field(default_factory=dict)
@@ -72,7 +80,7 @@ class SynthesisJob:
     plant : control.StateSpace or None
         Generalized plant; None where there are vertices, a response or a system.
     n_meas, n_ctrl : int
-        Numbers of measurements and of controls; 1 each for a response.
+        Numbers of measurements and of controls; 1 each for a response, 0 measurements where the file says nothing.
     response : FrequencyResponse or None
         Measured response; None where there is a plant.
     arguments : dict
@@ -83,6 +91,8 @@ class SynthesisJob:
         Plants at the vertices of a hull; empty where there is one plant.
     system : System or None
         Thermal system whose currents are fed back.
+    controller : control.StateSpace or None
+        Controller that is given, for anti-windup.
     """
 
     plant: control.StateSpace | None
@@ -93,6 +103,7 @@ class SynthesisJob:
     files: tuple[Path, ...]
     plants: tuple[control.StateSpace, ...] = ()
     system: System | None = None
+    controller: control.StateSpace | None = None
 
 
 def read_plant_file(path: str | Path) -> SynthesisJob:
@@ -102,7 +113,8 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     ----------
     path : str or Path
         TOML file with [plant] (A, B, C, D, or file: JSON with these keys; n_meas, n_ctrl, dt; or vertices), [frf]
-        (file) or [system] (file, box), and [design] with the keyword arguments of the synthesis.
+        (file) or [system] (file, box), [controller] (A, B, C, D) for anti-windup, and [design] with the keyword
+        arguments of the synthesis.
 
     Returns
     -------
@@ -138,10 +150,18 @@ def read_plant_file(path: str | Path) -> SynthesisJob:
     if found.plant.vertices:
         plants = tuple(_vertex(place, k, one, float(found.plant.dt)) for k, one in enumerate(found.plant.vertices))
         return SynthesisJob(None, found.plant.n_meas or 1, found.plant.n_ctrl, None, found.design, (place,), plants)
-    if found.plant.n_meas is None:
-        raise InputError("key plant.n_meas is missing", where=str(place), remedy=_REMEDY)
     plant, files = _plant(place, found.plant)
-    return SynthesisJob(plant, found.plant.n_meas, found.plant.n_ctrl, None, found.design, files)
+    controller = None if found.controller is None else _controller(place, found.controller, float(found.plant.dt))
+    return SynthesisJob(plant, found.plant.n_meas or 0, found.plant.n_ctrl, None, found.design, files,
+                        controller=controller)
+
+
+def _controller(place: Path, table: _Controller, dt: float) -> control.StateSpace:
+    try:
+        return control.ss(*(np.asarray(getattr(table, key), float) for key in "ABCD"), dt)
+    except (ValueError, TypeError, IndexError) as error:
+        raise InputError(f"[controller]: the matrices do not fit together: {error}", where=str(place),
+                         expected="A (n x n), B (n x m), C (p x n), D (p x m) of numbers") from None
 
 
 def _system(place: Path, table: _System, design: dict[str, Any]) -> SynthesisJob:
@@ -178,6 +198,9 @@ def _plant(place: Path, table: _Plant) -> tuple[control.StateSpace, tuple[Path, 
         if not isinstance(content, dict):
             raise InputError("is no JSON object", where=str(other), expected="an object with A, B, C, D")
         parts = {key: content.get(key) for key in "ABCD"}
+    if table.n_meas is None and parts["C"] is None and parts["D"] is None and parts["A"] and parts["B"]:
+        n, m = len(parts["A"]), len(parts["B"][0])  # only states are measured
+        parts |= {"C": np.eye(n).tolist(), "D": np.zeros((n, m)).tolist()}
     missing = [key for key, value in parts.items() if value is None]
     if missing:
         raise InputError(f"key plant.{missing[0]} is missing", where=str(place), remedy=_REMEDY)

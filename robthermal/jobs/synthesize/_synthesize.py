@@ -10,11 +10,13 @@ from typing import Any
 from ..._checks import quoted
 from ...design import (
     Design,
+    anti_windup,
     frf_pid,
     h2,
     hinf,
     lpv,
     mixed,
+    mpc,
     mu_synthesis,
     output_feedback,
     polytopic_feedback,
@@ -25,7 +27,8 @@ from ...verification import Certificate, verify
 from ..claims import Checked
 from ._file import SynthesisJob
 
-METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "lpv", "tem")
+METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "lpv", "tem",
+           "anti-windup", "mpc")
 
 
 def _lpv(plants: Sequence[Any], n_meas: int, n_ctrl: int, *, scheduling: Mapping[str, Sequence[float]],
@@ -36,10 +39,11 @@ def _lpv(plants: Sequence[Any], n_meas: int, n_ctrl: int, *, scheduling: Mapping
 
 _VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mixed, "mu": mu_synthesis,
                                            "output-feedback": output_feedback, "frf-pid": frf_pid,
-                                           "polytope": polytopic_feedback, "lpv": _lpv, "tem": tem_feedback}
+                                           "polytope": polytopic_feedback, "lpv": _lpv, "tem": tem_feedback,
+                                           "anti-windup": anti_windup, "mpc": mpc}
 _TITLES = {"frequency": "Structured singular value", "hinf": "H-infinity norm", "h2": "H2 norm",
            "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain",
-           "scheduled": "From every start in the ellipsoid"}
+           "scheduled": "From every start in the ellipsoid", "ellipsoid": "The ellipsoid is never left"}
 
 
 @dataclass(frozen=True)
@@ -135,4 +139,13 @@ def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:
     if job.plant is None:
         raise InputError(f"method {method} needs a plant", where=f"{job.files[0]}", expected="a table [plant]",
                          remedy="A measured response is designed for with --method frf-pid.")
+    if method == "mpc":
+        return (job.plant,)
+    if method == "anti-windup":
+        if job.controller is None:
+            raise InputError("method anti-windup needs the controller", where=f"{job.files[0]}",
+                             expected="a table [controller] with A, B, C, D")
+        return job.plant, job.controller
+    if not job.n_meas:
+        raise InputError("key plant.n_meas is missing", where=f"{job.files[0]}", expected="number of measurements")
     return job.plant, job.n_meas, job.n_ctrl

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...design import Design, FeedbackDesign, LpvDesign
+from ...design import Design, FeedbackDesign, LpvDesign, MpcDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
 from ..claims import ARITHMETIC, GateCode, kind_assumptions, machine_assumptions
@@ -20,10 +20,14 @@ from ._synthesize import Synthesis
 
 _ASSUMED = ("Plant and controller are linear and do not vary with time; no actuator saturates.",
             "Certificates speak of the floating-point numbers of plant and controller in their files.")
+_SATURATED = ("Plant and controller are linear and do not vary with time, but for actuators that saturate at once.",)
+_SOLVED = ("The plant moves as the sampled matrices say; disturbances are not covered.",
+           "The quadratic program of every sample is solved; what its solver returns is checked in floats only.")
 _FORMED = "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic."
 _HOW = {"frequency": "About the loop's matrices in floating-point numbers, as in the file; re-derived in ball "
                      "arithmetic at every frequency.",
         "polytope": "Loops at the vertices formed in rational numbers; one form for all, decided in ball arithmetic.",
+        "ellipsoid": "Loop formed in rational numbers; set, limits and cost decided in ball arithmetic.",
         "scheduled": "Hull of all slopes of the box built by the checker in rational numbers; decided in balls."}
 
 
@@ -72,11 +76,15 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
 
 
 def _programmed(design: Design) -> bool:
-    """Whether there is C source: of one sampled controller, not of a scheduled one."""
-    return bool(design.controller.dt) and not isinstance(design, LpvDesign)
+    """Whether there is C source: of one sampled controller, not of a scheduled one or of a quadratic program."""
+    return bool(design.controller.dt) and not isinstance(design, (LpvDesign, MpcDesign))
 
 
 def _assumed(result: Synthesis) -> tuple[str, ...]:
+    if result.method == "anti-windup":
+        return (*_SATURATED, _ASSUMED[1], ARITHMETIC)
+    if result.method == "mpc":
+        return (*kind_assumptions("ellipsoid"), *_SOLVED, ARITHMETIC)
     if result.job.plants:
         return (*kind_assumptions("polytope"), _ASSUMED[1], ARITHMETIC)
     if result.job.system is None:
@@ -116,6 +124,9 @@ def _reached(result: Synthesis) -> str:
         words += [f"{one.title} below {one.certificate.region['bound']:.6g}" for one in result.checked
                   if "bound" in one.certificate.region]
         return f"Proven: {', '.join(words)}."
+    if isinstance(result.design, MpcDesign):
+        level = result.design.terminal.level
+        return f"Proven: from every start in the terminal set x'Px <= {level:.6g} the cost is at most x'Px."
     how = "Proven" if result.checked else "Evaluated at the bins in floating point, not proven"
     return f"{how}: {result.design.value:.6g}."
 
