@@ -27,8 +27,8 @@ SURFACE = {
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent
         check_certificate check_loop_parameters claim_box closed_loop contraction frequency_norm frequency_radius gains
-        heater_heat hinf invariance largest_current largest_regulated_current limit_map loop network observer peak
-        regulated runaway runaway_free scheduled stability thesis_bounds usable_current
+        heater_heat hinf invariance largest_current largest_regulated_current limit_map loop network network_peak
+        observer peak regulated runaway runaway_free scheduled stability thesis_bounds usable_current
     """,
     "coupling": """
         NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors

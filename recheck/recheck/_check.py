@@ -32,7 +32,7 @@ KINDS: dict[str, Kind] = {
     "observer": (_observer.read, _observer.check), "polytope": (_polytope.read, _polytope.check),
     "ellipsoid": (_ellipsoid.read, _ellipsoid.check),
     "scheduled": (_scheduled.read, _scheduled.check)}
-OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop")
+OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop", "network_peak")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from ._loop_parameters import check_loop_parameters as check_loop_parameters
 from ._maps import LimitMap as LimitMap
 from ._maps import limit_map as limit_map
 from ._network import network as network
+from ._network_peak import network_peak as network_peak
 from ._observer import observer as observer
 from ._outcomes import CertifyCode as CertifyCode
 from ._regulated import largest_regulated_current as largest_regulated_current
@@ -39,5 +40,6 @@ from ._usable_result import UsableCurrent as UsableCurrent
 __all__ = ["CertifyCode", "CurrentBound", "CurrentLimit", "GainBound", "Gains", "LimitMap", "Runaway", "RunawayFree",
            "ThesisBounds", "UsableCurrent", "check_certificate", "check_loop_parameters", "claim_box", "closed_loop",
            "contraction", "frequency_norm", "frequency_radius", "gains", "heater_heat", "hinf", "invariance",
-           "largest_current", "largest_regulated_current", "limit_map", "loop", "network", "observer", "peak",
-           "regulated", "runaway", "runaway_free", "scheduled", "stability", "thesis_bounds", "usable_current"]
+           "largest_current", "largest_regulated_current", "limit_map", "loop", "network",
+           "network_peak", "observer", "peak", "regulated", "runaway", "runaway_free", "scheduled", "stability",
+           "thesis_bounds", "usable_current"]

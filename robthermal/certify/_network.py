@@ -62,8 +62,9 @@ def network(E: ArrayLike, A: Any, *, method: Literal["max", "sum"] = "max", unce
     if not 0.0 <= uncertainty < 1.0 or (uncertainty and method != "max"):
         raise InputError(f"uncertainty = {uncertainty!r}", where="argument uncertainty",
                          expected='a share in [0, 1), with method "max"')
-    capacity, matrix = _checked(E, A)
+    capacity, matrix = checked_network(E, A)
     entries = matrix.tocoo()
+    _path_to_ambient(matrix, entries)
     parts: dict[str, Any] = {"system": {"capacity": capacity, "rows": entries.row.astype(np.int64),
                                         "cols": entries.col.astype(np.int64), "values": entries.data},
                              "region": {"uncertainty": float(uncertainty)} if uncertainty else {}}
@@ -131,7 +132,8 @@ def _unstable(weights: np.ndarray | None) -> str:
             "positive one exactly when it is stable, so this one is not")
 
 
-def _checked(E: ArrayLike, A: Any) -> tuple[np.ndarray, csr_array]:
+def checked_network(E: ArrayLike, A: Any) -> tuple[np.ndarray, csr_array]:
+    """Return capacities and a Metzler matrix with its duplicates summed, or raise InputError."""
     try:
         capacity = np.asarray(E, dtype=float)
         matrix = csr_array(A if issparse(A) else np.asarray(A, dtype=float), dtype=float)
@@ -158,7 +160,6 @@ def _checked(E: ArrayLike, A: Any) -> tuple[np.ndarray, csr_array]:
         raise InputError(f"entry ({entries.row[at]}, {entries.col[at]}) is {entries.data[at]}", where="argument A",
                          expected="a Metzler matrix (off-diagonals not negative)",
                          remedy="A finite-element export: lump the mass, or refine obtuse elements.")
-    _path_to_ambient(matrix, entries)
     return capacity, matrix
 
 

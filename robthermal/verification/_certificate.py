@@ -35,7 +35,7 @@ class Certificate:
     ----------
     kind : str
         Kind of claim: contraction, invariance, runaway, network, observer, gain, regulated, loop, stability, hinf,
-        peak, frequency, closed_loop, polytope, ellipsoid or scheduled.
+        peak, frequency, closed_loop, polytope, ellipsoid, scheduled or network_peak.
     claim : str
         One sentence, the one its data give.
     system : mapping

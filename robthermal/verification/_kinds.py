@@ -12,6 +12,7 @@ from ._invariance import INVARIANCE
 from ._kind import Kind
 from ._loop import LOOP
 from ._network import NETWORK
+from ._network_peak import NETWORK_PEAK
 from ._observer import OBSERVER
 from ._peak import PEAK
 from ._polytope import POLYTOPE
@@ -22,4 +23,4 @@ from ._stability import STABILITY
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (CONTRACTION, INVARIANCE, RUNAWAY, NETWORK, OBSERVER, GAIN,
                                                        REGULATED, STABILITY, HINF, PEAK, FREQUENCY, LOOP,
-                                                       CLOSED_LOOP, POLYTOPE, ELLIPSOID, SCHEDULED)}
+                                                       CLOSED_LOOP, POLYTOPE, ELLIPSOID, SCHEDULED, NETWORK_PEAK)}

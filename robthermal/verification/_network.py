@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from flint import fmpq
-from numpy.typing import NDArray
 
 from robthermal.errors import InputError
 
@@ -20,23 +19,7 @@ from ._fields import get, mapping, margin_of, not_negative, text
 from ._kind import Kind, Proof
 from ._norm import say_rate
 from ._numbers import as_float, decimal, exact, name_of, round_down, show
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-_UNIT = 2.0**-52  # twice the rounding error of one operation
-_MODERATE = (1e-90, 1e90)  # products of three such numbers neither overflow nor underflow
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """A list of exact numbers and the doubles nearest to them."""
-
-    source: Any
-    nearest: Floats
-
-    def at(self, k: int) -> fmpq:
-        """Return one number exactly."""
-        return exact(self.source[k], "number")
+from ._sparse import UNIT, Floats, Indices, Numbers, moderate, one_per_lump, read_sparse
 
 
 @dataclass(frozen=True)
@@ -58,29 +41,17 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Network:
     """Return the problem, or raise InputError."""
     table, found = mapping(system, "system"), mapping(evidence, "evidence")
     uncertainty = not_negative(mapping(region, "region").get("uncertainty", 0), "region.uncertainty")
-    capacity = _numbers(get(table, "capacity", "system"), "system.capacity")
-    n = len(capacity.nearest)
-    if n == 0 or not bool(np.all(capacity.nearest > 0)):
-        where = int(np.argmin(capacity.nearest > 0)) if n else 0
-        raise InputError(f"capacity of lump {where} is missing or not positive", where="system.capacity")
-    rows = _indices(get(table, "rows", "system"), n, "system.rows")
-    cols = _indices(get(table, "cols", "system"), n, "system.cols")
-    values = _numbers(get(table, "values", "system"), "system.values")
-    if not len(rows) == len(cols) == len(values.nearest):
-        raise InputError(f"{len(rows)} rows, {len(cols)} cols, {len(values.nearest)} values", where="system",
-                         expected="the same number of each")
-    _no_duplicates(rows, cols, n)
+    matrix = read_sparse(table)
     method = text(found.get("method", "max"), "evidence.method")
     if method not in ("max", "sum"):
         raise InputError(f"method {name_of(method)}", where="evidence.method", expected="'max' or 'sum'")
     if uncertainty >= 1 or (uncertainty > 0 and method != "max"):
         raise InputError(f"uncertainty {show(uncertainty)} with method {method}", where="region.uncertainty",
                          expected="below 1, with method 'max'")
-    weights = _numbers(get(found, "weights", "evidence"), "evidence.weights")
-    if len(weights.nearest) != n:
-        raise InputError(f"{len(weights.nearest)} weights", where="evidence.weights", expected=f"{n}, one per lump")
+    weights = one_per_lump(get(found, "weights", "evidence"), len(matrix.capacity.nearest), "evidence.weights")
     rate = not_negative(get(found, "rate", "evidence"), "evidence.rate")
-    return Network(capacity, rows, cols, values, method, rate, weights, margin_of(margin, "rate"), uncertainty)
+    return Network(matrix.capacity, matrix.rows, matrix.cols, matrix.values, method, rate, weights,
+                   margin_of(margin, "rate"), uncertainty)
 
 
 def claim(problem: Network, machine: str) -> str:
@@ -174,11 +145,11 @@ def _sums(problem: Network, rate: float) -> tuple[Floats, Floats, Floats]:
         if uncertainty > 0:
             spread, size = _spread(problem)
             sums, total = sums + uncertainty * spread, total + uncertainty * size
-        bounds = total * (np.bincount(lines, minlength=n) + 16.0) * _UNIT
-    extreme = ~_moderate(problem.weights.nearest) | ~_moderate(problem.capacity.nearest)
-    odd = (~_moderate(problem.values.nearest) & (problem.values.nearest != 0)) | extreme[others]
+        bounds = total * (np.bincount(lines, minlength=n) + 16.0) * UNIT
+    extreme = ~moderate(problem.weights.nearest) | ~moderate(problem.capacity.nearest)
+    odd = (~moderate(problem.values.nearest) & (problem.values.nearest != 0)) | extreme[others]
     extreme[lines[odd]] = True
-    if rate != 0 and not _MODERATE[0] <= rate <= _MODERATE[1]:
+    if rate != 0 and not bool(moderate(np.float64(rate))):
         extreme[:] = True
     bounds[extreme] = math.inf
     return sums, bounds, scale
@@ -204,11 +175,6 @@ def _above(value: fmpq) -> float:
     return -round_down(-value)
 
 
-def _moderate(values: Floats) -> NDArray[np.bool_]:
-    size = np.abs(values)
-    return (size >= _MODERATE[0]) & (size <= _MODERATE[1])
-
-
 def _exact_line(problem: Network, lump: int, entries: Indices) -> fmpq:
     """Return (sum_j A_ij w_j)/(E_i w_i) exactly [1/s]."""
     _, others = _lines(problem)
@@ -221,42 +187,6 @@ def _exact_line(problem: Network, lump: int, entries: Indices) -> fmpq:
             total += problem.uncertainty * value * abs(weight - own)
     total += problem.uncertainty * abs(loss) * own
     return total / (problem.capacity.at(lump) * problem.weights.at(lump))
-
-
-def _numbers(value: Any, where: str) -> Numbers:
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim == 1:
-        if not bool(np.all(np.isfinite(value))):
-            raise InputError(f"entry {int(np.argmin(np.isfinite(value)))} is not finite", where=where)
-        return Numbers(value, value)
-    if not isinstance(value, (list, tuple)):
-        raise InputError(f"{name_of(type(value).__name__)} is not a list of numbers", where=where)
-    nearest = [item if type(item) is float and math.isfinite(item) else as_float(exact(item, f"{where}[{k}]"))
-               for k, item in enumerate(value)]
-    return Numbers(value, np.array(nearest, dtype=np.float64))
-
-
-def _indices(value: Any, n: int, where: str) -> Indices:
-    if isinstance(value, np.ndarray):
-        if value.ndim != 1 or value.dtype.kind not in "iu":
-            raise InputError(f"array of {value.dtype}", where=where, expected="a list of integers")
-        bad = np.flatnonzero((value < 0) | (value >= n))
-        if len(bad):
-            raise InputError(f"index {value[bad[0]]}", where=f"{where}[{bad[0]}]", expected=f"0 to {n - 1}")
-        return value.astype(np.int64)
-    if not isinstance(value, (list, tuple)):
-        raise InputError(f"{name_of(type(value).__name__)} is not a list of integers", where=where)
-    for k, item in enumerate(value):
-        if type(item) is not int or not 0 <= item < n:
-            raise InputError(f"index {name_of(item)}", where=f"{where}[{k}]", expected=f"an integer from 0 to {n - 1}")
-    return np.array(value, dtype=np.int64)
-
-
-def _no_duplicates(rows: Indices, cols: Indices, n: int) -> None:
-    keys = np.sort(rows * np.int64(n) + cols)
-    twice = np.flatnonzero(keys[1:] == keys[:-1])
-    if len(twice):
-        key = int(keys[twice[0]])
-        raise InputError(f"entry ({key // n}, {key % n}) is given twice", where="system.rows, system.cols")
 
 
 NETWORK = Kind("network", read, claim, prove, find_margin)

@@ -7,6 +7,7 @@ import copy
 import certificate_truth as truth
 import held_truth
 import loop_truth
+import mutant_network_peak
 import numpy as np
 from held_truth import candidate
 from mutants import Document, Subject, holds
@@ -359,6 +360,7 @@ SUBJECTS = (Subject("contraction", make_contraction, break_contraction),
             Subject("invariance", make_invariance, break_invariance, tolerance=1e-7),
             Subject("runaway", make_runaway, break_runaway, tolerance=1e-9),
             Subject("network", make_network, break_network),
+            Subject("network_peak", mutant_network_peak.make, mutant_network_peak.violation, tolerance=1e-9),
             Subject("observer", make_observer, break_observer, 0.6),
             Subject("gain", make_gain, break_gain),
             Subject("regulated", make_regulated, break_regulated, 0.4, edges=(9,)),

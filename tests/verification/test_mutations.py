@@ -54,7 +54,7 @@ def test_falsifiers_find_what_is_false(kind):
         region["rate" if region["measure"] == "stability" else "bound"] = (
             (0.999 if document["system"]["sample_time"] else 1e6) if region["measure"] == "stability"
             else region["bound"] / 4)
-    elif kind in ("hinf", "peak"):
+    elif kind in ("hinf", "peak", "network_peak"):
         region["bound"] /= 4
     elif kind == "frequency":
         region.update({"bounds": [value / 2 for value in region["bounds"]]} if region["form"] == "norm" else

@@ -32,6 +32,10 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
         "behind one conductance, at rest.",
     ),
     "network": ("The network is linear, with the constant conductances of the certificate file.",),
+    "network_peak": (
+        "The network is linear, with the constant conductances of the certificate file.",
+        "Nothing but the start heats it: there are no heat loads, and the surroundings stay at their temperature.",
+    ),
     "observer": (
         "Between samples the plant moves as the sampled model says, with the heat outside of the passive network held; "
         "what it does otherwise disturbs the error, and is not part of the claim.",
