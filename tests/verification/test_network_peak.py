@@ -1,4 +1,4 @@
-"""Kind "network_peak": against eigenvectors and ball arithmetic, what must not be certified, every bound of an error."""
+"""Kind "network_peak": against eigenvectors and ball arithmetic, what must not be certified, all bounds of errors."""
 
 from __future__ import annotations
 
