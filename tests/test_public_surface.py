@@ -47,6 +47,7 @@ SURFACE = {
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst Terminal
         anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
+        uncertainty_weight
     """,
     "diagnosis": """
         Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
@@ -95,6 +96,7 @@ SURFACE = {
         Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
         SynthesisCode Terminal anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc
         mu_synthesis output_feedback polytopic_feedback
+        uncertainty_weight
     """,
     "systems": """
         Scanner datasheets ferrotec scanner surrogate_module tclab tclab_two_state two_module

@@ -20,6 +20,7 @@ from ..synthesis import mpc as mpc
 from ..synthesis import mu_synthesis as mu_synthesis
 from ..synthesis import output_feedback as output_feedback
 from ..synthesis import polytopic_feedback as polytopic_feedback
+from ..synthesis import uncertainty_weight as uncertainty_weight
 from ._certify_loop import CertifiedLoop as CertifiedLoop
 from ._certify_loop import certify_loop as certify_loop
 from ._constant_gain import ConstantGain as ConstantGain
@@ -98,4 +99,5 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "unobservable"]
 __all__ += ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign",  # of synthesis
             "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
-            "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback"]
+            "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
+            "uncertainty_weight"]

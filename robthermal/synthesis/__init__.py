@@ -24,7 +24,9 @@ from ._mpc_terminal import Terminal as Terminal
 from ._mu_synthesis import mu_synthesis as mu_synthesis
 from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
+from ._uncertainty_weight import uncertainty_weight as uncertainty_weight
 
 __all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep",
            "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
-           "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback"]
+           "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
+           "uncertainty_weight"]
