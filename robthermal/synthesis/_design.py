@@ -89,6 +89,11 @@ class Design:
         """Whether the controller is proven to do what was asked."""
         return self.outcome.ok
 
+    @property
+    def _judged(self) -> str:
+        """What `value` is: a design that holds without a certificate was evaluated only."""
+        return "evaluated" if self.holds and not self.certificates else "proven"
+
     @cached_property
     def margins(self) -> Margins:
         """Disk, gain [-], phase [deg], delay [s] and modulus margin of every control and of all at once, in floats.
@@ -104,7 +109,7 @@ class Design:
         sizes = f"{K.nstates} states, {K.ninputs} measurements, {K.noutputs} controls"
         lines = [f"{self.method}, {self.solver}", self.outcome.text,
                  f"  controller      {sizes}, {f'sampled at {K.dt:g} s' if K.dt else 'continuous'}",
-                 f"  proven          {self.value:.6g}", f"  estimated best  {self.lower:.6g}",
+                 f"  {self._judged:<15} {self.value:.6g}", f"  estimated best  {self.lower:.6g}",
                  f"  time            {self.solve_time:.3g} s, {self.iterations} iterations"]
         lines += [f"  {name:<15} disk margin {one['disk']:.3g}, gain {one['gain']:.3g}, phase {one['phase']:.3g} deg, "
                   f"delay {one['delay']:.3g} s" for name, one in self.margins.items()]
