@@ -104,7 +104,8 @@ SURFACE = {
     "thermal": """
         AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
         Feedthrough FitRange Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
-        Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties Rating Reduction
+        Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties PwmRipple Rating
+        Reduction DrivableRange drivable_range pwm_ripple Supply
         Sensor SheetInversion SinkSize SplitLump SteadyState Step Stepper System ThermalCode Trajectory add_effect
         effects
         fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials

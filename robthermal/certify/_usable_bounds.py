@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import isfinite
 from typing import Any, Literal
 
 import numpy as np
 
 from ..errors import InputError
-from ..thermal import System
+from ..thermal import DrivableRange, System, drivable_range
 from ..verification import Certificate
 from ._contraction import Method
 from ._enclosure import RESERVE, named_box, no_box
@@ -127,12 +128,22 @@ def largest_box_current(question: Question) -> float:
 
 
 def rating_bound(question: Question) -> CurrentBound:
-    """Least declared limit of the modules in this direction."""
-    ends: dict[str, Callable[[Interval], float]] = {"cooling": lambda pair: pair[1], "heating": lambda pair: -pair[0],
-                                                    "symmetric": lambda pair: min(pair[1], -pair[0])}
-    declared = {name: max(0.0, ends[question.direction](module.current_limits))
-                for name, module in question.system.modules.items() if module.current_limits is not None}
-    if not declared:
+    """Least declared limit of the modules in this direction: rating, bridge, and what the supply drives in the box."""
+    found = {name: _drivable(question, name) for name in question.system.modules}
+    ends: dict[str, Callable[[DrivableRange], tuple[float, str]]] = {
+        "cooling": lambda one: (one.high, one.why_high), "heating": lambda one: (-one.low, one.why_low),
+        "symmetric": lambda one: min((one.high, one.why_high), (-one.low, one.why_low))}
+    sizes = {name: ends[question.direction](one) for name, one in found.items()}
+    least = min(sizes, key=lambda name: sizes[name][0])
+    size, why = sizes[least]
+    if not isfinite(size):
         return CurrentBound(float("inf"), None, "declared", "The system file declares no current_limits.")
-    least = min(declared, key=lambda name: declared[name])
-    return CurrentBound(declared[least], None, "declared", f"current_limits of module {least!r} in the system file.")
+    text = f"{why} of module {least!r} in the system file." if why == "current_limits" else f"Module {least!r}: {why}."
+    return CurrentBound(max(0.0, size), None, "declared", text)
+
+
+def _drivable(question: Question, name: str) -> DrivableRange:
+    """Currents of a module with both faces anywhere in the stated box."""
+    module, lumps = question.system.modules[name], list(question.system.lumps)
+    faces = question.stated[:, [lumps.index(module.cold), lumps.index(module.hot)]]
+    return drivable_range(module, (float(faces[0].min()), float(faces[1].max())))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..certify import UsableCurrent
 from ..errors import InputError
-from ..thermal import System
+from ..thermal import System, drivable_range
 from ..verification import Certificate
 from ._authority import proven_currents
 from ._export_law import export
@@ -336,8 +336,8 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
     """
     chosen = ModuleSet.of(system, modules)
     _refuse_effects(chosen)
-    declared = {name: system.modules[name].current_limits for name in chosen.names}
-    own = chosen.ranges({name: pair for name, pair in declared.items() if pair}, "system", "A")
+    declared = {name: drivable_range(system.modules[name]) for name in chosen.names}
+    own = chosen.ranges({name: (one.low, one.high) for name, one in declared.items()}, "system", "A")
     widest, source = own, "the range in the system file"
     if certificate is not None:
         proven = proven_currents(chosen, certificate)

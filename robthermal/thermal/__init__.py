@@ -3,6 +3,8 @@
 from ._datasheet import DatasheetFit as DatasheetFit
 from ._datasheet import ModuleParameters as ModuleParameters
 from ._datasheet import module_from_datasheet as module_from_datasheet
+from ._drivable import DrivableRange as DrivableRange
+from ._drivable import drivable_range as drivable_range
 from ._equations import Equations as Equations
 from ._file import fit_in_kelvin as fit_in_kelvin
 from ._file import format_system as format_system
@@ -43,9 +45,12 @@ from ._parts import Natural as Natural
 from ._parts import Periodic as Periodic
 from ._parts import Sensor as Sensor
 from ._parts import Step as Step
+from ._parts import Supply as Supply
 from ._polynomials import PolynomialFit as PolynomialFit
 from ._polynomials import Polynomials as Polynomials
 from ._polynomials import module_from_polynomials as module_from_polynomials
+from ._pwm import PwmRipple as PwmRipple
+from ._pwm import pwm_ripple as pwm_ripple
 from ._rating import Properties as Properties
 from ._rating import Rating as Rating
 from ._reduce import Reduction as Reduction
@@ -73,13 +78,14 @@ from .effects import Effect as EffectKind  # the same object as `rt.diagnosis.Ef
 from .effects import add_effect as add_effect
 from .effects import effects as effects
 
-__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "Drive", "EffectKind",
-           "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion", "Layer", "Lead",
-           "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module", "ModuleParameters",
-           "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties", "Rating", "Reduction",
-           "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState", "Step", "Stepper", "System",
-           "ThermalCode", "Trajectory", "add_effect", "effects", "fit_in_kelvin", "fold", "format_modelica",
-           "format_system", "hinf_error", "invert_datasheet", "linearize", "load_curve", "materials",
-           "module_from_datasheet", "module_from_polynomials", "module_point", "parse_system", "read_matrices",
-           "read_system", "reduce", "simulate", "size_sink", "split_lump", "steady_state", "system_from_matrices",
-           "time_constants", "trajectory", "voltage_slopes", "ways_to_split", "write_modelica", "write_system"]
+__all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "DrivableRange", "Drive",
+           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
+           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
+           "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
+           "PwmRipple", "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState",
+           "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "drivable_range",
+           "effects", "fit_in_kelvin", "fold", "format_modelica", "format_system", "hinf_error", "invert_datasheet",
+           "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials", "module_point",
+           "parse_system", "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink",
+           "split_lump", "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes",
+           "ways_to_split", "write_modelica", "write_system"]

@@ -16,6 +16,7 @@ from ._effect_parts import Step as Step
 from ._part import Finite, Kelvin, NonNegative, Positive, Range, ordered
 from ._part import Name as Name
 from ._part import Part as Part
+from ._supply import Supply as Supply
 
 
 class Ambient(Part):
@@ -184,6 +185,8 @@ class Module(Part):
         Memory of the polarity.
     drive : Drive
         What the amplifier makes of its column; default: exactly that.
+    supply : Supply, optional
+        Supply and bridge: what current they can drive. The equations do not know them.
     """
 
     hot: Name
@@ -197,6 +200,7 @@ class Module(Part):
     joule_split: Finite = 0.0
     hysteresis: Hysteresis | None = None
     drive: Drive = Drive()
+    supply: Supply | None = None
 
     _check = field_validator("current_limits")(ordered)
 

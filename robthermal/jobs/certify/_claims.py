@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from math import isfinite
 from typing import Any
 
 from ...certify import (
@@ -17,7 +18,7 @@ from ...certify import (
 )
 from ...errors import InputError
 from ...report import Parameters
-from ...thermal import System
+from ...thermal import System, drivable_range
 from ...verification import Certificate, not_certified, verify
 from ..claims import Certification, Checked
 from ..request import Boxes
@@ -161,8 +162,9 @@ def _currents(system: System, boxes: Boxes) -> dict[str, tuple[float, float]]:
         return boxes.current
     ranges = {}
     for name, module in system.modules.items():
-        if module.current_limits is None:
+        declared = drivable_range(module, boxes.temperature)
+        if not isfinite(declared.high - declared.low):
             raise InputError(f"module {name!r} has no current range", where=f"[modules.{name}] current_limits",
                              remedy="Declare current_limits, or give the range to certify.")
-        ranges[name] = module.current_limits
+        ranges[name] = (declared.low, declared.high)
     return ranges

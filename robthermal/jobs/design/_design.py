@@ -26,7 +26,7 @@ from ...design import (
     simulate_loop,
 )
 from ...errors import InputError
-from ...thermal import System
+from ...thermal import System, drivable_range
 from ..claims import Certification
 from ._claims import certified_design, certified_observer
 from ._limits import (
@@ -155,7 +155,7 @@ def design_system(system: System, request: DesignRequest,
     kalman = _kalman(system, request)
     possible = _reach(free, request)
     if not possible.outcome:
-        raise _refusal(possible)
+        raise _refusal(possible, system, request)
     if request.bandwidth is not None or request.margins is None:
         pid(plant, bandwidth=request.bandwidth or _BANDWIDTH, sample_time=request.sample_time)
     progress("searching the runaway limit")
@@ -185,9 +185,8 @@ def design_system(system: System, request: DesignRequest,
 
 def _asked(system: System, request: DesignRequest) -> Pairs:
     """Current limits of the user and of the file."""
-    free = (float("-inf"), float("inf"))
-    return {name: (request.current or {}).get(name, module.current_limits or free)
-            for name, module in system.modules.items()}
+    declared = {name: drivable_range(module, request.temperature) for name, module in system.modules.items()}
+    return {name: (request.current or {}).get(name, (one.low, one.high)) for name, one in declared.items()}
 
 
 def _reach(law: FeedbackLinearization, request: DesignRequest) -> Reachable:
@@ -196,9 +195,12 @@ def _reach(law: FeedbackLinearization, request: DesignRequest) -> Reachable:
     return next((r for r in found if not r.outcome), found[0])
 
 
-def _refusal(r: Reachable) -> InputError:
+def _refusal(r: Reachable, system: System, request: DesignRequest) -> InputError:
     """Set-points that cannot be held, in the words of the command line."""
     reason = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
+    drivable = {name: drivable_range(module, request.temperature) for name, module in system.modules.items()
+                if module.supply is not None and r.binding == "current"}
+    reason += "".join(f"; {name} can have {one}" for name, one in drivable.items())
     ranges = "; ".join(f"{name} {celsius(min(r.passive[name], r.limit[name]))} to "
                        f"{celsius(max(r.passive[name], r.limit[name]))}" for name in r.setpoint)
     wanted = ", ".join(f"{name} at {celsius(value)}" for name, value in r.setpoint.items())
@@ -214,7 +216,7 @@ def _law(system: System, request: DesignRequest, tried: Iterator[Pairs]) -> tupl
         reach = _reach(law, request)
         if reach.outcome:
             return law, reach
-    raise _refusal(reach)
+    raise _refusal(reach, system, request)
 
 
 def _kalman(system: System, request: DesignRequest) -> GainObserver | None:

@@ -20,7 +20,7 @@ from ...certify import (
 )
 from ...design import face_ranges, feedback_linearization, reachable
 from ...errors import InputError
-from ...thermal import System
+from ...thermal import System, drivable_range
 from ...verification import Certificate
 from ..request import Method
 from ._request import DesignRequest
@@ -81,7 +81,7 @@ def candidates(system: System, request: DesignRequest, fold: Runaway,
     First the largest for which a box is never left, below the upper end of the temperature box; then the largest
     that contract in the temperature box; then, where nothing is certified, what file and fold allow.
     """
-    widest = _widest(system, fold, certified)
+    widest = _widest(system, request, fold, certified)
     if request.parameters:
         most = usable_cooling(system, request).current
         widest = {name: (low, min(high, most)) for name, (low, high) in widest.items()}
@@ -95,7 +95,7 @@ def candidates(system: System, request: DesignRequest, fold: Runaway,
 def check_given(system: System, request: DesignRequest, fold: Runaway,
                 certified: tuple[CurrentLimit, CurrentLimit]) -> None:
     """Refuse limits of the user that are beyond I* or not certified; say what is allowed."""
-    allowed = _widest(system, fold, certified)
+    allowed = _widest(system, request, fold, certified)
     for name, (low, high) in (request.current or {}).items():
         where, top = f"--current {name}={low:g}:{high:g}", allowed[name][1]
         if high >= fold.current[name]:
@@ -130,11 +130,13 @@ def _fast(request: DesignRequest) -> Method:
     return "energy" if request.method == "lyapunov" else request.method
 
 
-def _widest(system: System, fold: Runaway, certified: tuple[CurrentLimit, CurrentLimit]) -> Pairs:
+def _widest(system: System, request: DesignRequest, fold: Runaway,
+            certified: tuple[CurrentLimit, CurrentLimit]) -> Pairs:
     cooling, symmetric = (limit.current if limit.certificate.holds else float("inf") for limit in certified)
     pairs = {}
     for name, module in system.modules.items():
-        low, high = module.current_limits or (float("-inf"), float("inf"))
+        declared = drivable_range(module, request.temperature)
+        low, high = declared.low, declared.high
         top = min(high, cooling, BELOW_FOLD * fold.current[name])
         # nothing declared and nothing certified: as far as when cooling
         pairs[name] = (max(low, -symmetric, -10 * top), top)

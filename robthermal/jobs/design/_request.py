@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..._celsius import ZERO_CELSIUS
 from ...design import RegulatedPoint, checked_margins, feedback_linearization, regulated_points
 from ...errors import InputError
-from ...thermal import System
+from ...thermal import System, drivable_range
 from ..request import Method
 
 FORMATS = ("c", "mat", "json")
@@ -107,14 +107,7 @@ class DesignRequest:
         if missing:
             raise InputError(f"module {missing[0]!r} has no set-point", where="--setpoint",
                              expected="one for every module: " + ", ".join(system.modules))
-        for name, (low, high) in (self.current or {}).items():
-            where, declared = f"--current {name}={low:g}:{high:g}", system.modules[name].current_limits
-            if not low <= 0 <= high:
-                raise InputError("the range leaves zero out", where=where, expected="lower ≤ 0 ≤ upper",
-                                 remedy="A controller must be able to switch the module off.")
-            if declared is not None and (low < declared[0] or high > declared[1]):
-                raise InputError("the range is beyond the current_limits of the system file", where=where,
-                                 expected=f"within {declared[0]:g}:{declared[1]:g}")
+        self._check_currents(system)
         low, high = self.temperature
         points = self.points(system)
         for name, value in self.setpoint.items():
@@ -133,6 +126,26 @@ class DesignRequest:
             raise InputError(f"{len(system.lumps)} lumps are too many for a certified observer", where=system.name,
                              expected=f"at most {_MOST_LUMPS}", remedy="Reduce the system with rt.thermal.reduce, or "
                              "take its sensors out to design without an observer.")
+
+    def _check_currents(self, system: System) -> None:
+        """Currents that are asked for are those that module, bridge and supply can have."""
+        for name, module in system.modules.items():
+            found = drivable_range(module, self.temperature)
+            if not found.low < found.high:
+                raise InputError(f"no current can be driven: {found.why_high}", where=f"[modules.{name}] supply",
+                                 expected="a supply with voltage to spare", remedy="Another supply, fewer modules in "
+                                 "series, or a narrower box with --temperature.")
+        for name, (low, high) in (self.current or {}).items():
+            where, declared = f"--current {name}={low:g}:{high:g}", drivable_range(system.modules[name],
+                                                                                    self.temperature)
+            if not low <= 0 <= high:
+                raise InputError("the range leaves zero out", where=where, expected="lower ≤ 0 ≤ upper",
+                                 remedy="A controller must be able to switch the module off.")
+            if low < declared.low or high > declared.high:
+                what = declared.why_high if high > declared.high else declared.why_low
+                what = "the current_limits" if what == "current_limits" else f"{what}: the supply"
+                raise InputError(f"the range is beyond {what} of the system file", where=where,
+                                 expected=f"within {declared.low:.4g}:{declared.high:.4g}")
 
     def _refuse_cascade(self, system: System) -> None:
         above = {part.hot: name for name, part in system.modules.items()}

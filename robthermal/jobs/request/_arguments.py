@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 
 from ...errors import InputError
-from ...thermal import System
+from ...thermal import System, drivable_range
 from ._calibrated import read_calibrated
 from ._schema import METHODS, STRUCTURES, Boxes, Project, in_kelvin, range_in_kelvin
 
@@ -61,11 +61,12 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
         raise InputError(f"structure is {structure!r}", where="--structure", expected="full or block")
     ranges = ranges_from_text(system, parameters, confidence)
     unit = system.temperature_unit
-    default = {name: m.current_limits for name, m in system.modules.items() if m.current_limits is not None}
+    box = range_in_kelvin(temperature, unit, "--temperature") if temperature else Boxes().temperature
+    declared = {name: drivable_range(module, box) for name, module in system.modules.items()}
+    default = {name: (one.low, one.high) for name, one in declared.items() if isfinite(one.high - one.low)}
     currents = {**default, **dict(_range(text, "--current") for text in current)}
     surroundings = dict(_range(text, "--ambient") for text in ambient)
     points = dict(_value(text, "--setpoint") for text in setpoint)
-    box = range_in_kelvin(temperature, unit, "--temperature") if temperature else Boxes().temperature
     return Boxes(temperature=box, current=currents,
                  ambient={name: range_in_kelvin(pair, unit, "--ambient") for name, pair in surroundings.items()},
                  setpoint={name: in_kelvin(value, unit, "--setpoint") for name, value in points.items()},
