@@ -45,6 +45,7 @@ SURFACE = {
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
+        AntiWindupDesign
         Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst Terminal
         anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
@@ -93,6 +94,7 @@ SURFACE = {
         options_from_text prbs read_record read_records save_records staircase
     """,
     "synthesis": """
+        AntiWindupDesign
         Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
         SynthesisCode Terminal anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc
         mu_synthesis output_feedback polytopic_feedback

@@ -1,5 +1,6 @@
 """Controllers and observers for systems with thermoelectric modules; syntheses for any linear plant."""
 
+from ..synthesis import AntiWindupDesign as AntiWindupDesign
 from ..synthesis import Design as Design
 from ..synthesis import FeedbackDesign as FeedbackDesign
 from ..synthesis import FrfDesign as FrfDesign
@@ -97,7 +98,8 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points",
            "simulate_loop", "state_feedback", "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi",
            "unobservable"]
-__all__ += ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign",  # of synthesis
-            "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
-            "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
+# of synthesis
+__all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign",
+            "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
+            "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
             "uncertainty_weight"]

@@ -3,6 +3,7 @@
 For any linear plant; thermal front ends are in `robthermal.design`, which also re-exports what is here.
 """
 
+from ._anti_windup import AntiWindupDesign as AntiWindupDesign
 from ._anti_windup import anti_windup as anti_windup
 from ._design import Design as Design
 from ._design import RobustAgainst as RobustAgainst
@@ -26,7 +27,7 @@ from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 from ._uncertainty_weight import uncertainty_weight as uncertainty_weight
 
-__all__ = ["Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep",
-           "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid", "h2", "hinf", "invariant_ellipsoid",
-           "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
+__all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign",
+           "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
+           "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
            "uncertainty_weight"]

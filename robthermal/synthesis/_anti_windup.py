@@ -1,13 +1,15 @@
 """Static anti-windup compensation: a gain from what saturation takes away to the states of the controller.
 
 Mulder, Kothare and Morari (2001). Nothing new has to be checked for its proof: with the dead zone q = v - sat(v)
-written as q = (v + p)/2, |p| <= |v|, the claim is a weighted H-infinity norm of a linear loop.
+written as q = (v + p)/2, |p| <= |v|, the claim is a weighted H-infinity norm of a linear loop. Where that fails, a
+region is looked for (`_attraction`).
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,10 +20,11 @@ from .._arrays import Array
 from .._checks import quoted
 from .._control import control
 from ..conic import inside
-from ..errors import InputError
+from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant
 from ..verification import Certificate
 from ._affine import Matrices, Unknowns, symmetric
+from ._attraction import Attraction, attraction, prove_gain, prove_region
 from ._design import Design, RobustAgainst, as_system
 from ._outcomes import SynthesisCode
 from ._plant import GeneralizedPlant, chosen, split
@@ -30,14 +33,80 @@ _SLACKS = (1e-3, 1e-2, 5e-2, 0.2)  # of the gain above that of the inequalities,
 _MARGIN = 1e-7  # of the inequality, in coordinates whose states are excited alike
 
 
+@dataclass(frozen=True)
+class AntiWindupDesign(Design):
+    """A controller with anti-windup gain, and where the limited loop is proven to come to rest.
+
+    Parameters
+    ----------
+    controller : control.StateSpace
+        Inputs y, then q = v - sat(v); a zero gain from q where nothing is proven.
+    value : float
+        Proven L2 gain from rest: for all disturbances, or for those up to `energy`; infinity where none is proven.
+    lower : float
+        H-infinity norm of the loop without limits, estimated, which small signals reach.
+    closed_loop : control.StateSpace
+        Loop without limits, from w to z in floats.
+    certificates : list of Certificate
+        Kind "closed_loop", or of a region two of kind "ellipsoid"; `rt.verify` checks each again.
+    robust_against : RobustAgainst
+        What set of plants the claim covers.
+    outcome : Outcome
+        How it ended; its text is the remedy.
+    method : str
+        Inequalities that gave the gain.
+    solver : str
+        What solved them.
+    solve_time : float
+        Time of the whole synthesis with its proofs [s].
+    iterations : int
+        Programs that were tried.
+    plant : GeneralizedPlant or None
+        None: margins of a limited loop say nothing.
+    matrix : ndarray, shape (n, n)
+        P of the region x'Px <= level over the states of plant and controller; zero where it is all of them, or nothing.
+    level : float
+        Level of the region; infinity where every start comes to rest, zero where nothing is proven.
+    rate : float
+        In the region x'Px falls at least as exp(-2 rate t) [1/s], sampled by (1 - rate)² per sample; 0 without one.
+    energy : float
+        Largest energy of disturbances (integral or sum of squares) that `value` is proven for, from rest.
+    """
+
+    matrix: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    level: float = 0.0
+    rate: float = 0.0
+    energy: float = 0.0
+
+    def contains(self, x: ArrayLike) -> bool:
+        """Whether a start is proven to come to rest.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            States of the plant, then of the controller.
+
+        Returns
+        -------
+        bool
+        """
+        state = np.asarray(x, float)
+        return bool(self.level > 0 and state @ self.matrix @ state <= self.level)
+
+    def _facts(self) -> dict[str, Any]:
+        return super()._facts() | {"matrix": self.matrix, "level": self.level, "rate": self.rate, "energy": self.energy}
+
+
 def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: ArrayLike,
-                performance: tuple[Sequence[int], Sequence[int]] | None = None) -> Design:
+                performance: tuple[Sequence[int], Sequence[int]] | None = None) -> AntiWindupDesign:
     """Design a static anti-windup gain for a given controller, and prove the L2 gain of the saturated loop.
 
     The plant sees sat(v), v = C_K x_K + D_K y. The controller returned has the further inputs q = v - sat(v), added to
     its states through the gain E: x_K' = A_K x_K + B_K y + E q. The smallest L2 gain from w to z that one quadratic
-    function and the sector of the dead zone give is found by matrix inequalities. The claim is global: it holds for
-    limits of any size, so that the plant has to be stable by itself.
+    function and the sector of the dead zone give is found by matrix inequalities. That claim is global: it holds for
+    limits of any size, so that the plant has to be stable by itself. Where it fails, the gain with a large region of
+    attraction is found instead: an ellipsoid of plant and controller states from which the loop comes to rest within
+    these limits.
 
     Parameters
     ----------
@@ -52,10 +121,10 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
 
     Returns
     -------
-    Design
+    AntiWindupDesign
         ``controller``: inputs y, then q. ``value``: proven L2 gain of the saturated loop from rest; ``lower``: the
-        H-infinity norm of the loop without saturation, which small signals reach. ``holds`` is False where the
-        inequalities have no solution, as for every plant that is not stable.
+        H-infinity norm of the loop without saturation, which small signals reach. ``level`` is infinite where every
+        start comes to rest; else ``contains`` says which do. ``holds`` is False where neither is proven.
 
     Raises
     ------
@@ -65,7 +134,8 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
     References
     ----------
     Mulder, Kothare and Morari, Automatica 37 (2001); Tarbouriech, Garcia, Gomes da Silva and Queinnec, Stability and
-    Stabilization of Linear Systems with Saturating Actuators (2011).
+    Stabilization of Linear Systems with Saturating Actuators (2011); Hu and Lin, Control Systems with Actuator
+    Saturation (2001).
 
     Examples
     --------
@@ -75,6 +145,10 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
     >>> d = rt.design.anti_windup(P, K, limits=1.0)  # the open loop has a gain of 1
     >>> d.holds, d.controller.ninputs, d.lower < d.value < 1.1
     (True, 2, True)
+    >>> P = control.ss([[0.2]], [[0.1, 1.0]], [[1.0], [-1.0]], [[0, 0], [0, 0]])  # not stable by itself
+    >>> d = rt.design.anti_windup(P, K, limits=1.0)  # limits of 1 can hold the state up to 5
+    >>> d.holds, d.contains([3.0, 0.0]), d.contains([6.0, 0.0])
+    (True, True, False)
     """
     start = time.perf_counter()
     joined, own = read_plant(plant, "argument plant"), read_plant(K, "argument K")
@@ -88,29 +162,64 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
     lower = plant_norm(nominal)[0]
     found = _solved(loop, len(own.A), len(own.C))
     proven = None if found is None else _proven(parts, own, *found)
-    E = np.zeros((len(own.A), len(own.C))) if found is None or proven is None else found[0]
     names = [*K.input_labels, *(f"q[{name}]" for name in K.output_labels)]
-    made = Plant(own.A, np.hstack([own.B, E]), own.C, np.hstack([own.D, np.zeros((len(own.C),) * 2)]), own.dt)
-    controller = as_system(made, names, list(K.output_labels))
     closed = as_system(nominal, [f"w[{k}]" for k in range(nominal.B.shape[1])],
                        [f"z[{k}]" for k in range(len(nominal.C))])
-    if proven is None:
-        outcome = SynthesisCode.NOT_FOUND.outcome(
-            "No gain was found with which the saturated loop is proven stable for every start and disturbance"
-            + ("." if close(parts.joined, _zero(own)).stable else ": the plant is not stable by itself."),
-            remedy="Such a loop can be stable in a region of its states only, which is not designed for here.")
-        return Design(controller, np.inf, lower, closed, [], RobustAgainst("Nothing is proven, of this plant or of "
-                      "others."), outcome, "matrix inequalities (Mulder, Kothare and Morari)", "Clarabel",
-                      time.perf_counter() - start, 1, None)
-    value = float(proven.region["bound"])
+    def result(E: Array, value: float, certificates: list[Certificate], covers: str, outcome: Outcome, method: str,
+               region: Attraction | None = None, energy: float = 0.0) -> AntiWindupDesign:
+        made = Plant(own.A, np.hstack([own.B, E]), own.C, np.hstack([own.D, np.zeros((len(own.C),) * 2)]), own.dt)
+        size = len(parts.A) + len(own.A)
+        return AntiWindupDesign(
+            as_system(made, names, list(K.output_labels)), value, lower, closed, certificates, RobustAgainst(covers),
+            outcome, method, "Clarabel", time.perf_counter() - start, 1 if proven is not None else 2, None,
+            np.zeros((size, size)) if region is None else region.P,
+            region.level if region is not None else np.inf if outcome.ok else 0.0,
+            0.0 if region is None else region.rate, energy)
+
+    if proven is not None and found is not None:
+        value = float(proven.region["bound"])
+        outcome = SynthesisCode.CERTIFIED.outcome(
+            "Certified for the numbers of the controller as returned: L2 gain of the saturated loop below "
+            f"{value:.6g}; without saturation it is about {lower:.6g}.")
+        covers = (f"Proven for the plant as given and saturations at {', '.join(f'{one:g}' for one in largest)}, or at "
+                  "any other limits: only |p| <= |v| is used of p = 2 q - v. The certificate's loop has p as a "
+                  "disturbance, weighted.")
+        return result(found[0], value, [proven], covers, outcome,
+                      "matrix inequalities (Mulder, Kothare and Morari)", energy=np.inf)
+    method = "matrix inequalities of a region (Gomes da Silva and Tarbouriech; Hu and Lin)"
+    bounds = np.array(largest)
+    region = None if parts.D22.any() else attraction(loop, bounds, len(parts.A), len(own.A))
+    certificate = None if region is None else prove_region(parts, own, bounds, region)
+    if region is None or certificate is None or not certificate.holds:
+        return result(np.zeros((len(own.A), len(own.C))), np.inf, [],
+                      "Nothing is proven, of this plant or of others.", _nothing(parts, own), method)
+    more = prove_gain(parts, own, bounds, region, loop)
+    reach = 1 / np.sqrt(np.linalg.eigvalsh(region.P[:len(parts.A), :len(parts.A)])[-1])
+    words = "" if more is None else (
+        f" From rest, disturbances of energy up to {more.region['level']:.4g} have an L2 gain below "
+        f"{more.region['bound']:.6g}.")
     outcome = SynthesisCode.CERTIFIED.outcome(
-        f"Certified for the numbers of the controller as returned: L2 gain of the saturated loop below {value:.6g}; "
-        f"without saturation it is about {lower:.6g}.")
-    covers = RobustAgainst(
-        f"Proven for the plant as given and saturations at {', '.join(f'{one:g}' for one in largest)}, or at any other "
-        "limits: only |p| <= |v| is used of p = 2 q - v. The certificate's loop has p as a disturbance, weighted.")
-    return Design(controller, value, lower, closed, [proven], covers, outcome,
-                  "matrix inequalities (Mulder, Kothare and Morari)", "Clarabel", time.perf_counter() - start, 1, None)
+        "Certified for the numbers of the controller as returned, in a region: within these limits the loop comes to "
+        f"rest from every start in x'Px <= {region.level:g}, with the controller at rest from every state of the plant "
+        f"of norm up to {reach:.4g}.{words} For every start, no gain was proven"
+        + ("." if _stable(parts, own) else ": the plant is not stable by itself."))
+    covers = (f"Proven for the plant as given and saturations at {', '.join(f'{one:g}' for one in largest)}, from the "
+              "starts in the region only.")
+    return result(region.E, np.inf if more is None else float(more.region["bound"]),
+                  [certificate, *([] if more is None else [more])], covers, outcome, method, region,
+                  0.0 if more is None else float(more.region["level"]))
+
+
+def _nothing(parts: GeneralizedPlant, own: Plant) -> Outcome:
+    return SynthesisCode.NOT_FOUND.outcome(
+        "No gain was found with which the saturated loop is proven stable for every start and disturbance"
+        + (", and no region." if _stable(parts, own) else ": the plant is not stable by itself; and no region.")
+        + (" Regions are designed for without a direct path from controls to measurements only." if parts.D22.any()
+           else ""), remedy="Allow larger limits, or scale the plant.")
+
+
+def _stable(parts: GeneralizedPlant, own: Plant) -> bool:
+    return close(parts.joined, _zero(own)).stable
 
 
 def _parts(joined: Plant, K: Plant, performance: Any) -> GeneralizedPlant:

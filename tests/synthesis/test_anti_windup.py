@@ -100,12 +100,94 @@ def test_the_dead_zone_is_what_the_proof_says():
     assert own.A @ xk + own.B @ out[4:] == pytest.approx(moved)
 
 
-def test_an_unstable_plant_is_never_certified():
+UNSTABLE = control.ss([[0.3]], [[0.1, 1.0]], [[1.0], [-1.0]], [[0, 0], [0, 0]])
+SADDLE = control.ss([[0.2, 0.3], [-0.1, -0.4]], [[0.2, 0, 1.0, 0.3], [0, 0.2, -0.2, 1.0]],
+                    [[1, 0], [0, 1], [-1, 0], [0, -1]], np.zeros((4, 4)))
+GROWING = control.ss([[1.1]], [[0.1, 0.5]], [[1.0], [-1.0]], [[0, 0], [0, 0]], 1.0)
+K_GROWING = control.ss([[0.95]], [[0.1]], [[0.1]], [[0.9]], 1.0)
+REGIONS = ((UNSTABLE, K, 1.0), (SADDLE, K_TWO, [1.0, 0.5]), (GROWING, K_GROWING, 1.0))
+
+
+@pytest.fixture(scope="module")
+def regional():
+    return [(plant, own, limits, rt.design.anti_windup(plant, own, limits=limits)) for plant, own, limits in REGIONS]
+
+
+def steps(plant, own, d, limits, xi, w=None, count=2000):
+    """The limited loop from a start, by steps of its own: last states, and energies of z and w."""
+    n_u, n, dt, h = own.noutputs, plant.nstates, plant.dt, plant.dt or 0.02
+    m, q = plant.ninputs - n_u, plant.noutputs - own.ninputs
+    x, xk, z2, w2 = xi[:n].copy(), xi[n:].copy(), 0.0, 0.0
+    for k in range(count):
+        now = np.zeros(m) if w is None else w(k)
+        y = plant.C[q:] @ x
+        v = own.C @ xk + own.D @ y
+        u = np.clip(v, -np.asarray(limits), limits)
+        z = plant.C[:q] @ x
+        z2, w2 = z2 + h * z @ z, w2 + h * now @ now
+        dx = plant.A @ x + plant.B @ np.concatenate([now, u])
+        dk = d.controller.A @ xk + d.controller.B @ np.concatenate([y, v - u])
+        x, xk = (dx, dk) if dt else (x + h * dx, xk + h * dk)
+    return np.concatenate([x, xk]), z2, w2
+
+
+def test_every_start_in_the_region_comes_to_rest(regional):
+    rng = np.random.default_rng(0)
+    for plant, own, limits, d in regional:
+        assert d.holds and 0 < d.level < np.inf and d.rate > 0
+        assert [one.kind for one in d.certificates] == ["ellipsoid"] * 2 and all(rt.verify(one).valid
+                                                                                 for one in d.certificates)
+        assert np.array_equal(d.certificates[0].system["controller"]["windup"], d.controller.B[:, own.ninputs:])
+        root, size = np.linalg.inv(np.linalg.cholesky(d.matrix)).T, len(d.matrix)
+        for direction in rng.standard_normal((4, size)):
+            start = root @ direction / np.linalg.norm(direction) * 0.999
+            assert d.contains(start) and not d.contains(1.01 * start)
+            last, _, _ = steps(plant, own, d, limits, start)
+            assert last @ d.matrix @ last < 0.01
+
+
+def test_the_region_ends_before_the_limits_lose_the_plant(regional):
+    """x' = p x + u, |u| <= 1, grows beyond 1/p whatever is done; x+ = a x + b u beyond b/(a - 1)."""
+    for index, edge in ((0, 1 / 0.3), (2, 0.5 / 0.1)):
+        d = regional[index][3]
+        reach = 1 / np.sqrt(d.matrix[0, 0])
+        assert 0.5 * edge < reach < edge, (reach, edge)
+        assert np.sqrt(np.linalg.inv(d.matrix)[0, 0]) < edge  # whatever the controller starts from
+
+
+def test_gains_in_the_region_hold_for_disturbances_of_the_energy(regional):
+    rng = np.random.default_rng(1)
+    for plant, own, limits, d in regional:
+        assert d.lower < d.value < np.inf and 0 < d.energy < np.inf
+        m, size, h, worst = plant.ninputs - own.noutputs, len(d.matrix), plant.dt or 0.02, 0.0
+        for _ in range(3):
+            shape = rng.standard_normal((m, 3))
+
+            def push(k, shape=shape, m=m):
+                return shape @ np.cos(np.arange(3) * k / 75) if k < 300 else np.zeros(m)
+            scale = np.sqrt(0.98 * d.energy / (h * sum(float(push(k) @ push(k)) for k in range(300))))
+            last, z2, w2 = steps(plant, own, d, limits, np.zeros(size),
+                                 lambda k, push=push, scale=scale: scale * push(k), 1200)
+            assert w2 <= d.energy and z2 <= d.value**2 * w2 and np.abs(last).max() < 1e3
+            worst = max(worst, np.sqrt(z2 / w2))
+        assert worst > 0.02
+
+
+def test_an_unstable_plant_is_never_certified_for_every_start():
     for pole in (1e-6, 0.01, 0.3):
         plant = control.ss([[pole]], [[0.1, 1.0]], [[1.0], [-1.0]], [[0, 0], [0, 0]])
         d = rt.design.anti_windup(plant, K, limits=100.0)
-        assert not d.holds and not d.certificates and np.isinf(d.value) and "not stable by itself" in d.outcome.text
-        assert not d.controller.B[:, 1:].any()
+        assert "not stable by itself" in d.outcome.text and d.level < np.inf and d.energy < np.inf
+        assert d.holds and not d.contains([1.001 * 100.0 / pole, 0.0]) and "in a region" in d.outcome.text
+    direct = control.ss([[0.3]], [[0.1, 1.0]], [[1.0], [-1.0]], [[0, 0], [0, 0.1]])
+    d = rt.design.anti_windup(direct, K, limits=100.0)
+    assert not d.holds and not d.certificates and np.isinf(d.value) and d.level == 0 and not d.contains([0.0, 0.0])
+    assert not d.controller.B[:, 1:].any() and "direct path" in d.outcome.text
+
+
+def test_a_global_design_says_so():
+    d = rt.design.anti_windup(P, K, limits=1.0)
+    assert np.isinf(d.level) and np.isinf(d.energy) and d.contains([1e6, -1e6]) and d.rate == 0
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
