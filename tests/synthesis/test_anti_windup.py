@@ -133,6 +133,7 @@ def steps(plant, own, d, limits, xi, w=None, count=2000):
 
 def test_every_start_in_the_region_comes_to_rest(regional):
     rng = np.random.default_rng(0)
+    assert len(regional) == 3
     for plant, own, limits, d in regional:
         assert d.holds and 0 < d.level < np.inf and d.rate > 0
         assert [one.kind for one in d.certificates] == ["ellipsoid"] * 2 and all(rt.verify(one).valid
@@ -157,6 +158,7 @@ def test_the_region_ends_before_the_limits_lose_the_plant(regional):
 
 def test_gains_in_the_region_hold_for_disturbances_of_the_energy(regional):
     rng = np.random.default_rng(1)
+    assert len(regional) == 3
     for plant, own, limits, d in regional:
         assert d.lower < d.value < np.inf and 0 < d.energy < np.inf
         m, size, h, worst = plant.ninputs - own.noutputs, len(d.matrix), plant.dt or 0.02, 0.0
