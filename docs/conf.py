@@ -1,6 +1,10 @@
 """Sphinx configuration. The build reads only this repository: no intersphinx inventories, no remote fonts."""
 
+import sys
 from importlib import metadata
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent / "_ext"))
 
 project = "robthermal"
 author = "The robthermal authors"
@@ -12,17 +16,22 @@ except metadata.PackageNotFoundError:  # built straight from a checkout
 
 extensions = [
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
+    "mathml",
     "sphinx.ext.viewcode",
     "numpydoc",
     "myst_nb",
 ]
+html_math_renderer = "mathml"
 exclude_patterns = ["_build", "**.ipynb_checkpoints"]
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-# Notebooks are executed by the tests, where a failing cell is a failing test; the site build stays quick.
-nb_execution_mode = "off"
+# The site shows what the notebooks print and draw. They are stored without outputs and run again only if they changed;
+# the tests, which run every notebook themselves, build the site with one of them (tests/test_docs.py).
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(Path(__file__).parents[1] / "build" / "notebooks")
+nb_execution_timeout = 120  # a cell may take this long [s]
+nb_execution_raise_on_error = True
 
 autodoc_member_order = "groupwise"
 autodoc_typehints = "none"  # numpydoc already states each type, and its unit

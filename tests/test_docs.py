@@ -18,12 +18,15 @@ import robthermal as rt
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
+SHOWN = "transients"  # the notebook that is run for the site here; tests/test_notebooks.py runs them all
 
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("docs")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
+    others = ",".join(f"*/{path.name}" for path in (DOCS / "tutorials").glob("*.ipynb") if path.stem != SHOWN)
+    command += ["-D", f"nb_execution_excludepatterns={others}", "-D", f"nb_execution_cache_path={target / 'notebooks'}"]
     command += ["-d", str(target / "doctrees"), str(DOCS), str(target / "html")]
     run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
     assert run.returncode == 0, run.stderr
@@ -41,12 +44,25 @@ def test_every_public_name_is_on_a_page(built: Path) -> None:
     assert not public - on_a_page
 
 
-def test_pages_fetch_nothing_but_the_formula_renderer(built: Path) -> None:
-    fetched = re.compile(r"<(?:script|img|iframe|link)\b[^>]*\s(?:src|href)=\"(https?://[^\"]+)")
-    pages = list(built.rglob("*.html"))
-    assert pages
-    remote = {address for page in pages for address in fetched.findall(page.read_text(encoding="utf-8"))}
-    assert {address for address in remote if "mathjax" not in address} == set()
+def test_pages_fetch_nothing(built: Path) -> None:
+    fetched = re.compile(r"<(?:script|img|iframe|link|source)\b[^>]*\s(?:src|href)=\"((?:https?:)?//[^\"]+)")
+    styled = re.compile(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')]+)")
+    pages, sheets = list(built.rglob("*.html")), list(built.rglob("*.css"))
+    assert pages and sheets
+    assert {address for page in pages for address in fetched.findall(page.read_text(encoding="utf-8"))} == set()
+    assert {address for sheet in sheets for address in styled.findall(sheet.read_text(encoding="utf-8"))} == set()
+
+
+def test_formulas_are_in_the_pages(built: Path) -> None:
+    page = (built / "explanations" / "calibration.html").read_text(encoding="utf-8")
+    assert page.count("<math ") > 50 and "\\frac" not in page and "MathJax" not in page
+
+
+def test_notebooks_show_what_they_print_and_draw(built: Path) -> None:
+    page = (built / "tutorials" / f"{SHOWN}.html").read_text(encoding="utf-8")
+    pictures = re.findall(r'<img[^>]*src="../_images/([^"]+\.png)"', page)
+    assert len(pictures) >= 2 and all((built / "_images" / name).stat().st_size > 5_000 for name in pictures)
+    assert "rms error, no noise" in page and 'class="output' in page
 
 
 def code_block(page: Path, language: str) -> str:

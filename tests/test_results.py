@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from figures import complaints
 from pydantic import BaseModel
 from results import instances, public_classes
 
@@ -97,6 +98,37 @@ def test_what_draws_into_one_axes_takes_it(kind: type, method: str) -> None:
         assert plot() is not second
         with pytest.raises(rt.InputError, match="argument ax.*one matplotlib axes"):
             plot(ax=np.array([first, second]))
+
+
+@pytest.mark.parametrize(("kind", "method"), DRAWN, ids=lambda value: CLASSES.get(value, value))
+def test_figures_can_be_read(kind: type, method: str) -> None:
+    """No text over text or cut off, a quantity with its unit at every axis, a name for every one of several curves."""
+    found = instances().get(kind, [])[:1]
+    assert found or CLASSES[kind] in ELSEWHERE
+    for one in found:
+        needed = [one.loops[0]] if method == "plot_bode" or method == "plot_nyquist" else []
+        assert complaints(np.ravel(getattr(one, method)(*needed))[0].figure) == []
+        plt.close("all")
+
+
+def test_what_cannot_be_read_is_complained_of() -> None:
+    figure, (left, right) = plt.subplots(1, 2)
+    left.plot([0, 1], [0, 1], label="one")
+    left.plot([0, 1], [1, 0], label="other")
+    left.text(0.5, 0.5, "first")
+    left.text(0.5, 0.5, "second")
+    right.bar(["a", "b"], [1.0, 2.0])
+    right.set(ylabel="heat [W]", title="far too long for a figure of this width, and therefore cut off")
+    said = " ".join(complaints(figure))
+    assert all(part in said for part in ("'first' lies on 'second'", "x axis says ''", "y axis says ''", "no legend",
+                                         "is cut off by the edge"))
+    left.set(xlabel="time [s]", ylabel="current [A]")
+    left.legend()
+    left.texts[1].set_visible(False)
+    right.set_title("")
+    assert complaints(figure) == []
+    left.set_ylabel("current")
+    assert complaints(figure) == ["y axis says 'current': no quantity with its unit in brackets"]
 
 
 @pytest.mark.parametrize("kind", [rt.System, rt.Record, rt.calibration.Fit, rt.identify.FrequencyResponse,

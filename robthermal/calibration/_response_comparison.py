@@ -66,8 +66,10 @@ class ResponseComparison:
         for o, name in enumerate(self.outputs):
             row = 2 * self.response.output_names.index(name)
             for i, source in enumerate(self.inputs):
-                place = grid[row, self.response.input_names.index(source)]
-                place.plot(self.frequencies, np.abs(self.model[o, i]), "k--", linewidth=1.0, label="model")
+                size, phase = grid[row:row + 2, self.response.input_names.index(source)]
+                size.plot(self.frequencies, np.abs(self.model[o, i]), "k--", linewidth=1.0, label="model")
+                phase.plot(self.frequencies, np.degrees(np.angle(self.model[o, i])), "k--", linewidth=1.0)
+                size.legend(fontsize="small")
         return axes
 
     def to_dict(self) -> dict[str, Any]:

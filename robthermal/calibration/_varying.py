@@ -120,7 +120,7 @@ class VaryingModel:
         _, axes = plt.subplots(len(self.names), 1, sharex=True, squeeze=False, layout="constrained")
         for ax, name, value, std in zip(axes[:, 0], self.names, self.values.T, self.std.T, strict=True):
             ax.errorbar(self.temperatures, value, 2 * std, fmt="o-")
-            ax.set(ylabel=name)
+            ax.set(ylabel=f"{name} [SI unit]")
         axes[-1, 0].set(xlabel="temperature [K]")
         return axes[:, 0]
 

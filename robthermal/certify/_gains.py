@@ -64,8 +64,8 @@ class Gains:
         image = ax.imshow(self.heat.to_numpy())
         ax.set_xticks(range(self.heat.shape[1]), self.heat.columns, rotation=90)
         ax.set_yticks(range(self.heat.shape[0]), self.heat.index)
-        ax.set(xlabel="heat load on", ylabel="moves", title="peak gain [K/W]")
-        ax.figure.colorbar(image, ax=ax)
+        ax.set(xlabel="lump with the heat load", ylabel="lump that moves")
+        ax.figure.colorbar(image, ax=ax, label="peak gain [K/W]")
         return ax
 
 

@@ -43,13 +43,13 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
         for ax in axes:
             ax.axvline(found.crossover, color="k", linestyle=":", linewidth=0.8)
         axes[1].annotate(f"phase {found.phase:.3g}°, delay {found.delay:.3g} s", (found.crossover, -180.0),
-                         textcoords="offset points", xytext=(4, 4))
+                         textcoords="offset points", xytext=(-4, 4), ha="right")
     turn = np.flatnonzero(np.diff(np.sign(_phase(nominal) + 180.0)))
     if len(turn) and np.isfinite(found.gain):
         k = turn[0]
         axes[0].plot([frequency[k]] * 2, [np.abs(nominal[k]), 1.0], "k-", linewidth=0.8)
-        axes[0].annotate(f"gain × {found.gain:.3g}", (frequency[k], np.abs(nominal[k])), textcoords="offset points",
-                         xytext=(-4, -4), ha="right", va="top")
+        axes[0].annotate(f"gain × {found.gain:.3g}", (frequency[k], 1.0), textcoords="offset points",
+                         xytext=(-4, 4), ha="right")
     axes[0].set(ylabel="|L| [-]")
     axes[1].set(ylabel="phase [deg]", xlabel="frequency [rad/s]")
     return axes

@@ -70,8 +70,8 @@ class StepResponseLinearity:
             for step, response in zip(self.steps, family, strict=True):
                 ax.plot(self.time, response[:, 0], label=f"{step:+g} K")
             ax.set(xlabel="time [s]", title=title)
+            ax.legend(title="step")
         axes[0].set_ylabel("normalized response [-]")
-        axes[1].legend()
         return axes
 
 

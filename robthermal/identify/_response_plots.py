@@ -52,7 +52,7 @@ def _bode(result: FrequencyResponse, axes: Any, p: float) -> None:
             below.semilogx(f, phase, lw=1.0)
             below.fill_between(f, phase - spread, phase + spread, alpha=0.3)
             above.set_title(f"{name} to {output}", fontsize="small")
-            above.set_ylabel("|G|")
+            above.set_ylabel("|G| [output/input]")
             below.set_ylabel("phase [deg]")
     axes[0, 0].legend(fontsize="small")
 
@@ -61,12 +61,12 @@ def _coherence(result: FrequencyResponse, axes: Any) -> None:
     for o, output in enumerate(result.output_names):
         axes[o].semilogx(result.frequencies, result.coherence[o], lw=1.0)
         axes[o].set_ylim(0.0, 1.05)
-        axes[o].set_ylabel(f"coherence of {output}")
+        axes[o].set_ylabel(f"coherence of {output} [-]")
 
 
 def _transient(result: FrequencyResponse, axes: Any) -> None:
     for o, output in enumerate(result.output_names):
         axes[o].loglog(result.frequencies, np.abs(result.transient[o]), lw=1.0, label="transient")
         axes[o].loglog(result.frequencies, np.sqrt(result.noise_variance[o]), lw=1.0, label="noise")
-        axes[o].set_ylabel(output)
+        axes[o].set_ylabel(f"{output} [output unit]")
         axes[o].legend(fontsize="small")

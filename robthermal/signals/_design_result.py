@@ -197,13 +197,13 @@ class DesignCheck:
         if self.model_errors is not None:
             axes[0].loglog(self.frequencies, self.model_errors.max(axis=0), "k", lw=1.5, label="nominal model")
         axes[0].axhline(self.tolerance, color="black", lw=0.8, ls="--", label="tolerance")
-        axes[0].set_ylabel("relative error without noise")
+        axes[0].set_ylabel("relative error without noise [-]")
         axes[0].legend(fontsize="small")
         relative, variance = self.relative_deviation, self.variance
         shown = relative if relative is not None else np.sqrt(self.noise_gain[None] if variance is None else variance)
         for o, i in np.ndindex(*shown.shape[:2]):
             axes[1].loglog(self.frequencies, shown[o, i], lw=1.0, label=f"output {o}, input {i}")
-        label = "per unit of noise" if variance is None else "of G" if relative is None else "of G, relative"
+        label = "per unit of noise [-]" if variance is None else "of G [output/input]" if relative is None else "of G, relative [-]"
         axes[1].set_ylabel(f"deviation {label}")
         axes[1].set_xlabel("frequency [Hz]")
         axes[1].legend(fontsize="small")

@@ -102,8 +102,8 @@ class Excitation:
         for i, axis in enumerate(axes[:, 0]):
             for e, experiment in enumerate(self.signals[0]):
                 axis.step(time, experiment[: self.period, i], where="post", lw=0.8, label=f"experiment {e}")
-            axis.set_ylabel(f"input {i}")
+            axis.set_ylabel(f"input {i} [unit of the actuator]")
             axis.grid(True, alpha=0.3)
-        axes[0, 0].legend(fontsize="small")
+        axes[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, fontsize="small", frameon=False)
         axes[-1, 0].set_xlabel("time [s]")
         return axes[:, 0]

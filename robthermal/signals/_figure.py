@@ -30,7 +30,7 @@ def draw(record: Record) -> NDArray[Any]:
             paint = axis.step if kind == "inputs" else axis.plot
             place = own.index(name) if kind == "outputs" else -1 - own.index(name)  # inputs from the other end
             paint(record.time, record[name], label=name, color=COLORS[place % len(COLORS)], **style)
-        axis.set_ylabel(f"{_QUANTITIES.get(unit, kind)} [{unit}]" if unit else kind)
+        axis.set_ylabel(f"{_QUANTITIES.get(unit, kind)} [{unit or 'no unit given'}]")
         axis.grid(True, alpha=0.3)
         axis.set_title(kind, loc="left", fontsize="small")
         if names:

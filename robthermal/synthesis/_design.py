@@ -137,7 +137,7 @@ class Design:
         if np.isfinite(self.value):
             ax.axhline(self.value, color="0.5", linestyle="--", label="proven bound")
         ax.set_xlabel("frequency [rad/s]")
-        ax.set_ylabel("largest singular value of w to z")
+        ax.set_ylabel("largest singular value of w to z [z/w]")
         ax.legend(loc="best")
         return ax
 

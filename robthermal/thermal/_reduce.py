@@ -55,7 +55,7 @@ class Reduction:
         ax = axes_for(ax)
         ax.semilogy(range(1, len(self.hankel) + 1), np.maximum(self.hankel, 1e-300), "o")
         ax.axvline(self.order + 0.5, linestyle="--", label=f"order {self.order}")
-        ax.set(xlabel="state", ylabel="contribution", title="model reduction")
+        ax.set(xlabel="number of the state [-]", ylabel="contribution [output/input]", title="model reduction")
         ax.legend()
         return ax
 

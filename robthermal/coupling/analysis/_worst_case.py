@@ -81,7 +81,7 @@ class WorstCase:
             ax.loglog(hertz, spectra.T, color=color, linewidth=0.8)
             ax.loglog(hertz, bound, color=color, linestyle="--", label=f"{name} (dashed: bound)")
         ax.set_xlabel("frequency [Hz]")
-        ax.set_ylabel("weighted e12 per white noise")
+        ax.set_ylabel("weighted e12 per white noise [m/√Hz]")
         ax.legend()
         return ax
 

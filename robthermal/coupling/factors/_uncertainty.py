@@ -127,6 +127,7 @@ class Uncertainty:
             else:
                 ax.set_axis_off()
             ax.set_title(f"Δp {row + 1}{column + 1}")
+            ax.set_ylabel("magnitude [-]")
             ax.set_xlabel("frequency [Hz]")
         return axes
 

@@ -78,8 +78,8 @@ class MuBound:
             if self.certificate.holds:
                 ax.axhline(float(self.upper), color="k", lw=0.8, label="holds at every frequency")
             ax.set_xscale("symlog", linthresh=float(min(x[x > 0], default=1.0)))
-        ax.set_xlabel("frequency [rad/s]" if len(self.omega) else "matrix")
-        ax.set_ylabel("structured singular value")
+        ax.set_xlabel("frequency [rad/s]" if len(self.omega) else "number of the matrix [-]")
+        ax.set_ylabel("structured singular value [-]")
         ax.legend(fontsize="small")
         return ax
 

@@ -64,7 +64,7 @@ class Adequacy:
         both = {**self.sensors, **self.lumps}
         ax.barh(list(both), [-np.log10(max(p, 1e-300)) for p in both.values()])
         ax.axvline(-np.log10(SMALLEST_P), color="black", linewidth=0.7)
-        ax.set(xlabel="-log10 p")
+        ax.set(xlabel="-log10 p [-]")
         return ax
 
 

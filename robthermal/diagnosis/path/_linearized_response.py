@@ -107,7 +107,7 @@ class LinearizedResponse:
         """Magnitude of a deviation (2 n_b, m) of every element against frequency."""
         for name, column in zip(self.one.sensors, np.abs(as_complex(r)).T, strict=True):
             ax.loglog(self.one.frequencies, column, linewidth=0.7, label=name)
-        ax.set(xlabel="frequency [Hz]", ylabel="|measured − model|")
+        ax.set(xlabel="frequency [Hz]", ylabel="|measured − model| [output/input]")
 
     def columns(self, trials: Sequence[Candidate]) -> Array:
         """Change of the response (2 n_b, m, k) per unit of size of every trial; zero for what it cannot show."""
