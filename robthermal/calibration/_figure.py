@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._celsius import ZERO_CELSIUS
+from .._drawing import COLORS
 from ..signals import Record
 from ._score import Score
 
@@ -23,7 +24,7 @@ def draw(columns: list[Column], n_fitted: int, units: Mapping[str, str]) -> NDAr
 
     present = {units.get(name, "K") for _, residuals, _ in columns for name in residuals}
     kinds = [unit for unit in _SHOWN if unit in present] or ["K"]
-    size = (4.0 + 3.5 * len(columns), 5.0 * len(kinds))
+    size = (3.0 + 5.0 * len(columns), 5.0 * len(kinds))
     _, axes = plt.subplots(2 * len(kinds), len(columns), sharex="col", squeeze=False, layout="constrained",
                            figsize=size, height_ratios=(2, 1) * len(kinds))
     for place, (record, residuals, score) in enumerate(columns):
@@ -43,12 +44,13 @@ def _pair(above: Any, below: Any, record: Record, residuals: Mapping[str, NDArra
     """Readings of one unit, and their residuals below."""
     label, zero = _SHOWN[unit]
     for i, (name, residual) in enumerate(residuals.items()):
-        above.plot(record.time, record[name] - zero, ".", color=f"C{i}", markersize=2, alpha=0.4)
-        above.plot(record.time, record[name] - residual - zero, color=f"C{i}",
+        above.plot(record.time, record[name] - zero, ".", color=COLORS[i % len(COLORS)], markersize=2, alpha=0.4)
+        above.plot(record.time, record[name] - residual - zero, color=COLORS[i % len(COLORS)],
                    label=f"{name}, {score.rmse[name]:.3g} {unit}")
-        below.plot(record.time, residual, color=f"C{i}", linewidth=0.7)
+        below.plot(record.time, residual, color=COLORS[i % len(COLORS)], linewidth=0.7)
     above.set(ylabel=label)
     if residuals:
-        above.legend(fontsize="small", title="model, RMSE")
+        above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",
+                     title="model, RMSE")  # beside the curves, on none of them
     below.set(ylabel=f"measured − model [{unit}]")
     below.axhline(0.0, color="black", linewidth=0.5)

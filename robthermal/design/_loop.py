@@ -78,7 +78,7 @@ class ClosedLoop:
         """Plot what is regulated with its set-points [°C], other cold faces thin, and currents [A]; two axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
-        _, axes = plt.subplots(2, sharex=True, layout="constrained")
+        _, axes = plt.subplots(2, sharex=True, layout="constrained", figsize=(8.0, 4.8))
         for i, name in enumerate(_base(self.law).names):
             line, = axes[0].plot(self.time, self.regulated[:, i] - ZERO_CELSIUS, label=f"{name}: {self.points[i]}")
             if (self.regulated[:, i] != self.cold[:, i]).any():
@@ -87,7 +87,8 @@ class ClosedLoop:
             axes[0].plot(self.time, self.reference[:, i] - ZERO_CELSIUS, "--", color=line.get_color())
             axes[1].plot(self.time, self.current[:, i], color=line.get_color(), drawstyle="steps-post")
         axes[0].set(ylabel="temperature [°C]", title=self.outcome.code)
-        axes[0].legend()
+        axes[0].plot([], [], "--", color="0.5", label="set-point")
+        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)  # beside the curves
         axes[1].set(xlabel="time [s]", ylabel="current [A]")
         return axes
 

@@ -71,9 +71,8 @@ class NextExperiment:
         """Plot the inputs to apply and the readings that the best candidate predicts; returns the matplotlib axes."""
         axes = self.record.select(inputs=self.inputs or None).plot()
         axes[0].figure.suptitle("Next experiment")
-        for ax in axes:
-            ax.set_title("inputs to apply" if ax.get_title(loc="left") == "inputs" else "predicted readings",
-                         loc="left", fontsize="small")
+        axes[0].set_ylabel("inputs to apply [unit of the input]")
+        axes[1].set_ylabel("predicted readings [K]")
         return axes
 
 
