@@ -1,4 +1,4 @@
-"""What is wrong with a drawn figure: text over text, text cut off, axes without a label or a unit, curves without names."""
+"""What is wrong with a drawn figure: text over text or cut off, axes without a label or a unit, curves no name."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from itertools import combinations
 
+import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -23,10 +24,21 @@ def complaints(figure: Figure) -> list[str]:
              and min(first.y1, second.y1) - max(first.y0, second.y0) > SLACK]
     page = figure.bbox
     found += [f"{said!r} is cut off by the edge of the figure" for said, box in drawn
-              if box.x0 < page.x0 - SLACK or box.y0 < page.y0 - SLACK or box.x1 > page.x1 + SLACK or box.y1 > page.y1 + SLACK]
+              if min(box.x0 - page.x0, box.y0 - page.y0, page.x1 - box.x1, page.y1 - box.y1) < -SLACK]
     for axes in figure.axes:
         found += _of_axes(axes)
     return found
+
+
+def look_at_open_figures(*, described: bool) -> None:
+    """Complain of what a cell of a notebook has drawn, and close it; figures need an alternative text."""
+    found = [complaint for number in plt.get_fignums() for complaint in complaints(plt.figure(number))]
+    if plt.get_fignums() and not described:
+        found.append("a figure without alternative text")
+    if described and not plt.get_fignums():
+        found.append("an alternative text without a figure")
+    plt.close("all")
+    assert not found, found
 
 
 def _said(text: Text) -> str:
@@ -41,10 +53,11 @@ def _texts(figure: Figure) -> Iterator[Text]:
             scaled = axis.get_transform()
             low, high = sorted(scaled.transform(axis.get_view_interval()))
             margin = 1e-6 * (high - low)
+            shown = axes.axison and axes.get_visible()
             for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
                 labels = {tick.label1, tick.label2}
                 ticks |= labels
-                if axes.axison and axes.get_visible() and low - margin <= scaled.transform(tick.get_loc()) <= high + margin:
+                if shown and low - margin <= scaled.transform(tick.get_loc()) <= high + margin:
                     yield from (one for one in labels if one.get_visible() and _said(one))
             if not axes.axison:
                 ticks |= {axis.label, axis.offsetText}

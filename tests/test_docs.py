@@ -20,6 +20,9 @@ ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 SHOWN = "transients"  # the only notebook that docs/conf.py runs for tests; tests/test_notebooks.py runs them all
 
+# The kernel of the notebook must find this checkout, and draw into the page.
+SETTINGS = {"PYTHONPATH": str(ROOT), "MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -27,7 +30,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html"]
     command += ["-t", "tests", "-D", f"nb_execution_cache_path={target / 'notebooks'}"]
     command += ["-d", str(target / "doctrees"), str(DOCS), str(target / "html")]
-    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    run = subprocess.run(command, capture_output=True, text=True, env=os.environ | SETTINGS)
     assert run.returncode == 0, run.stderr
     return target / "html"
 
@@ -80,12 +83,32 @@ def test_the_system_and_record_of_the_start_page_are_read(tmp_path: Path) -> Non
     np.testing.assert_allclose(record["m1"], [0.0, 0.8])
 
 
+def run_blocks(page: str) -> dict[str, Any]:
+    """The names that the Python blocks of a page leave, run from top to bottom."""
+    names: dict[str, Any] = {}
+    for block in re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.M | re.S):
+        exec(compile(block, page, "exec"), names)  # noqa: S102  (our own documentation)
+    return names
+
+
+@pytest.mark.parametrize("page", ["from_matlab.md", "from_simscape.md", "from_tec_tool.md"])
+def test_pages_for_those_who_come_from_other_tools_run(page: str, tmp_path: Path,
+                                                       monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert "\nassert " in text and re.search(r"^```(matlab|text|sh)\n", text, re.M)
+    assert run_blocks(page)["rt"] is rt
+
+
+def test_every_name_of_the_tables_of_the_reference_exists() -> None:
+    named = re.findall(r"\{(?:func|class)\}`~robthermal\.(\w+)\.(\w+)`", (DOCS / "api" / "index.md").read_text("utf-8"))
+    assert len(named) > 100
+    assert [f"{package}.{name}" for package, name in named if not hasattr(getattr(rt, package), name)] == []
+
+
 def test_the_recipes_run_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / "how_to.md").read_text(encoding="utf-8"), re.M | re.S)
-    names: dict[str, Any] = {}
-    for block in blocks:
-        exec(compile(block, "how_to.md", "exec"), names)  # noqa: S102  (our own documentation)
+    names = run_blocks("how_to.md")
     found, proof, usable, possible = (names[name] for name in ("found", "proof", "usable", "possible"))
     assert found.verdict == "named" and found.effects[0].effect == "sensor_lag"
     assert names["verdict"].valid and proof.holds and possible.outcome.ok

@@ -70,7 +70,8 @@ class Placement:
         sizes = list(self.best)
         ax.plot(sizes, [radius for _, radius in self.best.values()], "o-")
         for size, (names, radius) in self.best.items():
-            ax.annotate(" ".join(names), (size, radius), (0, 6), textcoords="offset points", ha="center", fontsize="small")
+            ax.annotate(" ".join(names), (size, radius), (0, 6), textcoords="offset points", ha="center",
+                        fontsize="small")
         ax.margins(x=0.15, y=0.1)  # room for the names
         ax.axhline(1.0, color="k", lw=0.8, ls="--")
         ax.set(xlabel="number of sensors [-]", ylabel="spectral radius of the error, worst corner [-]", xticks=sizes)

@@ -203,8 +203,8 @@ class DesignCheck:
         shown = relative if relative is not None else np.sqrt(self.noise_gain[None] if variance is None else variance)
         for o, i in np.ndindex(*shown.shape[:2]):
             axes[1].loglog(self.frequencies, shown[o, i], lw=1.0, label=f"output {o}, input {i}")
-        label = "per unit of noise [-]" if variance is None else "of G [output/input]" if relative is None else "of G, relative [-]"
-        axes[1].set_ylabel(f"deviation {label}")
+        of_G = "of G [output/input]" if relative is None else "of G, relative [-]"
+        axes[1].set_ylabel("deviation " + ("per unit of noise [-]" if variance is None else of_G))
         axes[1].set_xlabel("frequency [Hz]")
         axes[1].legend(fontsize="small")
         return axes
