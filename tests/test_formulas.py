@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
 
 import pytest
 from docutils.utils.math import MathError
+from markdown_it import MarkdownIt
+from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-EXTENSION = Path(__file__).resolve().parents[1] / "docs" / "_ext" / "mathml.py"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+EXTENSION = DOCS / "_ext" / "mathml.py"
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,7 @@ def drawn(node: ElementTree.Element) -> str:
     (r"G_{\rm BLA}", "G_[BLA]"),
     (r"e = 0 \tag{6.21, corrected}", "e=0(6.21, corrected)"),
     (r"^2", "^[2]"),
+    (r"a\textstyle\sum_j", "a∑under[j]"),
     (r"\text{don't}\ x'", "don'tx^[′]"),
     (r"\operatorname{tr} P \iff a < b", "trP⟺a<b"),
 ])
@@ -67,3 +72,28 @@ def test_absolute_values_have_no_room_inside_their_bars(extension: ModuleType) -
 def test_what_cannot_be_shown_is_refused(extension: ModuleType, code: str) -> None:
     with pytest.raises(MathError):
         extension.mathml(code)
+
+
+def pages() -> dict[str, str]:
+    """The Markdown of the documentation, cells of notebooks included."""
+    found = {str(path.relative_to(DOCS)): path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md")}
+    for path in (DOCS / "tutorials").glob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        found[path.name] = "\n\n".join("".join(one["source"]) for one in cells if one["cell_type"] == "markdown")
+    return found
+
+
+def test_every_formula_of_the_pages_can_be_shown(extension: ModuleType) -> None:
+    """In seconds; the build of the site sees those of the docstrings as well, and warns with file and line."""
+    reader = MarkdownIt().use(dollarmath_plugin, double_inline=True)
+    shown, refused = 0, []
+    for name, text in pages().items():
+        tokens = reader.parse(text)
+        for token in [*tokens, *(child for token in tokens for child in token.children or ())]:
+            if token.type.startswith("math"):
+                try:
+                    extension.mathml(token.content, block=token.type == "math_block")
+                    shown += 1
+                except MathError as error:
+                    refused.append(f"{name}: {error}: {token.content}")
+    assert refused == [] and shown > 2000

@@ -21,6 +21,7 @@ _ACCENTS = {*accents.values(), *(sign for sign, _ in over.values())} - {over["ov
 _WORDS = re.compile(r"(\\(?:text|mathrm|operatorname|mbox|tag)\s*\{[^{}]*\})")
 _SIMPLE = [
     (re.compile(r"\\dots(?![a-zA-Z])"), r"\\ldots "),
+    (re.compile(r"\\(?:text|display)style(?![a-zA-Z])"), ""),  # docutils takes it at the start of a group only
     (re.compile(r"\\iff(?![a-zA-Z])"), r"\\;\\Longleftrightarrow\\;"),
     (re.compile(r"\\rm\s+(\w+)"), r"\\mathrm{\1}"),
     (re.compile(r"\\([bB]igg?)(?=[(\[]|\\\{|\\langle)"), r"\\\1l"),  # \big( has a left and a right in docutils
