@@ -89,7 +89,7 @@ def test_every_formula_of_the_pages_can_be_shown(extension: ModuleType) -> None:
     shown, refused = 0, []
     for name, text in pages().items():
         tokens = reader.parse(text)
-        for token in [*tokens, *(child for token in tokens for child in token.children or ())]:
+        for token in [*tokens, *(child for block in tokens for child in block.children or ())]:
             if token.type.startswith("math"):
                 try:
                     extension.mathml(token.content, block=token.type == "math_block")
