@@ -107,7 +107,7 @@ class InvariantEllipsoid:
             root = np.linalg.cholesky(both + 1e-300 * np.eye(2)) if n > 1 else np.sqrt(both)
             ax.plot(*(root @ np.vstack([np.cos(angle), np.sin(angle)])), label="never left")
             ax.legend(loc="best")
-        ax.set(xlabel="state 0", ylabel="state 1")
+        ax.set(xlabel="state 0 [unit of the state]", ylabel="state 1 [unit of the state]")
         return ax
 
 

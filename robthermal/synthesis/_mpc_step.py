@@ -73,7 +73,7 @@ class MpcStep:
         times = self.sample_time * np.arange(len(self.controls))
         for k, values in enumerate(self.controls.T):
             ax.step(times, values, where="post", label=f"control {k}")
-        ax.set(xlabel="time [s]", ylabel="control")
+        ax.set(xlabel="time [s]", ylabel="control [unit of the control]")
         ax.legend(loc="best")
         return ax
 
