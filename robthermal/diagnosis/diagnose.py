@@ -11,12 +11,13 @@ from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._changed import changed
+from ._doubts import doubts, may_be_the_room
 from ._graded import evidence_of, graded
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative
-from .data import Measured, as_measured, noise_floor
+from .data import Measured, as_measured, noise_floor, refuse_constant
 from .diagnosis import Diagnosis, Found
 from .effects import candidates
 from .evidence import (
@@ -83,7 +84,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     Raises
     ------
     InputError
-        Records too short, validation on the training data, no noise declared and none visible, a nominal model that
+        Records too short, readings that never change, validation on the training data, no noise declared and none visible, a nominal model that
         runs away, an unknown effect.
 
     Examples
@@ -122,6 +123,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("refitting the nominal system")
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
+    refuse_constant(nominal.system, [path.one for path in nominal.records])
     judged = judge(searched(nominal, names, checked, progress), checked, progress)
     judged = graded(reconsider_noise(judged, checked), checked, progress)
     progress("locating the misfit and planning the next experiment")
@@ -167,7 +169,8 @@ def concluded(judged: Judged) -> Diagnosis:
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves)
-    said = [judged.outcome.text, *map(str, filter(None, (rest, resolves))), *fit.contradictions,
+    said = [judged.outcome.text, *nominal.floor.remarks, *map(str, filter(None, (rest, resolves))),
+            *fit.contradictions, *may_be_the_room(nominal, state.fit.structure.effects),
             *doubts(nominal.system, judged.plain is not None)]
     return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
 
@@ -184,22 +187,6 @@ def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:
         evidence = evidence_of(state.rounds, state.fit, state.nominal)
     return tuple(_found(state.fit, i, round_, evidence[i] if named else None, judged.plain is not None)
                  for i, round_ in enumerate(state.rounds))
-
-
-def doubts(system: System, remainder: bool) -> list[str]:
-    """What to hold against a name beside a remainder, a sentence each: the suite of foreign truth found these wrong.
-
-    Parameters
-    ----------
-    system : System
-        Nominal system that was diagnosed.
-    remainder : bool
-        Whether a name stands beside a remainder.
-    """
-    if not system.modules or not remainder:
-        return []
-    return ["A module has no inside of its own in this test. On simulated stacks with a module 2 of 7 such names were "
-            "wrong, and both records with nothing missing got one: confirm this name on the machine."]
 
 
 def _hidden(state: SearchState) -> dict[Name, str]:

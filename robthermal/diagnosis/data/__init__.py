@@ -11,6 +11,7 @@ from ._measured import without_outliers as without_outliers
 from ._noise_estimate import NoiseEstimate as NoiseEstimate
 from ._noise_estimate import noise_floor as noise_floor
 from ._record_data import RecordData as RecordData
+from ._remarks import refuse_constant as refuse_constant
 
 __all__ = ["Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
-           "noise_floor", "records_of", "responses_of", "without_outliers"]
+           "noise_floor", "records_of", "refuse_constant", "responses_of", "without_outliers"]

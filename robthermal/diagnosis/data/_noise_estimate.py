@@ -16,6 +16,7 @@ from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ._glitches import counted
 from ._measured import as_measured, records_of, responses_of
+from ._remarks import remarks
 
 Array = NDArray[np.float64]
 _SHORTEST = 50  # samples
@@ -44,6 +45,9 @@ class NoiseEstimate:
         Sensors whose steps are more than two standard deviations of their noise: their errors are no white noise.
     units : dict
         Unit of every sensor: "K", or "V" of a voltage; "-" of a frequency response, whose noise is relative.
+    remarks : tuple of str
+        What the records cannot show whatever the model, a sentence each: stuck, held or saturated readings, inputs that
+        never change, restarts.
     """
 
     noise: dict[str, float]
@@ -54,6 +58,7 @@ class NoiseEstimate:
     glitches: dict[str, int] = field(default_factory=dict)
     quantized: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         lines = [f"{'sensor':<12} {'noise':>10} {'differences':>12}  unit"]
@@ -62,6 +67,7 @@ class NoiseEstimate:
         lines += [f"{name}: {n} isolated outliers left out" for name, n in self.glitches.items()]
         lines += [f"{name}: quantized; its errors count as noise of step/√12, and are not tested for whiteness"
                   for name in self.quantized]
+        lines += self.remarks
         return "\n".join([*lines, str(self.outcome)])
 
     def plot(self, ax: Any = None) -> Any:
@@ -144,7 +150,7 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
     return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
                          _outcome(noise_of, rough, unknown, units), glitches, _quantized(data, noise_of),
-                         {**units, **dict.fromkeys(relative, "-")})
+                         {**units, **dict.fromkeys(relative, "-")}, remarks(system, data, noise_of))
 
 
 def _refuse_short(data: Sequence[Data]) -> None:

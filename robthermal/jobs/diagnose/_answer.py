@@ -31,8 +31,10 @@ def answer_sentence(found: Diagnosis) -> str:
             f"The model lacks {accepted_in_words(found)}")
         return f"{said}. With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
     if found.verdict == "consistent":
-        return nothing_changed(found) if found.reference else (
-            "The model explains the records: its error is no larger than the noise of the sensors allows.")
+        if found.reference:
+            return nothing_changed(found)
+        text = "The model explains the records: its error is no larger than the noise of the sensors allows."
+        return " ".join([text, *found.noise_floor.remarks[:1]])
     what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
             "Something is missing in the model that no effect of the catalog explains")
     return (f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "

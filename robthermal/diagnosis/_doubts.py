@@ -1,0 +1,49 @@
+"""What to hold against a name, a sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..thermal import System
+from .effects import Candidate
+from .fit import Refit
+
+_LIKE_THE_ROOM = ("heat_source", "periodic_load", "ambient_gradient")  # heats that a warmer or colder room gives too
+
+
+def doubts(system: System, remainder: bool) -> list[str]:
+    """What to hold against a name beside a remainder: the suite of foreign truth found these wrong.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system that was diagnosed.
+    remainder : bool
+        Whether a name stands beside a remainder.
+    """
+    if not system.modules or not remainder:
+        return []
+    return ["A module has no inside of its own in this test. On simulated stacks with a module 2 of 7 such names were "
+            "wrong, and both records with nothing missing got one: confirm this name on the machine."]
+
+
+def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
+    """Which effects may be an ambient that was not recorded: heats into a lump that is joined to it.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Fit of the nominal system that was diagnosed.
+    effects : sequence of Candidate
+        Effects that were accepted, provisional ones included.
+    """
+    said = []
+    for room in nominal.system.ambients:
+        if all(room in path.one.record.input_names for path in nominal.records):
+            continue
+        joined = {end for link in nominal.system.links if room in link.between for end in link.between}
+        labels = [one.label for one in effects if one.effect.name in _LIKE_THE_ROOM and one.where[0] in joined]
+        if labels:
+            said.append(f"{room} was not recorded: {', '.join(labels)} may be {room} itself, warmer or colder than the "
+                        "system says, or drifting. Record it.")
+    return said
