@@ -84,8 +84,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     Raises
     ------
     InputError
-        Records too short, readings that never change, validation on the training data, no noise declared and none visible, a nominal model that
-        runs away, an unknown effect.
+        Records too short, readings that never change, validation on the training data, no noise declared and none
+        visible, a nominal model that runs away, an unknown effect.
 
     Examples
     --------
