@@ -48,8 +48,8 @@ def lpv_level(plants: Sequence[GeneralizedPlant]) -> float:
                             [p.C1, p.D11, -level * np.eye(q)]])
         outer_R = _outer(np.hstack([p.B2.T, p.D12.T]), m)
         outer_S = _outer(np.hstack([p.C2, p.D21]), q)
-        constraints += [_negative(outer_R.T @ controls @ outer_R), _negative(outer_S.T @ measured @ outer_S)]
-    return _minimum(level, constraints)
+        constraints += [negative(outer_R.T @ controls @ outer_R), negative(outer_S.T @ measured @ outer_S)]
+    return minimum(level, constraints)
 
 
 def h2_level(plant: GeneralizedPlant) -> float:
@@ -68,7 +68,7 @@ def h2_level(plant: GeneralizedPlant) -> float:
                         [p.B1.T, driven.T, -np.eye(m)]])
     eye, seen = np.eye(n), p.C1 @ X + p.D12 @ C_hat
     bound = cp.bmat([[X, eye, seen.T], [eye, Y, p.C1.T], [seen, p.C1, Q]])
-    return float(np.sqrt(_minimum(cp.trace(Q), [_negative(lyapunov), (bound + bound.T) / 2 >> 0])))
+    return float(np.sqrt(minimum(cp.trace(Q), [negative(lyapunov), (bound + bound.T) / 2 >> 0])))
 
 
 def margin_step(bins: Bins, at: Array, objective: Array, margin: float) -> Array:
@@ -97,14 +97,14 @@ def polytope_level(vertices: Vertices, objective: str) -> float:
                                     strict=True):
         moved, seen = A @ W + B2 @ Y, C @ W + D2 @ Y
         if objective == "hinf":
-            constraints.append(_negative(cp.bmat([[moved + moved.T, B1, seen.T], [B1.T, -np.eye(w), D1.T],
+            constraints.append(negative(cp.bmat([[moved + moved.T, B1, seen.T], [B1.T, -np.eye(w), D1.T],
                                                   [seen, D1, -g * np.eye(p)]])))
         else:
             Z = cp.Variable((w, w), symmetric=True)
             energy = cp.bmat([[Z, B1.T], [B1, W]])
-            constraints += [_negative(cp.bmat([[moved + moved.T, seen.T], [seen, -np.eye(p)]])),
+            constraints += [negative(cp.bmat([[moved + moved.T, seen.T], [seen, -np.eye(p)]])),
                             (energy + energy.T) / 2 >> 0, cp.trace(Z) <= g]
-    return float(np.sqrt(_minimum(g, constraints)))
+    return float(np.sqrt(minimum(g, constraints)))
 
 
 def _outer(rows: Array, more: int) -> Array:
@@ -115,11 +115,13 @@ def _outer(rows: Array, more: int) -> Array:
     return found
 
 
-def _negative(matrix: Any) -> Any:
+def negative(matrix: Any) -> Any:
+    """The constraint matrix <= 0, of what is symmetric but for the way it is written."""
     return (matrix + matrix.T) / 2 << 0
 
 
-def _minimum(objective: Any, constraints: list[Any]) -> float:
+def minimum(objective: Any, constraints: list[Any]) -> float:
+    """Least objective; InputError where the program is not solved."""
     problem = cp.Problem(cp.Minimize(objective), constraints)
     try:
         problem.solve(solver=cp.CLARABEL, **_SETTINGS)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
 
 from .._arrays import Array
-from ..conic import Inequality, inside
+from ..conic import Inequality, Point, inside
 from ..linear import Plant, close
 from ._affine import Matrices, Unknowns, symmetric
 from ._plant import GeneralizedPlant, with_direct_path
@@ -54,10 +54,7 @@ def solved_for(plant: GeneralizedPlant, aims: Aims, known: Plant) -> Plant | Non
     aims = replace(aims, norm2=moved(aims.norm2, T), norminf=moved(aims.norminf, T))
     own = moved(plant, T)
     assert own is not None
-    unknowns = _unknowns(own, aims)
-    inequalities = [unknowns.inequality(form, _MARGIN) for form in _forms(aims, own)]
-    cost = unknowns.gradient(lambda v: _cost(aims, v))
-    first = inside(inequalities, cost)
+    unknowns, inequalities, cost, first = _optimum(own, aims)
     if not np.isfinite(first.value) or not first.x.any():
         return None
     found = _apart(unknowns, inequalities, cost, first.value, len(own.A))
@@ -66,6 +63,14 @@ def solved_for(plant: GeneralizedPlant, aims: Aims, known: Plant) -> Plant | Non
         if K is not None:
             return with_direct_path(K, plant.D22)
     return None
+
+
+def _optimum(plant: GeneralizedPlant, aims: Aims) -> tuple[Unknowns, list[Inequality], Array, Point]:
+    """The program and its solution."""
+    unknowns = _unknowns(plant, aims)
+    inequalities = [unknowns.inequality(form, _MARGIN) for form in _forms(aims, plant)]
+    cost = unknowns.gradient(lambda v: _cost(aims, v))
+    return unknowns, inequalities, cost, inside(inequalities, cost)
 
 
 def _cost(aims: Aims, v: Matrices) -> float:
