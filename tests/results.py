@@ -32,7 +32,7 @@ jobs.write_job report.Claim report.UsableRange signals.declared signals.design_c
 signals.multisines systems.datasheets thermal.Assembly thermal.Material thermal.Stepper thermal.add_effect
 thermal.load_curve thermal.module_from_polynomials thermal.reduce thermal.steady_state thermal.system_from_matrices
 thermal.trajectory thermal.invert_datasheet thermal.size_sink design.tune_pi synthesis.hinf
-thermal.DrivableRange thermal.PwmRipple
+design.protection design.setpoint_ramp thermal.DrivableRange thermal.PwmRipple
 synthesis.anti_windup synthesis.frf_pid synthesis.lpv synthesis.polytopic_feedback synthesis.invariant_ellipsoid
 synthesis.mpc
 design.tem_feedback""".split()

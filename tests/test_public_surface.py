@@ -40,7 +40,8 @@ SURFACE = {
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DESIGN_FORMAT
         DesignCode DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
         LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
-        Polarity Reach Reachable RegulatedPoint Seen StateFeedback StepResponseLinearity Tuning certify_loop
+        Polarity Protection ProtectionRules Reach Reachable RegulatedPoint Seen SetpointRamp StateFeedback
+        StepResponseLinearity Tuning certify_loop protection setpoint_ramp
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback

@@ -65,6 +65,11 @@ from ._plant import ColdSide as ColdSide
 from ._plant import cold_side as cold_side
 from ._polarity import Polarity as Polarity
 from ._polarity import check_polarity as check_polarity
+from ._protection import Protection as Protection
+from ._protection import protection as protection
+from ._protection_rules import ProtectionRules as ProtectionRules
+from ._ramp import SetpointRamp as SetpointRamp
+from ._ramp import setpoint_ramp as setpoint_ramp
 from ._reachable import Reachable as Reachable
 from ._reachable import reachable as reachable
 from ._regulated_points import RegulatedPoint as RegulatedPoint
@@ -91,13 +96,13 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate",
            "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController",
            "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
-           "PlantMargins", "Polarity", "Reach", "Reachable", "RegulatedPoint", "Seen", "StateFeedback",
-           "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity", "checked_margins",
-           "cold_side", "collapse", "constant_gain", "corner_plants", "disturbance_observer", "face_ranges",
-           "feed_forward", "feedback_linearization", "gains_digest", "linear_controller", "load_controller",
-           "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "reachable", "regulated_points",
-           "simulate_loop", "state_feedback", "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi",
-           "unobservable"]
+           "PlantMargins", "Polarity", "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint",
+           "Seen", "SetpointRamp", "StateFeedback", "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop",
+           "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain", "corner_plants",
+           "disturbance_observer", "face_ranges", "feed_forward", "feedback_linearization", "gains_digest",
+           "linear_controller", "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors",
+           "protection", "reachable", "regulated_points", "setpoint_ramp", "simulate_loop", "state_feedback",
+           "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi", "unobservable"]
 # of synthesis
 __all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign",
             "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
