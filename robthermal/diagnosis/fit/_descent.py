@@ -1,4 +1,4 @@
-"""Gauss-Newton with bounds; where a step fails, shorter ones, then Marquardt's damping."""
+"""Gauss-Newton with bounds; where a step fails, one along the curvature it shows, then Marquardt's damping."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ from ...errors import Diverged, InputError
 
 Array = NDArray[np.float64]
 _FLAT = 1e-10  # relative singular value that is rounding
-_TOO_LONG = 0.5  # a shorter step is tried if the parabola's lowest point lies at this part of it, or farther
 _DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squares of the derivatives
+_LESS = 0.1  # factor on a damping that was not needed
+_NONE = 1e-7  # damping below which the full step is tried
+_WORTH = 0.05  # of the decrease that the linearization predicts: less is left to a larger damping
+_AS_PREDICTED = 0.75  # of the predicted decrease: the model is nearly linear along the step, which may be longer
 
 
 class Problem(Protocol):
@@ -73,8 +76,7 @@ class Descent:
     at : Point
         The best one.
     converged : bool
-        Whether a further step, shortened or damped where longer ones fail, would change the sum of squares by less
-        than `enough`.
+        Whether a further step, damped where longer ones fail, would change the sum of squares by less than `enough`.
     iterations : int
         Number of evaluations.
     """
@@ -106,11 +108,8 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
     while count < limit:
         power = float(now.z @ now.z)
         little = enough * power * (1.0 + 10.0 * np.log(max(power / now.z.size, 1.0)))
-        lowest = 0.0
-        for share, damping in _lengths(damped):
-            if share < 1.0 and lowest < share * _TOO_LONG:
-                continue
-            step = share * _damped_step(now, damping, bounds, little)
+        for damping in _dampings(damped):
+            step = _damped_step(now, damping, bounds, little)
             J, z = now.small
             decrease = power - float(np.sum((z - J @ step) ** 2))
             if decrease <= little:
@@ -120,11 +119,18 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
             count += 1
             new = Point(problem, np.clip(now.v + step, *bounds))  # a rounding may lie beyond
             if _better(new, power - 1e-4 * decrease, count < limit):
+                damped = _relaxed(damping) if power - float(new.z @ new.z) > _AS_PREDICTED * decrease else damping
                 break
-            lowest = _lowest(now, new, step)
+            curved, gain = _curved(now, new, step, damping, bounds)
+            if gain > max(little, _WORTH * decrease) and count < limit:
+                count += 1
+                new = Point(problem, np.clip(now.v + curved, *bounds))
+                if _better(new, power - 1e-4 * gain, count < limit):
+                    damped = damping
+                    break
         else:
             return Descent(now, False, count)
-        now, damped = new, damping
+        now = new
     return Descent(now, False, count)
 
 
@@ -140,25 +146,48 @@ def _better(new: Point, power: float, goes_on: bool) -> bool:
     return True
 
 
-def _lengths(damped: float) -> list[tuple[float, float]]:
-    """Share and damping of the steps tried one after the other, if the step before had to be damped by so much.
+def _dampings(first: float) -> list[float]:
+    """Dampings tried one after the other: the first one, then larger ones; it is not looked for from the beginning."""
+    return [first, *(damping for damping in _DAMPINGS if damping > 2.0 * first)]
 
-    The full step; shorter ones in its direction; then ones that turn away from what the data hardly determine. In a
-    curved valley step after step needs the same damping: it is not looked for again from the beginning.
+
+def _relaxed(damping: float) -> float:
+    """Damping of the next step after one that was as good as predicted; none if it is next to nothing."""
+    return _LESS * damping if _LESS * damping > _NONE else 0.0
+
+
+def _curved(now: Point, new: Point, step: Array, damping: float, bounds: tuple[Array, Array]) -> tuple[Array, float]:
+    """Step along the parabola that a failed step shows, and its predicted decrease; 0 if it leads nowhere.
+
+    What the failed step found beyond its linearization is the curvature of the residuals along it; t step + t² bent
+    follows the valley (geodesic acceleration, Transtrum and Sethna 2012), with the t at which the sum of squares of
+    z - t J step - t² (curvature + J bent) is lowest.
     """
-    shares = [(1.0, 0.0)] if damped else [(1.0, 0.0), (0.5, 0.0), (0.25, 0.0)]
-    return shares + [(1.0, damping) for damping in _DAMPINGS if damping > 0.05 * damped]
-
-
-def _lowest(now: Point, new: Point, step: Array) -> float:
-    """Share of a step at which the parabola through both sums of squares is lowest; 0 if the step leads nowhere."""
-    J, z = now.small
-    slope = -2.0 * float(z @ (J @ step))
     try:
-        bend = float(new.z @ new.z) - float(now.z @ now.z) - slope
+        beyond = now.z - now.J @ step - new.z
     except (Diverged, InputError):
-        return 0.0
-    return -slope / (2.0 * bend) if np.isfinite(bend) and bend > 0 else 0.0
+        return step, 0.0
+    if not np.isfinite(beyond).all():
+        return step, 0.0
+    J = now.J
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    rows = np.concatenate([J / scale, np.sqrt(damping) * np.eye(step.size)]) if damping else J / scale
+    bent = np.linalg.lstsq(rows, np.concatenate([-beyond, np.zeros(len(rows) - len(J))]), rcond=_FLAT)[0] / scale
+    along, across = J @ step, beyond + J @ bent
+    t = _lowest(now.z, along, across)
+    curved = np.clip(now.v + t * step + t**2 * bent, *bounds) - now.v
+    predicted = now.z - t * along - t**2 * across
+    return curved, float(now.z @ now.z - predicted @ predicted)
+
+
+def _lowest(z: Array, along: Array, across: Array) -> float:
+    """The t between 0 and 1 at which |z - t along - t² across|² is lowest."""
+    quartic = np.polynomial.Polynomial([z @ z, -2.0 * (z @ along), along @ along - 2.0 * (z @ across),
+                                        2.0 * (along @ across), across @ across])
+    roots = quartic.deriv().roots()
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return float(min([t for t in real if 0.0 < t < 1.0] + [1.0], key=quartic))
 
 
 def _damped_step(at: Point, damping: float, bounds: tuple[Array, Array], little: float) -> Array:
