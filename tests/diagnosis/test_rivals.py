@@ -80,8 +80,14 @@ def test_a_path_from_between_two_lumps_has_two_names():
     assert all(neighboring(bar(), entry.candidate, one.best.candidate) for entry in both.contenders)
 
 
-def test_a_path_from_the_middle_of_a_lump_keeps_its_name():
-    assert names(with_neighbors(found(18))) == {frozenset({"x2", "x5"})}
+def test_a_path_from_the_middle_of_a_lump_is_among_its_names():
+    """With every fit at its optimum the neighbor is as good: 1637 and 1638 of 1693; what is farther is not."""
+    one = found(18)
+    removed = {frozenset(entry.candidate.where): one.before.rss - entry.fit.rss
+               for entry in (one.best, *with_neighbors(one).contenders)}
+    most = max(removed.values())
+    assert one.before.outcome.ok and removed[frozenset({"x2", "x5"})] > 0.9 * most
+    assert all(gain < 0.5 * most for where, gain in removed.items() if where not in ({"x1", "x5"}, {"x2", "x5"}))
 
 
 @pytest.mark.parametrize(("one", "other", "answer"), [

@@ -159,9 +159,9 @@ def _relaxed(damping: float) -> float:
 def _curved(now: Point, new: Point, step: Array, damping: float, bounds: tuple[Array, Array]) -> tuple[Array, float]:
     """Step along the parabola that a failed step shows, and its predicted decrease; 0 if it leads nowhere.
 
-    What the failed step found beyond its linearization is the curvature of the residuals along it; t step + t² bent
-    follows the valley (geodesic acceleration, Transtrum and Sethna 2012), with the t at which the sum of squares of
-    z - t J step - t² (curvature + J bent) is lowest.
+    What the failed step found beyond its linearization is the curvature of the residuals along it. t step +
+    t² acceleration follows the valley (geodesic acceleration, Transtrum and Sethna 2012), with the t at which the sum
+    of squares of z - t J step - t² (curvature + J acceleration) is lowest.
     """
     try:
         beyond = now.z - now.J @ step - new.z
@@ -173,10 +173,11 @@ def _curved(now: Point, new: Point, step: Array, damping: float, bounds: tuple[A
     scale = np.linalg.norm(J, axis=0)
     scale[scale == 0] = 1.0
     rows = np.concatenate([J / scale, np.sqrt(damping) * np.eye(step.size)]) if damping else J / scale
-    bent = np.linalg.lstsq(rows, np.concatenate([-beyond, np.zeros(len(rows) - len(J))]), rcond=_FLAT)[0] / scale
-    along, across = J @ step, beyond + J @ bent
+    against = np.concatenate([-beyond, np.zeros(len(rows) - len(J))])
+    acceleration = np.linalg.lstsq(rows, against, rcond=_FLAT)[0] / scale
+    along, across = J @ step, beyond + J @ acceleration
     t = _lowest(now.z, along, across)
-    curved = np.clip(now.v + t * step + t**2 * bent, *bounds) - now.v
+    curved = np.clip(now.v + t * step + t**2 * acceleration, *bounds) - now.v
     predicted = now.z - t * along - t**2 * across
     return curved, float(now.z @ now.z - predicted @ predicted)
 
