@@ -13,6 +13,7 @@ from . import (
     _gain,
     _invariance,
     _network,
+    _network_peak,
     _observer,
     _polytope,
     _runaway,
@@ -31,8 +32,9 @@ KINDS: dict[str, Kind] = {
     "stability": (_stability.read, _stability.check), "gain": (_gain.read, _gain.check),
     "observer": (_observer.read, _observer.check), "polytope": (_polytope.read, _polytope.check),
     "ellipsoid": (_ellipsoid.read, _ellipsoid.check),
-    "scheduled": (_scheduled.read, _scheduled.check)}
-OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop", "network_peak")
+    "scheduled": (_scheduled.read, _scheduled.check),
+    "network_peak": (_network_peak.read, _network_peak.check)}
+OTHERS = ("regulated", "loop", "hinf", "peak", "frequency", "closed_loop")
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,20 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     """Return the problem of the sections of a certificate."""
     system, region, evidence = parts["system"], parts["region"], parts["evidence"]
     spread = not_negative(region.get("uncertainty", 0), "region.uncertainty")
+    capacity, rows, cols, values = matrix_of(system)
+    n = len(capacity)
+    method = text(evidence.get("method", "max"), "evidence.method")
+    if method not in ("max", "sum"):
+        raise Malformed(f"evidence.method: {short(method)}")
+    if spread >= 1 or (spread > 0 and method != "max"):
+        raise Malformed("region.uncertainty: must be below 1, with method max")
+    weights = numbers(get(evidence, "weights", "evidence"), n, "evidence.weights")
+    rate = not_negative(get(evidence, "rate", "evidence"), "evidence.rate")
+    return Problem(capacity, rows, cols, values, method, rate, weights, margin(parts["margin"], "rate"), spread)
+
+
+def matrix_of(system: Mapping[str, Any]) -> tuple[list[Fraction], list[int], list[int], list[Fraction]]:
+    """Return capacities, and rows, columns and values of all entries of A."""
     capacity = _numbers(get(system, "capacity", "system"), "system.capacity")
     if not capacity or min(capacity) <= 0:
         raise Malformed("system.capacity: missing or not positive")
@@ -43,14 +57,7 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
         raise Malformed("system: rows, cols and values differ in number")
     if len(set(zip(rows, cols, strict=True))) < len(rows):
         raise Malformed("system.rows, system.cols: an entry is given twice")
-    method = text(evidence.get("method", "max"), "evidence.method")
-    if method not in ("max", "sum"):
-        raise Malformed(f"evidence.method: {short(method)}")
-    if spread >= 1 or (spread > 0 and method != "max"):
-        raise Malformed("region.uncertainty: must be below 1, with method max")
-    weights = numbers(get(evidence, "weights", "evidence"), n, "evidence.weights")
-    rate = not_negative(get(evidence, "rate", "evidence"), "evidence.rate")
-    return Problem(capacity, rows, cols, values, method, rate, weights, margin(parts["margin"], "rate"), spread)
+    return capacity, rows, cols, values
 
 
 def check(problem: Problem) -> Answer:

@@ -12,6 +12,7 @@ from . import (
     _gain,
     _invariance,
     _network,
+    _network_peak,
     _observer,
     _polytope,
     _runaway,
@@ -165,6 +166,14 @@ def _network_claim(problem: _network.Problem, parts: Parts) -> str:
             f"inputs {_rate(problem.rate)}.")
 
 
+def _network_peak_claim(problem: _network_peak.Problem, parts: Parts) -> str:
+    return (f"In the thermal network of {len(problem.capacity)} lumps and {len(problem.rows)} entries (machine "
+            f"{machine_hash(parts['system'])}), continuous plant, nominal parameters, without heat loads, temperatures "
+            f"counted from that of the surroundings: from every start in which no lump is warmer than its entry in "
+            f"table {short_hash(parts['region']['start'])}, lump {problem.lump} (counted from 0) never exceeds "
+            f"{decimal(problem.bound)} K in the first {decimal(problem.horizon)} s.")
+
+
 def _runaway_claim(problem: _runaway.Problem, parts: Parts) -> str:
     words = {}
     for key, value in problem.constants.items():
@@ -300,5 +309,5 @@ def _scheduled_claim(problem: _scheduled.Problem, parts: Parts) -> str:
 _KINDS: dict[str, Callable[[Any, Parts], str]] = {
     "contraction": _contraction_claim, "invariance": _invariance_claim, "gain": _gain_claim,
     "observer": _observer_claim, "polytope": _polytope_claim, "ellipsoid": _ellipsoid_claim,
-    "scheduled": _scheduled_claim,
+    "scheduled": _scheduled_claim, "network_peak": _network_peak_claim,
     "network": _network_claim, "runaway": _runaway_claim, "stability": _stability_claim}

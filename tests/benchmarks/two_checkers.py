@@ -23,7 +23,7 @@ import mutant_thermal  # noqa: E402
 from agreement import both, cases  # noqa: E402
 
 COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope", "ellipsoid",
-           "scheduled")
+           "scheduled", "network_peak")
 SUBJECTS = [subject for subject in (*mutant_thermal.SUBJECTS, *mutant_linear.SUBJECTS, *mutant_feedback.SUBJECTS,
             *mutant_ellipsoid.SUBJECTS, *mutant_scheduled.SUBJECTS)
             if subject.kind in COVERED]

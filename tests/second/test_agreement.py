@@ -29,7 +29,7 @@ SUBJECTS = {subject.kind: subject for subject in (*mutant_thermal.SUBJECTS, *mut
                                                   *mutant_feedback.SUBJECTS, *mutant_ellipsoid.SUBJECTS,
                                                   *mutant_scheduled.SUBJECTS)}
 COVERED = ("contraction", "invariance", "runaway", "network", "stability", "gain", "observer", "polytope",
-           "ellipsoid", "scheduled")
+           "ellipsoid", "scheduled", "network_peak")
 
 
 def document_of(certificate) -> dict:
