@@ -20,7 +20,7 @@ from ._sections import made_by
 
 _SLACK = 5e-4  # of the largest value, between it and the bound
 _SURPLUS = 30.0  # exponent of what the sum leaves out
-_MOST = 10_000  # pieces of time
+_MOST = 5_000  # pieces of time
 _GRID, _ZOOMS = 1000, 4  # times where the largest value is looked for, and how often around it
 
 

@@ -23,7 +23,7 @@ from ._sparse import Numbers, Sparse, moderate, one_per_lump, read_sparse
 
 _BITS = 128
 _HIGHEST = 100_000  # degree
-_PRODUCTS, _EDGES, _TERMS = 1.5e10, 10_000, 1e7  # of entries and degree, and of the sums: a minute each
+_PRODUCTS, _EDGES, _TERMS = 1e10, 5_000, 5e6  # of entries and degree, and of the sums: less than a minute each
 
 
 @dataclass(frozen=True)

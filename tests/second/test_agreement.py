@@ -19,6 +19,7 @@ import mutant_thermal
 import numpy as np
 import pytest
 from agreement import both, cases, judge
+from heat3d import MAXIMA, heat3d
 
 import recheck
 import robthermal as rt
@@ -162,3 +163,16 @@ def test_the_page_names_every_key_of_every_kind():
         own = {*parts["system"].get("lumps", {}), *parts["system"].get("modules", {}),
                *parts["system"].get("ambients", []), *parts["region"].get("parameters", {})}
         assert kind in words and keys(parts, set()) - own <= words, kind
+
+
+def test_heat3d_by_both():
+    """125 lumps; and a bound just below the published maximum is not valid, whatever its evidence."""
+    A, start, lump = heat3d(5)
+    found = rt.certify.network_peak(np.ones(125), A, lump, start, 40.0)
+    content = json.loads(json.dumps(document_of(found), default=lambda value: value.tolist()))
+    pair = judge(content)
+    assert pair.first and pair.second == "valid", pair.reasons
+    content["region"]["bound"] = MAXIMA[5] - 1e-5
+    content["claim"] = content["claim"].replace(str(found.region["bound"]), str(content["region"]["bound"]))
+    pair = judge(content)
+    assert not pair.first and pair.second == "not valid" and "too large" in pair.reasons[1], pair.reasons

@@ -13,6 +13,7 @@ from recheck._ball import BITS, exponential
 from recheck._definite import Factor, Scaling, definite, finish
 from recheck._exact import Malformed, exact, power
 from recheck._hash import short_hash
+from recheck._network_peak import _at, _powers, read
 from recheck._polynomial import positive_on, variables
 from recheck._sentences import decimal
 from recheck._stability import characteristic, routh
@@ -161,3 +162,25 @@ def test_signs_of_polynomials_on_boxes():
     assert positive_on(y - x * 3, unit) is False
     point = [(Fraction(1, 2), Fraction(1, 2)), (Fraction(1), Fraction(1))]
     assert positive_on(y - x * 2, point, strict=False) is True and positive_on(y - x * 2, point) is False
+
+
+def test_temperatures_by_powers_are_enclosed():
+    """z and its slope with their errors, against scipy's exponential; the growth of the warmest row taken out."""
+    rng = np.random.default_rng(6)
+    for n in (1, 2, 6):
+        A = np.triu(np.round(rng.uniform(0, 2, (n, n)), 2), 1)
+        A = A + A.T - np.diag(np.round(A.sum(axis=0) + A.sum(axis=1) + rng.uniform(0.1, 1, n), 2))
+        E, start = np.round(rng.uniform(1, 9, n), 1), np.round(rng.uniform(-5, 9, n), 1)
+        rows, cols = np.nonzero(np.ones((n, n)))
+        found = read({"system": {"capacity": E.tolist(), "rows": rows.tolist(), "cols": cols.tolist(),
+                                 "values": A[rows, cols].tolist()},
+                      "region": {"start": start.tolist(), "lump": 0, "horizon": 40, "bound": 1}, "margin": {},
+                      "evidence": {"degree": 9, "edges": [40]}})
+        for growth in (Fraction(0), Fraction(1, 7)):
+            powers = _powers(found, Fraction(20), growth)
+            for t in (Fraction(1, 1000), Fraction(3), Fraction(40)):
+                z, slope, error, slope_error = map(float, _at(powers, t))
+                flow = A / E[:, None] - float(growth) * np.eye(n)
+                state = expm(flow * float(t)) @ start
+                assert error < 1e-25 and slope_error < 1e-24
+                assert abs(z - state[0]) < 1e-11 and abs(slope - (flow @ state)[0]) < 1e-11

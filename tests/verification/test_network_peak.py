@@ -70,7 +70,7 @@ def test_what_is_false_is_not_certified_whatever_the_evidence():
     ({"edges": [30.0]}, "before 30 s"), ({"edges": [1e-3, 30.0]}, "between 0.001 s and 30 s"),
     ({"degree": 3}, "between"), ({"start": [1e-91, 0.0]}, "below 1e-90"), ({"start": [5.0, 5.0]}, "before"),
     ({"horizon": 31.0}, "do not rise"), ({"degree": 100_000}, "too many products"),
-    ({"edges": np.linspace(1e-3, 30.0, 10_001)}, "too many products")])
+    ({"edges": np.linspace(1e-3, 30.0, 5_001)}, "too many products")])
 def test_evidence_that_proves_nothing(change, words):
     document = chain()
     assert proven(document).holds
