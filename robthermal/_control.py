@@ -7,25 +7,14 @@ where `import control` would. From then on state spaces can be pickled: its own 
 from __future__ import annotations
 
 import copyreg
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-
-class _OnFirstUse(ModuleType):
-    """A module that becomes another one when it is asked for a name."""
-
-    def __getattr__(self, name: str) -> Any:
-        module = import_module(self.__name__)
-        copyreg.pickle(module.StateSpace, _reduced)
-        self.__dict__.update({key: value for key, value in vars(module).items() if not key.startswith("__")})
-        return getattr(module, name)
-
+from ._first_use import OnFirstUse
 
 if TYPE_CHECKING:
     import control as control
 else:
-    control = _OnFirstUse("control")
+    control = OnFirstUse("control", lambda module: copyreg.pickle(module.StateSpace, _reduced))
 
 
 def _rebuilt(matrices: tuple[Any, ...], dt: float | bool | None, names: dict[str, Any]) -> control.StateSpace:

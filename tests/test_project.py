@@ -123,12 +123,12 @@ def test_imports_stand_at_the_top(path: Path) -> None:
     assert not hidden, f"{relative(path)}: imports inside functions at (line, module) {sorted(hidden)}"
 
 
-_ON_FIRST_USE = ("control", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate",
-                 "scipy.ndimage", "scipy.io", "scipy.fft")
+_ON_FIRST_USE = ("control", "pandas", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize",
+                 "scipy.interpolate", "scipy.ndimage", "scipy.io", "scipy.fft")
 
 
 def test_slow_libraries_are_imported_on_first_use() -> None:
-    """`import scipy`, then `scipy.signal.lfilter(...)`, loaded when asked; `from .._control import control`."""
+    """`import scipy`, then `scipy.signal.lfilter(...)`, loaded when asked; `from .._control import control`, `pd`."""
     found = [f"{relative(path)}:{node.lineno} {name}" for path in FILES if path.name != "conftest.py"
              for node in ast.parse(path.read_text(encoding="utf-8")).body for name in _imported(node)
              if any(f"{name}.".startswith(f"{slow}.") for slow in _ON_FIRST_USE)]

@@ -170,7 +170,8 @@ def test_importing_the_package_loads_nothing_heavy() -> None:
     assert [name for name in loaded if name.split(".")[0] in heavy] == []
 
 
-_ON_FIRST_USE = ("control", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize")  # slow to import
+_ON_FIRST_USE = ("control", "pandas", "matplotlib.pyplot", "scipy.signal", "scipy.stats",
+                 "scipy.optimize")  # slow to import
 
 
 @pytest.mark.parametrize(("package", "unused"), [

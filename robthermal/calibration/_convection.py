@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy
 
 from .._arrays import Floats
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..signals import Record
 from ._outcomes import CalibrationCode

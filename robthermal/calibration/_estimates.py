@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from .._arrays import Floats
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..export import plain
 from ..thermal import System

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from .._arrays import Floats
+from .._pandas import pd
 from ..errors import InputError
 from ..signals import Record
 from ..thermal import Linear, Module

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ADD_ZERO
 from .._control import control
+from .._pandas import pd
 from ..errors import InputError
 from ..thermal import System, linearize
 from ._estimates import Estimates

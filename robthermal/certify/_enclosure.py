@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from .._celsius import ZERO_CELSIUS
+from .._pandas import pd
 from ..errors import Outcome
 from ..thermal import System
 from ..verification import Certificate, not_certified

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate, establish, not_certified

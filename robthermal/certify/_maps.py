@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from .._celsius import ZERO_CELSIUS
 from .._fleet import fleet
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..thermal import System, format_system, steady_state
 from ._contraction import Method

@@ -8,8 +8,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from .._pandas import pd
 from ..errors import Outcome
 from ..thermal import LoadCurve, System, fold
 from ..verification import Certificate, establish

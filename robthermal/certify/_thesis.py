@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import connected_components
 
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import InputError
 from ..thermal import Equations, System
 from ._sections import system_section

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import Outcome
 from ..verification import Certificate
 from ._sections import Interval

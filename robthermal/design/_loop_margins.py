@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ._controller import Controller
 from ._corner_values import Corner, Ranges, checked_ranges, corners

@@ -8,9 +8,8 @@ from itertools import combinations, islice
 from math import comb
 from typing import Any, Literal
 
-import pandas as pd
-
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..thermal import System
 from ..verification import Certificate

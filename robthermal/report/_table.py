@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from .._digits import in_table
+from .._pandas import pd
 from ..errors import InputError
 
 MAX_ROWS = 200  # of a table on the page; a network may have 100 000 lumps, a reader has less time

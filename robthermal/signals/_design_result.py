@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from .._pandas import pd
 from ..errors import Outcome
 from ._checks import Array
 from ._outcomes import SignalsCode

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import scipy
 
+from .._pandas import pd
 from .._write import whole_file
 from ..errors import InputError
 from ._checks import channel_names

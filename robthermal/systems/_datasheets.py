@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-import pandas as pd
+from .._pandas import pd
 
 
 def datasheets() -> pd.DataFrame:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import pandas as pd
-
 from .._checks import positive_number, whole_number
+from .._pandas import pd
 from ..errors import InputError
 from ._checks import kelvin, non_negative
 from ._materials import Material, material_of

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from .._celsius import LOWEST_KELVIN
 from .._control import control
+from .._pandas import pd
 from ..errors import InputError
 from ._checks import by_lump
 from ._equations import Equations

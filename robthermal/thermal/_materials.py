@@ -5,9 +5,8 @@ from __future__ import annotations
 import difflib
 from dataclasses import astuple, dataclass, fields
 
-import pandas as pd
-
 from .._checks import positive_number
+from .._pandas import pd
 from ..errors import InputError
 
 _INCROPERA = "Incropera and DeWitt, Fundamentals of Heat and Mass Transfer, appendix A, 300 K"

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ._outcomes import ThermalCode
 from ._parts import Linear, Module

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from .._celsius import LOWEST_KELVIN, ZERO_CELSIUS
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ._continuation import Curve, follow
 from ._equations import Equations

@@ -9,11 +9,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
 from ..._drawing import axes_for
+from ..._pandas import pd
 from ..effects import Candidate, candidates
 from ..fit import Refit
 from ._frequency_tails import inflation, tail

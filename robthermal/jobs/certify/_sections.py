@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import pandas as pd
 
 from ..._celsius import ZERO_CELSIUS
+from ..._pandas import pd
 from ...report import Figure, Section, Table, box_ranges, house_style
 from ..claims import Certification
 

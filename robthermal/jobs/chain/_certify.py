@@ -7,8 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
+from ..._pandas import pd
 from ...calibration import Estimates
 from ...report import Report, Section, Table
 from .._parameter_words import parameter_label

@@ -7,8 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
+from ..._pandas import pd
 from ...diagnosis import Diagnosis
 from ...report import Report, Section, Table
 from ...thermal import FitRange, System

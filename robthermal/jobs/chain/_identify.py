@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...errors import InputError
 from ...identify import FrequencyResponse, IdentifyCode
 from ...report import Figure, Reason, Report, Section, Table, house_style

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import pandas as pd
-
+from ..._pandas import pd
 from ...report import Section, Table, file_hash
 from ..request import Project
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..._digits import in_table
+from ..._pandas import pd
 from ...coupling import NORMS, Filters, Norm
 from ...export import plain
 from ...report import Reason, Report, Section, Table

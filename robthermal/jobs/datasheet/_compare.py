@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import pandas as pd
-
 from ..._celsius import HIGHEST_CELSIUS, ZERO_CELSIUS
+from ..._pandas import pd
 from ...errors import InputError
 from ...thermal import (
     Inversion,

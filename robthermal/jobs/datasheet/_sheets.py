@@ -8,10 +8,9 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import pandas as pd
-
 from ..._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN, ZERO_CELSIUS
 from ..._checks import quoted
+from ..._pandas import pd
 from ...errors import InputError
 from ...systems import datasheets
 from ...thermal import Rating

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...report import Figure, Section, Table, house_style
 from ._design import ControllerDesign
 

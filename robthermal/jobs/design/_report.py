@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..._celsius import ZERO_CELSIUS
 from ..._digits import in_table, inward
+from ..._pandas import pd
 from ...design import ClosedLoop, GainObserver
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...diagnosis import Diagnosis
 
 NOT_NEEDED = "not needed: no more than noise"

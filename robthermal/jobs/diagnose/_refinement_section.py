@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import pandas as pd
-
+from ..._pandas import pd
 from ...diagnosis import Refinement
 from ...report import Section, Table
 

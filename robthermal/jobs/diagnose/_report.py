@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...diagnosis import Diagnosis, Found, effects
 from ...fitting import rmse
 from ...report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after

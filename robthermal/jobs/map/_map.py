@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from joblib import cpu_count
 
 from ..._celsius import ZERO_CELSIUS
+from ..._pandas import pd
 from ...certify import LimitMap, UsableCurrent, limit_map, runaway
 from ...errors import InputError
 from ...report import Figure, Report, Section, Table, house_style

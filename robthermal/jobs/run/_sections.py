@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-import pandas as pd
-
+from ..._pandas import pd
 from ...calibration import Estimates, Fit
 from ...report import Figure, Section, Table, house_style, measured_against_model
 from .._parameter_words import parameter_label

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...design import Design, FeedbackDesign, LpvDesign, MpcDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table

@@ -6,9 +6,9 @@ import re
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._options import ImportOptions
 from ._table import Block, Table

@@ -8,8 +8,8 @@ from decimal import Decimal
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._table import Lines, Table
 

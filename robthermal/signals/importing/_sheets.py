@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._frames import plain_column
 from ._options import ImportOptions

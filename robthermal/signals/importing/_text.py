@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._decode import examine
 from ._layout import Layout, find_layout
@@ -24,8 +24,11 @@ from ._tokens import DECIMAL_COMMA, NUMBER, THOUSANDS, is_missing, na_values, sh
 _HEAD = 400_000  # characters in which the header is searched
 _LONGEST = 64 * 1024  # characters of a line
 BLOCK = 8_000_000  # bytes read at once
-# Before version 3 the parser rounds the last digit unless it is told not to; since then it is exact and says so.
-_EXACT: dict[str, Any] = {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
+
+
+def _exact() -> dict[str, Any]:
+    """Before version 3 the parser rounds the last digit unless told not to; since then it is exact and says so."""
+    return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
 class TextSource:
@@ -146,7 +149,7 @@ class TextSource:
                 skipinitialspace=True,
                 engine="c",
                 low_memory=False,
-                **_EXACT,
+                **_exact(),
                 index_col=False,
                 skip_blank_lines=False,
             )

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table

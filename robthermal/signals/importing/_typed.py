@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from ..._matfile import Value, kind_of, read_matlab
+from ..._pandas import pd
 from ...errors import InputError
 from .._export import require_pyarrow
 from .._source import memory_limit, refuse_large

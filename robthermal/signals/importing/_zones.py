@@ -5,9 +5,9 @@ from __future__ import annotations
 from zoneinfo import ZoneInfo
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
+from ..._pandas import pd
 from ...errors import InputError
 from ._options import ImportOptions
 from ._table import Action, Array, Table, spans
