@@ -22,7 +22,7 @@ SURFACE = {
     """,
     "calibration": """
         CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseComparison Score VaryingModel Whiteness
-        calibrate convection_law join_models module_properties
+        calibrate convection_law convection_of_body join_models module_properties
     """,
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent

@@ -1,8 +1,9 @@
 """Parameters of a thermal system from records, frequency responses or both, and what the data do not determine."""
 
 from ._calibrate import calibrate as calibrate
-from ._convection import ConvectionLaw as ConvectionLaw
 from ._convection import convection_law as convection_law
+from ._convection_law import ConvectionLaw as ConvectionLaw
+from ._convection_of_body import convection_of_body as convection_of_body
 from ._estimates import Estimates as Estimates
 from ._fit import Fit as Fit
 from ._module_properties import ModuleProperties as ModuleProperties
@@ -15,4 +16,5 @@ from ._varying import join_models as join_models
 from ._whiteness import Whiteness as Whiteness
 
 __all__ = ["CalibrationCode", "ConvectionLaw", "Estimates", "Fit", "ModuleProperties", "ResponseComparison",
-           "Score", "VaryingModel", "Whiteness", "calibrate", "convection_law", "join_models", "module_properties"]
+           "Score", "VaryingModel", "Whiteness", "calibrate", "convection_law", "convection_of_body",
+           "join_models", "module_properties"]
