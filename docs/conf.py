@@ -34,7 +34,7 @@ nb_execution_timeout = 120  # a cell may take this long [s]
 nb_execution_raise_on_error = True
 if tags.has("tests"):  # noqa: F821  (defined by Sphinx)
     notebooks = (Path(__file__).parent / "tutorials").glob("*.ipynb")
-    nb_execution_excludepatterns = [f"*/{one.name}" for one in notebooks if one.stem != "transients"]
+    nb_execution_excludepatterns = [f"*/{one.name}" for one in notebooks if one.stem != "gallery"]
     del notebooks
 
 autodoc_member_order = "groupwise"

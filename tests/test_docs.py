@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -18,7 +19,7 @@ import robthermal as rt
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-SHOWN = "transients"  # the only notebook that docs/conf.py runs for tests; tests/test_notebooks.py runs them all
+SHOWN = "gallery"  # the only notebook that docs/conf.py runs for tests; tests/test_notebooks.py runs them all
 
 # The kernel of the notebook must find this checkout, and draw into the page.
 SETTINGS = {"PYTHONPATH": str(ROOT), "MPLBACKEND": "module://matplotlib_inline.backend_inline"}
@@ -60,11 +61,27 @@ def test_formulas_are_in_the_pages(built: Path) -> None:
     assert page.count("<math ") > 50 and "\\frac" not in page and "MathJax" not in page
 
 
-def test_notebooks_show_what_they_print_and_draw(built: Path) -> None:
+def test_the_gallery_shows_twelve_pictures_with_their_lines(built: Path) -> None:
     page = (built / "tutorials" / f"{SHOWN}.html").read_text(encoding="utf-8")
-    pictures = re.findall(r'<img[^>]*src="../_images/([^"]+\.png)"', page)
-    assert len(pictures) >= 2 and all((built / "_images" / name).stat().st_size > 5_000 for name in pictures)
-    assert "rms error, no noise" in page and 'class="output' in page
+    pictures = re.findall(r'<img alt="([^"]{40,})"[^>]*src="../_images/([^"]+\.png)"', page)
+    assert len(pictures) == 12
+    assert all((built / "_images" / name).stat().st_size > 5_000 for _, name in pictures)
+    assert page.count("Show code cell source") >= 12 and "law = " in re.sub("<[^>]+>", "", page)
+
+
+@pytest.mark.parametrize(("words", "page"), [
+    (["timestamp"], "measured_files"), (["peltier"], "from_tec_tool"), (["peltier"], "api/index"),
+    (["thermistor"], "measured_files"), (["safe", "current"], "explanations/limits"),
+    (["maximum", "current"], "explanations/limits"), (["matlab"], "from_matlab"), (["simscap"], "from_simscape")])
+def test_search_finds(built: Path, words: list[str], page: str) -> None:
+    """In the index that the search page loads; its terms are stems."""
+    stored = (built / "searchindex.js").read_text(encoding="utf-8")
+    index = json.loads(stored[stored.index("(") + 1:stored.rindex(")")])
+    found = []
+    for word in words:
+        places = [index[kind].get(word, []) for kind in ("terms", "titleterms")]
+        found.append({number for one in places for number in (one if isinstance(one, list) else [one])})
+    assert page in {index["docnames"][number] for number in set.intersection(*found)}
 
 
 def code_block(page: Path, language: str) -> str:
