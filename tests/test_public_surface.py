@@ -112,7 +112,8 @@ SURFACE = {
         Sensor SheetInversion SinkSize SplitLump SteadyState Step Stepper System ThermalCode Trajectory add_effect
         effects
         fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials
-        module_from_datasheet module_from_polynomials module_point parse_system read_matrices read_system reduce
+        module_from_datasheet module_from_polynomials module_point
+        parameter_in_words parameter_label parse_system read_matrices read_system reduce
         simulate size_sink split_lump steady_state system_from_matrices time_constants trajectory voltage_slopes
         ways_to_split write_modelica write_system
     """,

@@ -12,7 +12,7 @@ from .._arrays import Floats
 from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..export import plain
-from ..thermal import System
+from ..thermal import System, parameter_label
 from ._outcomes import CalibrationCode
 from ._parameter_ranges import Set, check_request, factor
 
@@ -175,9 +175,10 @@ class Estimates:
 
     def _lines(self) -> list[str]:
         wide = max((len(name) for name in self.parameters), default=9)
-        lines = [f"{'parameter':<{wide}}  {'value':>12}  {'std':>9}"]
+        lines = [f"{'parameter':<{wide}}  {'value':>12}  {'std':>9}  quantity"]
         for (name, value), std, at in zip(self.parameters.items(), self.std.values(), self.at_bound, strict=True):
-            lines.append(f"{name:<{wide}}  {value:>12.6g}  {std:>9.2g}{'  at bound' if at else ''}")
+            quantity = parameter_label(name) + ("  at bound" if at else "")
+            lines.append(f"{name:<{wide}}  {value:>12.6g}  {std:>9.2g}  {quantity}")
         return lines
 
     def _plain_table(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from .._html import short_table
 from ..export import plain
 from ..fitting import rmse_by_sensor
 from ..signals import Record
+from ..thermal import parameter_label
 from ._estimates import Estimates
 from ._figure import draw
 from ._response_comparison import ResponseComparison
@@ -136,7 +137,8 @@ class Fit(Estimates):
 
     def _repr_html_(self) -> str:
         units, deviations = self.system.sensor_units, self.std
-        rows = [(name, f"{value:.6g} ± {deviations[name]:.2g}") for name, value in self.parameters.items()]
+        rows = [(parameter_label(name), f"{value:.6g} ± {deviations[name]:.2g}")
+                for name, value in self.parameters.items()]
         for kind, scores in (("fitted", self.train), ("validation", self.validation)):
             rows += [(f"RMSE, {kind} {one.record}", ", ".join(f"{name} {e:.3g} {units.get(name, 'K')}"
                                                               for name, e in one.rmse.items())) for one in scores]

@@ -15,7 +15,7 @@ from .._celsius import ADD_ZERO
 from .._control import control
 from .._pandas import pd
 from ..errors import InputError
-from ..thermal import System, linearize
+from ..thermal import System, linearize, parameter_label
 from ._estimates import Estimates
 
 
@@ -120,7 +120,7 @@ class VaryingModel:
         _, axes = plt.subplots(len(self.names), 1, sharex=True, squeeze=False, layout="constrained")
         for ax, name, value, std in zip(axes[:, 0], self.names, self.values.T, self.std.T, strict=True):
             ax.errorbar(self.temperatures, value, 2 * std, fmt="o-")
-            ax.set(ylabel=f"{name} [SI unit]")
+            ax.set(ylabel=parameter_label(name))
         axes[-1, 0].set(xlabel="temperature [K]")
         return axes[:, 0]
 

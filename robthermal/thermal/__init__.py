@@ -29,6 +29,8 @@ from ._module_point import SinkSize as SinkSize
 from ._module_point import module_point as module_point
 from ._module_point import size_sink as size_sink
 from ._outcomes import ThermalCode as ThermalCode
+from ._parameter_words import parameter_in_words as parameter_in_words
+from ._parameter_words import parameter_label as parameter_label
 from ._parts import Ambient as Ambient
 from ._parts import Condensation as Condensation
 from ._parts import Drive as Drive
@@ -86,6 +88,6 @@ __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "Dat
            "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "drivable_range",
            "effects", "fit_in_kelvin", "fold", "format_modelica", "format_system", "hinf_error", "invert_datasheet",
            "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials", "module_point",
-           "parse_system", "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink",
-           "split_lump", "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes",
-           "ways_to_split", "write_modelica", "write_system"]
+           "parameter_in_words", "parameter_label", "parse_system", "pwm_ripple", "read_matrices", "read_system",
+           "reduce", "simulate", "size_sink", "split_lump", "steady_state", "system_from_matrices", "time_constants",
+           "trajectory", "voltage_slopes", "ways_to_split", "write_modelica", "write_system"]

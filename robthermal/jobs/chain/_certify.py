@@ -10,7 +10,7 @@ from typing import Any
 from ..._pandas import pd
 from ...calibration import Estimates
 from ...report import Report, Section, Table
-from .._parameter_words import parameter_label
+from ...thermal import parameter_label
 from ..certify import certification_report, certify_system, claim_ranges
 from ..evidence import with_evidence
 from ..request import Project

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found, Gap
-from .._parameter_words import parameter_in_words
+from ...thermal import parameter_in_words
 from ._change_words import change_in_words, nothing_changed
 
 _PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found
-from .._parameter_words import parameter_in_words
+from ...thermal import parameter_in_words
 
 
 def change_in_words(found: Found) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from ..._pandas import pd
 from ...calibration import Estimates, Fit
 from ...report import Figure, Section, Table, house_style, measured_against_model
-from .._parameter_words import parameter_label
+from ...thermal import parameter_label
 from ..certify import converged
 from ._misfit import Misfit
 from ._result import Comparison

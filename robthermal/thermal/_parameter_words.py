@@ -52,9 +52,14 @@ def parameter_in_words(name: str) -> str:
     name : str
         Dotted name of the number; returned as it is where it is none of a system.
 
+    Returns
+    -------
+    str
+
     Examples
     --------
-    >>> parameter_in_words("modules.m1.seebeck.value")
+    >>> import robthermal as rt
+    >>> rt.thermal.parameter_in_words("modules.m1.seebeck.value")
     'the Seebeck coefficient of m1'
     """
     found = _found(name)
@@ -69,9 +74,14 @@ def parameter_label(name: str) -> str:
     name : str
         Dotted name of the number, or names joined by " = ".
 
+    Returns
+    -------
+    str
+
     Examples
     --------
-    >>> parameter_label("links.sink-room.conductance")
+    >>> import robthermal as rt
+    >>> rt.thermal.parameter_label("links.sink-room.conductance")
     'conductance of link sink-room [W/K]'
     """
     parts = [_found(own) for own in name.split(" = ")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robthermal.jobs._parameter_words import WORDS, parameter_in_words, parameter_label
+from robthermal.thermal._parameter_words import WORDS, parameter_in_words, parameter_label
 from robthermal.thermal._parameters import FIELDS
 
 
