@@ -45,7 +45,8 @@ class DrivableRange:
 def drivable_range(module: Module, temperature: Interval | None = None) -> DrivableRange:
     """Current range of a module: declared, of its bridge, and what its supply voltage drives at all temperatures.
 
-    The supply drives a current I at all temperatures of the faces if |(S - thomson)(T_hot - T_cold) + (R + r) I| is at
+    The supply drives a current I at all temperatures of the faces if
+    abs((S - thomson)(T_hot - T_cold) + (R + r) I) is at
     most duty times voltage for the worst of them; r is the resistance in series. The largest such I is exact for S and
     R linear in the mean temperature, rounded down.
 
