@@ -14,11 +14,13 @@ from ._document import get, interval, intervals, kelvin, mapping, matrix, not_ne
 from ._exact import ONE, ZERO, Interval, Malformed, NotCovered, ends, exact, power, short
 from ._lyapunov import Share, check_work, decide, first_failure, link_shares
 from ._result import Answer, not_covered, not_valid, valid
+from ._scheduled_sampled import held_gains, held_holds
 from ._thermal import Form, Link, Module, Network, check_cost
 from ._uncertain import read_network
 from ._vertices import Entries, add
 
-_REGION = ("temperature", "current", "parameters", "ambient", "heat", "level", "rate", "offset")
+_REGION = ("temperature", "current", "parameters", "ambient", "heat", "level", "rate", "offset", "sample_time",
+           "sampled_rate")
 _PIECES = (1, 2, 4)
 _MOST_LUMPS = 60
 Matrix = list[list[Fraction]]
@@ -38,6 +40,8 @@ class Problem:
     rate: Fraction
     offset: Fraction
     matrix: Matrix
+    sample_time: Fraction | None
+    sampled_rate: Fraction | None
 
 
 def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
@@ -63,13 +67,16 @@ def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
         table = mapping(get(operating, key, "system.operating"), where)
         only(table, names, where)
         points.append([exact(get(table, name, where), f"{where}[{short(name)}]") for name in names])
+    held = "sample_time" in region or "sampled_rate" in region
+    time, claimed = ((positive(get(region, key, "region"), f"region.{key}") if held else None)
+                     for key in ("sample_time", "sampled_rate"))
     return Problem(network, {name: kelvin(given[name], "region.ambient") for name in network.ambients},
                    {k: interval(loads[name], "region.heat") for k, name in enumerate(network.lumps) if name in loads},
                    matrix(get(system, "gain", "system"), m, n, "system.gain"), points[0], points[1],
                    positive(get(region, "level", "region"), "region.level"),
                    positive(get(region, "rate", "region"), "region.rate"),
                    not_negative(get(region, "offset", "region"), "region.offset"),
-                   matrix(get(evidence, "matrix", "evidence"), n, n, "evidence.matrix"))
+                   matrix(get(evidence, "matrix", "evidence"), n, n, "evidence.matrix"), time, claimed)
 
 
 def check(problem: Problem) -> Answer:
@@ -94,10 +101,28 @@ def check(problem: Problem) -> Answer:
     reach = left / problem.rate
     if reach**2 > problem.level:
         return not_covered("the heat left at the operating point is not bounded sharply enough")
+    if not _sampled(problem, left):
+        return not_covered("what a held current adds is not bounded sharply enough")
     for k in range(n):
         if reach and not _shorter(P, [Fraction(int(k == j)) for j in range(n)], (problem.offset / reach) ** 2):
             return not_covered("how far the equilibrium is away is not bounded sharply enough")
     return _falls(problem)
+
+
+def _sampled(problem: Problem, left: Fraction) -> bool:
+    if problem.sample_time is None or problem.sampled_rate is None:
+        return True
+    network = problem.network
+    base, nonlinear = link_shares(network, problem.ambient)
+    groups, inputs = [[base], *nonlinear], []
+    for k, module in enumerate(network.modules):
+        h, c = module.hot, module.cold
+        box = network.temperature[h], network.temperature[c], network.current[k]
+        points = [point for form in module.forms for point in _bernstein(module, form, box)]
+        groups.append([dict(zip(((h, h), (h, c), (c, h), (c, c)), point[:4], strict=True)) for point in points])
+        inputs.append((h, c, [(point[4], point[5]) for point in points]))
+    gains = held_gains(problem.matrix, [own[0] for own in network.capacity], problem.gain, groups, inputs)
+    return held_holds(problem.sample_time, problem.sampled_rate, problem.rate, problem.level, left, gains)
 
 
 def _reaches(problem: Problem) -> Iterator[tuple[str, list[Fraction], Fraction]]:

@@ -298,11 +298,15 @@ def _scheduled_claim(problem: _scheduled.Problem, parts: Parts) -> str:
     words = f", for all {', '.join(outside)}, constant or not" if outside else ""
     currents = ", ".join(f"{short(module.name)} in {_span(box)} A"
                          for module, box in zip(network.modules, network.current, strict=True))
-    return (f"The {_subject(network, parts)}, with the state feedback I = I0 + F (x - x0) as given{words}, with no "
-            f"other heat: from every start with (x - x0)'P(x - x0) <= {decimal(problem.level)}, P of table "
+    held, rate, fall = "", problem.rate, "falls"
+    if problem.sample_time is not None and problem.sampled_rate is not None:
+        held = f", x sampled every {decimal(problem.sample_time)} s and the currents held in between"
+        rate, fall = problem.sampled_rate, "falls from sample to sample"
+    return (f"The {_subject(network, parts)}, with the state feedback I = I0 + F (x - x0) as given{held}{words}, with "
+            f"no other heat: from every start with (x - x0)'P(x - x0) <= {decimal(problem.level)}, P of table "
             f"{short_hash(parts['evidence']['matrix'])}, this bound is kept for ever, and with it lump temperatures "
             f"{_temperatures(network)} and module currents {currents}; while ambients and heat loads are constant, "
-            f"(x - x*)'P(x - x*) falls at least as exp(-2 rate t), rate = {decimal(problem.rate)} 1/s, x* the only "
+            f"(x - x*)'P(x - x*) {fall} at least as exp(-2 rate t), rate = {decimal(rate)} 1/s, x* the only "
             f"equilibrium there, within {decimal(problem.offset)} K of x0 in every lump.")
 
 

@@ -8,20 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._checks import positive_number
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, establish
 from ._sections import Currents, Interval, Temperatures, made_by, named_ranges, region_section, system_section
 from ._surroundings import ambient_ranges
 
+_SHARES = (0.95, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03)  # of the rate, claimed from sample to sample, in turn
 _OFFSETS = tuple(step * 10.0**k for k in range(-7, 2) for step in (1, 2, 5))  # K, in turn
 
 
 def scheduled(system: System, *, gain: ArrayLike, matrix: ArrayLike, level: float, rate: float,
               operating_temperatures: Mapping[str, float], operating_current: Mapping[str, float], current: Currents,
               temperature: Temperatures, ambient: Mapping[str, Interval] | None = None,
-              heat: Mapping[str, Interval] | None = None, parameters: Mapping[str, Interval] | None = None
-              ) -> Certificate:
+              heat: Mapping[str, Interval] | None = None, parameters: Mapping[str, Interval] | None = None,
+              sample_time: float | None = None, sampled_rate: float | None = None) -> Certificate:
     """Certify a state feedback I = I0 + F (x - x0) of the currents, for the nonlinear network.
 
     From every start with (x - x0)'P(x - x0) <= level the temperatures stay in the box, the currents in their ranges,
@@ -51,6 +53,11 @@ def scheduled(system: System, *, gain: ArrayLike, matrix: ArrayLike, level: floa
         {lump: (lower, upper)} extra heat, heaters and loads [W]; default none.
     parameters : mapping, optional
         Uncertain numbers of links and modules as in `contraction`; capacities are not covered.
+    sample_time : float, optional
+        Time between two readings of the temperatures, the currents held in between [s]. Default: the currents follow
+        at every moment.
+    sampled_rate : float, optional
+        Rate that is claimed from sample to sample, below `rate` [1/s]; default the largest share of it that is proven.
 
     Returns
     -------
@@ -92,6 +99,19 @@ def scheduled(system: System, *, gain: ArrayLike, matrix: ArrayLike, level: floa
     P = np.array(_matrix(matrix, (len(system.lumps),) * 2, "matrix"))
     evidence = {"matrix": ((P + P.T) / 2).tolist()}
     region |= {"level": float(level), "rate": float(rate)}
+    if sample_time is None:
+        return _established(section, region, evidence)
+    region["sample_time"] = positive_number(sample_time, "sample_time", "s")
+    shares = [float(f"{share * rate:.6g}") for share in _SHARES]
+    for claimed in shares if sampled_rate is None else [positive_number(sampled_rate, "sampled_rate", "1/s")]:
+        cert = _established(section, {**region, "sampled_rate": claimed}, evidence)
+        if cert.holds or "1/s is left" not in cert.reason:
+            break
+    return cert
+
+
+def _established(section: dict[str, Any], region: dict[str, Any], evidence: dict[str, Any]) -> Certificate:
+    """The certificate with the smallest offset of the equilibrium that is proven."""
     for offset in _OFFSETS:
         cert = establish("scheduled", system=section, region={**region, "offset": offset}, evidence=evidence, margin={},
                          made_by=made_by("none", "feedback and matrix as given"))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from ._tem_hull import TemHull, read_box, tem_hull
 from ._tem_program import Ellipsoid, largest_ball
 
 _QUARTERS, _HALVINGS = 7, 4  # of the rate, where the one asked for is not reached
+_SHARES = (1.0, 0.5, 0.25, 0.1)  # of the room of the currents: samples may need smaller gains
+_FASTER = (1.1, 1.5, 2.5)  # times the rate asked for, of the feedback without samples
 _METHOD = "state feedback over a box of temperatures and currents (matrix inequalities)"
 
 
@@ -73,6 +76,8 @@ class TemFeedback(FeedbackDesign):
         {lump: temperature} x0 [K], {module: current} I0 [A].
     temperature, current_limits : mapping
         Box of the claim: {lump: (lower, upper)} [K], {module: (lower, upper)} [A].
+    sample_time : float
+        Time between two readings of the temperatures, the currents held in between [s]; 0: at every moment.
     """
 
     level: float = 0.0
@@ -80,6 +85,7 @@ class TemFeedback(FeedbackDesign):
     operating_current: Mapping[str, float] = field(default_factory=dict)
     temperature: Mapping[str, tuple[float, float]] = field(default_factory=dict, repr=False)
     current_limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sample_time: float = 0.0
 
     @cached_property
     def semi_axes(self) -> Array:
@@ -122,7 +128,7 @@ class TemFeedback(FeedbackDesign):
 
     def _facts(self) -> dict[str, Any]:
         return super()._facts() | {"level": self.level, "operating_temperatures": dict(self.operating_temperatures),
-                                   "operating_current": dict(self.operating_current),
+                                   "operating_current": dict(self.operating_current), "sample_time": self.sample_time,
                                    "current_limits": dict(self.current_limits), "temperature": dict(self.temperature)}
 
     def __str__(self) -> str:
@@ -163,7 +169,8 @@ class TemFeedback(FeedbackDesign):
 def tem_feedback(system: System, *, temperature: Any, current: Any, operating: Any, rate: float,
                  method: str = "quadratic", covariance: Any = None, probability: float = 0.95,
                  ambient: Mapping[str, tuple[float, float]] | None = None,
-                 heat: Mapping[str, tuple[float, float]] | None = None) -> TemFeedback:
+                 heat: Mapping[str, tuple[float, float]] | None = None,
+                 sample_time: float | None = None) -> TemFeedback:
     """Design one current law I = I0 + F (x - x0) for a whole box of temperatures and currents, and prove it.
 
     Among the feedbacks that make V = (x - x0)'P(x - x0) fall with the rate at every temperature and current of the box,
@@ -193,6 +200,9 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
         {ambient: (lower, upper)} [K], constant or not; default its nominal temperature.
     heat : mapping, optional
         {lump: (lower, upper)} heat loads and heaters [W], constant or not; default none.
+    sample_time : float, optional
+        Time between two readings of the temperatures, the currents held in between [s]; the rate is then proven from
+        sample to sample, the box for all times. Default: the currents follow at every moment.
 
     Returns
     -------
@@ -233,13 +243,36 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     room, current_room = (np.minimum(at - low, high - at) for at, (low, high) in (
         (x0, np.array(list(box["temperature"].values())).T), (I0, np.array(list(box["current"].values())).T)))
     hull = tem_hull(system, box)
+    held = None if sample_time is None else positive_number(sample_time, "sample_time", "s")
+
+    def proven(found: Ellipsoid, rate: float) -> Certificate:
+        return scheduled(system, gain=found.F, matrix=np.linalg.inv(found.W), level=1.0, rate=rate,
+                         operating_temperatures=point[0], operating_current=point[1], current=_pairs(box["current"]),
+                         temperature=temperature, ambient=ambient, heat=heat, parameters=_pairs(box["parameters"]),
+                         sample_time=held, sampled_rate=None if held is None else asked)
+
     found = largest_ball(hull, asked, room, current_room)
-    cert = None if found is None else scheduled(
-        system, gain=found.F, matrix=np.linalg.inv(found.W), level=1.0, rate=asked, operating_temperatures=point[0],
-        operating_current=point[1], current=_pairs(box["current"]), temperature=temperature, ambient=ambient, heat=heat,
-        parameters=_pairs(box["parameters"]))
+    cert = None if found is None or held is not None else proven(found, asked)
+    if found is not None and held is not None:
+        found, cert = _sampled(found, hull, asked, room, current_room, proven)
     outcome = _outcome(found, cert, asked, hull, room, current_room)
-    return _design(system, box, point, found, cert, asked, outcome, time.perf_counter() - start)
+    return _design(system, box, point, found, cert, asked, outcome, held or 0.0,
+                   time.perf_counter() - start)
+
+
+def _sampled(found: Ellipsoid, hull: TemHull, asked: float, room: Array, current_room: Array,
+             proven: Callable[[Ellipsoid, float], Certificate]) -> tuple[Ellipsoid, Certificate]:
+    """Of feedbacks that are faster than asked for, with less current, that of the largest ball that bears the samples.
+    """
+    best: tuple[Ellipsoid, Certificate] | None = None
+    for share, factor in product(_SHARES, _FASTER):
+        other = largest_ball(hull, factor * asked, room, share * current_room)
+        if other is None or (best is not None and other.semi_axis <= best[0].semi_axis):
+            continue
+        tried = proven(other, factor * asked)
+        if tried.holds:
+            best = other, tried
+    return (found, proven(found, asked)) if best is None else best  # the latter says what is missing
 
 
 def _operating(system: System, operating: Any, box: Mapping[str, Any], heat: Mapping[str, tuple[float, float]] | None
@@ -286,7 +319,8 @@ def _outcome(found: Ellipsoid | None, cert: Certificate | None, asked: float, hu
                 f"{found.semi_axis:.3g} K) temperatures and currents stay in the box, and the distance to the "
                 f"equilibrium decays with {asked:g} 1/s or faster.")
         return SynthesisCode.NOT_CERTIFIED.outcome(f"A gain was computed, but not proven: {cert.reason}.",
-                                                   remedy="Ask for a lower rate, a smaller box or narrower ranges.")
+                                                   remedy="Ask for a lower rate, a smaller box, narrower ranges or "
+                                                          "shorter samples.")
     def reached(rate: float) -> bool:
         return largest_ball(hull, rate, room, current_room) is not None
 
@@ -306,8 +340,8 @@ def _outcome(found: Ellipsoid | None, cert: Certificate | None, asked: float, hu
 
 
 def _design(system: System, box: Mapping[str, Any], point: tuple[dict[str, float], dict[str, float]],
-            found: Ellipsoid | None, cert: Certificate | None, asked: float, outcome: Outcome, seconds: float
-            ) -> TemFeedback:
+            found: Ellipsoid | None, cert: Certificate | None, asked: float, outcome: Outcome, held: float,
+            seconds: float) -> TemFeedback:
     lumps, modules = list(system.lump_names), list(system.module_names)
     n, m, ok = len(lumps), len(modules), outcome.ok
     F = np.zeros((m, n)) if found is None else found.F
@@ -327,7 +361,7 @@ def _design(system: System, box: Mapping[str, Any], point: tuple[dict[str, float
                        RobustAgainst(words, {"parameters": float(len(box["parameters"]))}), outcome, _METHOD,
                        "Clarabel", seconds, 0 if found is None else found.solves, None, F, (P + P.T) / 2,
                        asked if ok else 0.0, (plant,), float(ok), *point, _pairs(box["temperature"]),
-                       _pairs(box["current"]))
+                       _pairs(box["current"]), held)
 
 
 def _pairs(ranges: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, float]]:

@@ -37,12 +37,14 @@ from ._lti import Rows, expect_shape, read_matrix
 from ._lyapunov import MOST_ROWS, MOST_WORK, Described, asymmetry, dense, link_slopes
 from ._numbers import decimal, exact, name_of, show
 from ._residual import Heats, residual_norm
+from ._scheduled_sampled import Held, sampled_failure, sampled_gains
 from ._system import Region, ThermalSystem, read_region, read_system, say_interval, say_temperatures
 from ._uncertain import Parameters, read_parameters, say_subject, worst_system
 from ._vertices import Entries
 
 PIECES = (1, 2, 4)  # of every current, the hull refined in turn
-_REGION = ("temperature", "current", "parameters", "ambient", "heat", "level", "rate", "offset")
+_REGION = ("temperature", "current", "parameters", "ambient", "heat", "level", "rate", "offset", "sample_time",
+           "sampled_rate")
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,7 @@ class Scheduled:
     matrix: Rows
     table: str
     parameters: Parameters
+    held: Held | None
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Scheduled:
@@ -84,7 +87,15 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Scheduled:
     return Scheduled(network, nominal, box, _read_heats(asked, network, temperatures), gain, currents,
                      positive(get(asked, "level", "region"), "region.level"),
                      positive(get(asked, "rate", "region"), "region.rate"),
-                     not_negative(get(asked, "offset", "region"), "region.offset"), matrix, short_hash(P), parameters)
+                     not_negative(get(asked, "offset", "region"), "region.offset"), matrix, short_hash(P), parameters,
+                     _read_held(asked))
+
+
+def _read_held(asked: Mapping[str, Any]) -> Held | None:
+    if "sample_time" not in asked and "sampled_rate" not in asked:
+        return None
+    time, rate = (positive(get(asked, key, "region"), f"region.{key}") for key in ("sample_time", "sampled_rate"))
+    return Held(time, rate)
 
 
 def _read_operating(value: Any, system: ThermalSystem) -> tuple[tuple[fmpq, ...], tuple[fmpq, ...]]:
@@ -119,12 +130,16 @@ def claim(problem: Scheduled, machine: str) -> str:
     words = f", for all {', '.join(outside)}, constant or not" if outside else ""
     currents = ", ".join(f"{name_of(module.name)} in {say_interval(box)} A" for module, box in
                          zip(problem.system.modules, problem.region.current, strict=True))
+    held, rate, fall = "", problem.rate, "falls"
+    if problem.held is not None:
+        held = f", x sampled every {decimal(problem.held.sample_time)} s and the currents held in between"
+        rate, fall = problem.held.rate, "falls from sample to sample"
     return (f"The {say_subject(problem.system, problem.parameters, machine)}, with the state feedback I = I0 + F (x - "
-            f"x0) as given{words}, with no other heat: from every start with (x - x0)'P(x - x0) <= "
+            f"x0) as given{held}{words}, with no other heat: from every start with (x - x0)'P(x - x0) <= "
             f"{decimal(problem.level)}, P of table {problem.table}, this bound is kept for ever, and with it lump "
             f"temperatures {say_temperatures(problem.system, problem.region)} and module currents {currents}; while "
-            "ambients and heat loads are constant, (x - x*)'P(x - x*) falls at least as exp(-2 rate t), rate = "
-            f"{decimal(problem.rate)} 1/s, x* the only equilibrium there, within {decimal(problem.offset)} K of x0 in "
+            f"ambients and heat loads are constant, (x - x*)'P(x - x*) {fall} at least as exp(-2 rate t), rate = "
+            f"{decimal(rate)} 1/s, x* the only equilibrium there, within {decimal(problem.offset)} K of x0 in "
             "every lump.")
 
 
@@ -175,6 +190,12 @@ def _held(problem: Scheduled, P: arb_mat, W: arb_mat) -> str:
     if not reach**2 <= arb(problem.level):
         return (f"the heat flows left at the operating point are too large for the level: |f(x0, I0)|_P is up to "
                 f"{float(left.upper()):.4g}")
+    if problem.held is not None:
+        gains = sampled_gains(problem.system, problem.region, problem.heats, problem.gain, P, W)
+        failed = gains if isinstance(gains, str) else sampled_failure(problem.held, problem.rate, problem.level, left,
+                                                                      gains)
+        if failed:
+            return failed
     for k, name in enumerate(problem.system.lumps):
         if not reach**2 * W[k, k] <= arb(problem.offset) ** 2:
             away = float((reach * W[k, k].sqrt()).upper())

@@ -63,7 +63,8 @@ KIND_ASSUMPTIONS: dict[str, tuple[str, ...]] = {
                   "within what the sentence says.", "The controller runs with the numbers of the certificate file, "
                   "without delays, and without limits other than those of the sentence."),
     "scheduled": (
-        "The feedback reads all lump temperatures at every moment and the currents follow without delay.",
+        "The feedback reads all lump temperatures at every moment, or at the samples that the sentence names, and the "
+        "currents follow without delay.",
         "The machine starts inside the ellipsoid; ambients and heats stay in their stated ranges.",
     ),
     "loop": (
