@@ -183,12 +183,12 @@ def test_the_second_checker_reads_the_sentence(design):
 
 
 def test_design_for_samples(design):
-    d = rt.design.tem_feedback(STAGE, temperature=BOX["temperature"], current=(0.2, 1.8), operating=1.0, rate=0.008,
+    d = rt.design.tem_feedback(STAGE, temperature=BOX["temperature"], current=(0.2, 1.8), operating=1.0, rate=0.009,
                                sample_time=5.0)
-    assert d.holds and d.rate == 0.008 and d.sample_time == 5.0 and rt.verify(d.certificates[0]).valid
-    assert d.certificates[0].region["rate"] > 0.008 and d.semi_axes[0] > 5
+    assert d.holds and d.rate == 0.009 and d.sample_time == 5.0 and rt.verify(d.certificates[0]).valid
+    assert d.certificates[0].region["rate"] > 0.009 and d.semi_axes[0] > 5
     A, B = linear(d)
-    assert norm_in(d.matrix, moved(A, B, d.gain, 5.0)) <= np.exp(-0.008 * 5.0)
+    assert norm_in(d.matrix, moved(A, B, d.gain, 5.0)) <= np.exp(-0.009 * 5.0)
     slow = rt.design.tem_feedback(STAGE, temperature=BOX["temperature"], current=(0.2, 1.8), operating=1.0, rate=0.012,
                                   sample_time=600.0)
     assert not slow.holds and "sampled every 600 s" in slow.outcome.text and not slow.certificates
