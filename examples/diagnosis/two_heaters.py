@@ -1,9 +1,10 @@
 """Two heaters on one board: start from convection only, let the diagnosis find what is missing, predict another day.
 
-    python examples/diagnosis/two_heaters.py [FOLDER]
+    python examples/diagnosis/two_heaters.py [FOLDER [OUT]]
 
 FOLDER holds ``tclab_saopaulo`` (default: ``../shared/data`` beside the checkout). Without it the same work is done on
-simulated runs, and the output says so.
+simulated runs, and the output says so. OUT, a folder, gets what the work leaves behind: augmented.toml, the model with
+the missing effects, and gap.svg, both models beside the day that no fit has seen.
 
 What the user has to know, and states here: the noise of one reading, the random heat that draughts bring (DRAUGHT), and
 which part of the record is a fair test. How the numbers were found, and how far the workflow gets without them:
@@ -30,6 +31,7 @@ STEP = 0.489  # K, of the converter: all the noise that a running median leaves
 NOISE = {"T1": 0.2, "T2": 0.38}  # K, of a mean over 5 s: third differences of the record show 0.19 and 0.39
 DRAUGHT = 0.1  # W/√Hz, random heat into each heater; its level is re-estimated within a factor 1.4
 WINDOW = (700.0, 3500.0)  # s: before it both heaters are constant, after it the board has warmed up
+_DRAWN = 20  # samples from point to point of the picture
 EFFECTS = ("missing_link", "missing_ambient_link", "sensor_lag", "input_lag", "hidden_mass", "natural_convection",
            "radiation", "heater_power_slope", "heat_source", "input_saturation")
 
@@ -119,18 +121,47 @@ def calibrated(system: rt.System, training: rt.Record, validation: rt.Record) ->
                         noise=STEP / 12**0.5, validation=without_glitches(validation))
 
 
-def main(folder: Path) -> None:
-    """Print the diagnosis and what it is worth on the run it has not seen."""
+def picture(before: rt.calibration.Fit, after: rt.calibration.Fit) -> str:
+    """Readings of the run that no fit has seen, with what both models make of it; SVG."""
+    from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
+
+    (run,) = after.validation_data
+    names = list(after.validation_residuals[0])
+    with rt.report.house_style():
+        figure, axes = plt.subplots(len(names), 1, figsize=(7.0, 5.0), sharex=True, layout="constrained")
+        for ax, name in zip(axes, names, strict=True):
+            ax.plot(run.time[::_DRAWN], (run[name] - 273.15)[::_DRAWN], color="0.6", label="measured, another day")
+            for fit, style, what in ((before, "--", "convection only"), (after, "-", "with the three effects")):
+                error = float(fit.validation_rmse[name])
+                modelled = run[name] - fit.validation_residuals[0][name] - 273.15
+                ax.plot(run.time[::_DRAWN], modelled[::_DRAWN], style,
+                        label=f"{what}: {error:.2f} K")
+            ax.set(ylabel=f"{name} [°C]")
+            ax.legend(fontsize="small", loc="lower right")
+        axes[-1].set(xlabel="time [s]")
+    return rt.report.Figure.draw(figure, alt="Readings of both sensors on an unseen day, and two models.",
+                                 caption="Heater 1 alone.").svg
+
+
+def main(folder: Path, out: Path | None = None) -> None:
+    """Print the diagnosis and what it is worth on the run it has not seen; write model and picture if asked."""
     training, validation = runs(folder)
     found = diagnose(training, validation)
     print(found)
     print("alternatives:", found.alternatives)
     print("\nfree-run RMSE of T1/T2 [K]     training run    heater 1 alone")
+    fits = []
     for what, system in (("convection only", found.nominal.system), ("with the effects", found.fit.system)):
         fit = calibrated(system, training, validation)
+        fits.append(fit)
         scores = (f"{rmse['T1']:.2f}/{rmse['T2']:.2f}" for rmse in (fit.rmse, fit.validation_rmse))
         print(f"{what:<29} {next(scores):>13} {next(scores):>17}")
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        system = fits[1].system.model_copy(update={"name": "board with two heaters, coupled, with late sensors"})
+        rt.thermal.write_system(system, out / "augmented.toml")
+        (out / "gap.svg").write_text(picture(*fits) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT)
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else DEFAULT, Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -112,3 +112,25 @@ def test_examples_run_on_simulated_data_and_say_so(tmp_path: Path, capsys: pytes
     assert len(training) == len(validation) == 3500 and len(step) == 900
     assert validation["Q2"].max() == 0.0 and training["Q2"].max() > 50.0
     assert np.ptp(two_heaters.means(training).outputs, axis=0).min() > 10.0
+
+
+def test_the_picture_shows_the_unseen_run_and_both_sensors() -> None:
+    """A toy in place of the board: a path of 0.2 W/K between two heaters, missing in one of the models."""
+    def toy(coupling: float) -> rt.System:
+        return rt.System(ambients={"room": {"temperature": 295.0}},
+                         lumps={"h1": {"capacity": 20.0}, "h2": {"capacity": 20.0}},
+                         links=[{"between": ("h1", "h2"), "conductance": coupling},
+                                *({"between": (name, "room"), "conductance": 0.1} for name in ("h1", "h2"))],
+                         inputs={"q": {"lump": "h1"}}, sensors={"T1": {"lump": "h1"}, "T2": {"lump": "h2"}},
+                         fit={"links.h1-room.conductance": {"lower": 0.01, "upper": 1.0}})
+
+    def run(seed: int) -> rt.Record:
+        heater = np.repeat(np.random.default_rng(seed).uniform(0.0, 4.0, 8), 25)
+        drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["q"],
+                          output_names=[])
+        return rt.thermal.simulate(toy(0.2), drive, initial=295.0)
+
+    before, after = (rt.calibrate(toy(g), run(1), validation=run(2), noise=0.05) for g in (1e-4, 0.2))
+    drawn = two_heaters.picture(before, after)
+    assert drawn.startswith("<svg") and after.validation_rmse["T2"] < 0.01 < before.validation_rmse["T2"]
+    assert all(part in drawn for part in ("axes_2", "legend_2"))  # a panel for each sensor
