@@ -79,7 +79,7 @@ def read(parts: Mapping[str, Table]) -> Problem:
     seen = _seen(system, n, w)
     controller = None if own is None else _controller(own, k, len(seen[0]))
     q = len(controller["A"]) if controller else 0
-    if len(vertices) * (2**k if "saturation" in region else 1) * (n + q) ** 3 > 300_000_000:
+    if len(vertices) * (2**k if "saturation" in region else 1) * (n + q + m + len(seen[0])) ** 3 > 100_000_000:
         raise Malformed("system.vertices: too many")
     performance = _performance(system, n, m)
     way = "disturbance" if "disturbance" in region else "bound" if "bound" in region else ""

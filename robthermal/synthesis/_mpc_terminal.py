@@ -99,13 +99,15 @@ def _program(plant: Plant, Q: Array, R: Array, limits: Limits, best: tuple[Array
                           [W, np.zeros((n, q)), np.zeros((n, r))], [s * np.eye(q), np.zeros((q, r))], [s * np.eye(r)]])
 
     def row(k: int, v: Matrices) -> Array:
+        if not limits.H[k].any():  # r W r' <= g² as it stands
+            return np.array([[1 - G[k] @ v["W"] @ G[k] / limits.g[k] ** 2]])
         return symmetric([[np.eye(1), ((G[k] @ v["W"] + limits.H[k] @ v["Y"]) / limits.g[k])[None]], [v["W"]]])
 
     eye = np.eye(n)
     forms = [unknowns.inequality(falls, _MARGIN), unknowns.inequality(lambda v: v["W"] - v["t"][0, 0] * eye),
              unknowns.inequality(lambda v: v["W"] - v["s"][0, 0] / DEARER * eye),
              unknowns.inequality(lambda v: _LARGEST**2 - v["t"])]
-    forms += [unknowns.inequality(partial(row, k)) for k in range(len(limits.g))]
+    forms += [unknowns.inequality(partial(row, k)) for k in _distinct(limits)]
     found = inside(forms, unknowns.gradient(lambda v: -float(v["t"][0, 0])))
     v = unknowns.matrices(found.x)
     if not found.solved or np.linalg.eigvalsh(v["W"])[0] <= 0 or v["s"][0, 0] <= 0:
@@ -114,6 +116,16 @@ def _program(plant: Plant, Q: Array, R: Array, limits: Limits, best: tuple[Array
     W = v["W"]
     P = size * v["s"][0, 0] * inverse.T @ np.linalg.solve(W, inverse)
     return (P + P.T) / 2, v["Y"] @ np.linalg.solve(W, inverse)
+
+
+def _distinct(limits: Limits) -> list[int]:
+    """The tightest of the rows that are equal but for sign and size: the set is symmetric."""
+    found: dict[bytes, int] = {}
+    rows = np.hstack([limits.G, limits.H]) / limits.g[:, None]
+    for k in np.argsort(-np.abs(rows).max(axis=1), kind="stable"):
+        first = rows[k][np.flatnonzero(rows[k])[0]] if rows[k].any() else 1.0
+        found.setdefault((np.round(rows[k] / first, 12) + 0.0).tobytes(), int(k))  # + 0.0: there is one zero
+    return sorted(found.values())
 
 
 def _strict(plant: Plant, Q: Array, R: Array, limits: Limits, P: Array, K: Array, spare: float) -> Terminal | None:

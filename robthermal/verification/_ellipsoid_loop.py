@@ -19,7 +19,7 @@ from robthermal.errors import InputError
 from ._fields import get, mapping, no_other, not_negative, sequence
 from ._lti import Rows, expect_shape, read_matrix
 
-_MOST_WORK = 3e8  # vertices times sets of controls times n³
+_MOST_WORK = 10**8  # vertices times sets of controls times the third power of states, inputs and measurements
 
 
 @dataclass(frozen=True)
@@ -127,10 +127,10 @@ def read_plants(system: Any, limited: bool) -> Plants:
     n, w = vertices[0][0].nrows(), vertices[0][1].ncols()
     seen = _read_seen(table, n, w)
     controller = _read_controller(table, k, seen[0].nrows())
-    size = n + controller.states
+    size = n + controller.states + w + k + seen[0].nrows()
     if len(vertices) * (2**k if limited else 1) * size**3 > _MOST_WORK:
-        raise InputError(f"{len(vertices)} vertices, {k} controls, {size} states", where="system.vertices",
-                         expected="fewer: too many")
+        raise InputError(f"{len(vertices)} vertices, {k} controls, {size} states, inputs and measurements",
+                         where="system.vertices", expected="fewer: too many")
     performance = zeros(0, n), zeros(0, w), zeros(0, k)
     if "performance" in table:
         part = mapping(table["performance"], "system.performance")

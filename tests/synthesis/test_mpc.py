@@ -8,8 +8,9 @@ import json
 import control
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm, solve_discrete_are
-from scipy.optimize import minimize
+from scipy.optimize import fsolve, minimize
 
 import recheck
 import robthermal as rt
@@ -208,3 +209,33 @@ def test_bad_input(arguments, words):
     given = {"horizon": 5, "Q": 1.0, "R": 1.0, "limits": 1.0, "sample_time": T} | arguments
     with pytest.raises(InputError, match=words):
         rt.design.mpc(given.pop("plant", CART), **given)
+
+
+def test_a_module_is_kept_at_a_current_that_depends_on_its_temperature():
+    """Plate, module and sink by scipy, from their own equations: 20 % of S x_c/R binds, and is never passed."""
+    S, resistance, K, share, capacities = 0.052, 2.1, 0.5, 0.2, np.array([60.0, 12.0, 90.0])
+
+    def flow(_, x, current):
+        plate, face, sink = x
+        cooled = S * face * current - resistance * current**2 / 2 - K * (sink - face)
+        given = S * sink * current + resistance * current**2 / 2 - K * (sink - face)
+        return np.array([5 * (face - plate) + 0.15 * (298 - plate), 5 * (plate - face) - cooled,
+                         4 * (298 - sink) + given]) / capacities
+
+    rest = fsolve(lambda x: flow(0, x, 1.0), [285.0, 284.0, 305.0])
+    h = 1e-4
+    A = np.stack([(flow(0, rest + h * e, 1.0) - flow(0, rest - h * e, 1.0)) / (2 * h) for e in np.eye(3)], axis=1)
+    B = (flow(0, rest, 1 + h) - flow(0, rest, 1 - h)) / (2 * h)
+    slope = share * S / resistance
+    rows = ([[0.0, -slope, 0.0], [0.0, 0.0, 0.0]], [[1.0], [-1.0]], [slope * rest[1] - 1.0, 1.0])
+    d = rt.design.mpc(control.ss(A, B[:, None], np.eye(3), 0), horizon=40, Q=[1.0, 0.01, 0.01], R=0.1,
+                      limits={"rows": rows}, sample_time=5.0)
+    assert d.holds
+    x, used = rest + np.array([5.0, 5.0, 0.0]), []
+    for _ in range(40):
+        move = d.step(x - rest)
+        assert move.holds
+        current = 1.0 + move.control[0]
+        used.append(current / (slope * x[1]))
+        x = solve_ivp(flow, (0, 5.0), x, args=(current,), rtol=1e-8).y[:, -1]
+    assert 0.999 < max(used) < 1.0001 and abs(x - rest).max() < 0.5
