@@ -24,7 +24,8 @@ def new(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to ma
 
 
 def explain(name: Annotated[str | None, typer.Argument(
-                metavar="NAME", help="An effect, a kind of certificate, a code of an outcome; without one: a list.")]
+                metavar="NAME", help="An effect, a kind of certificate, a code of an outcome, a word of a report; "
+                "without one: a list.")]
             = None, as_json: Json = False) -> None:
     """Say what a name in a report, a diagnosis, a certificate or a message means.
 

@@ -1,4 +1,4 @@
-"""What a name means: an effect, a kind of certificate, the code of an outcome, an error."""
+"""What a name means: an effect, a kind of certificate, the code of an outcome, an error, a word of a report."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ...errors import InputError, OutcomeCode
 from ...verification import KINDS
 from ..claims import ARITHMETIC, GateCode, kind_assumptions
 from ._codes import outcome_codes, package_of
+from ._glossary import GLOSSARY, WORDS_PAGE
 
 _PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency", "closed_loop",
                                             "polytope", "ellipsoid"),
@@ -32,13 +33,13 @@ class Explanation:
     name : str
         As it stands in files, tables and messages.
     what : str
-        "effect", "certificate", "outcome", "reason" or "error".
+        "effect", "certificate", "outcome", "reason", "error" or "word".
     meaning : tuple of str
         Paragraphs that say what it means.
     details : dict of str to tuple of str
         By heading: assumptions, confusable partners, what separates them.
     page : str
-        Page of the documentation.
+        Page of the documentation; of a word its list, and the page that derives it.
     """
 
     name: str
@@ -76,7 +77,7 @@ def explainable() -> dict[str, tuple[str, ...]]:
     True
     """
     return {"effect": (*effects(), _CHANGE.name), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
-            "reason": tuple(_REASONS), "error": tuple(_ERRORS)}
+            "reason": tuple(_REASONS), "error": tuple(_ERRORS), "word": tuple(GLOSSARY)}
 
 
 def explain(name: str) -> tuple[Explanation, ...]:
@@ -85,7 +86,8 @@ def explain(name: str) -> tuple[Explanation, ...]:
     Parameters
     ----------
     name : str
-        Of an effect, a kind of certificate, the code of an outcome, the reason of a verdict, or an error.
+        Of an effect, a kind of certificate, the code of an outcome, the reason of a verdict, an error, or a word of
+        a report, its first letter small or large.
 
     Returns
     -------
@@ -128,6 +130,10 @@ def _all(name: str) -> Iterator[Explanation]:
     if name in _ERRORS:
         text = inspect.getdoc(_ERRORS[name]) or ""
         yield Explanation(name, "error", (text.split("\n\n")[0],), {}, "docs/api/errors.md")
+    word = name if name in GLOSSARY else name[:1].lower() + name[1:]
+    if word in GLOSSARY:
+        meaning, page = GLOSSARY[word]
+        yield Explanation(word, "word", (meaning,), {}, f"{WORDS_PAGE} docs/explanations/{page}.md")
 
 
 def _effect(effect: Effect) -> Explanation:
