@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from .._arrays import Floats
 from .._drawing import axes_for
+from .._pandas import pd
 from ..errors import InputError, Outcome
 from ..thermal import Link, Natural, System
 

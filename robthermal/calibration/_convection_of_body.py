@@ -6,10 +6,10 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import pandas as pd
 import scipy
 
 from .._arrays import Floats
+from .._pandas import pd
 from ..errors import InputError
 from ..signals import Record
 from ..thermal import System
