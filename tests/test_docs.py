@@ -69,6 +69,13 @@ def test_the_gallery_shows_twelve_pictures_with_their_lines(built: Path) -> None
     assert page.count("Show code cell source") >= 12 and "law = " in re.sub("<[^>]+>", "", page)
 
 
+def test_every_picture_has_an_alternative_text(built: Path) -> None:
+    pictures = [(page.name, tag) for page in built.rglob("*.html")
+                for tag in re.findall(r"<img\b[^>]*>", page.read_text(encoding="utf-8")) if "_static/" not in tag]
+    assert len(pictures) > 40
+    assert [one for one in pictures if not re.search(r'alt="(?![^"]*_images/)[^"]{15,}"', one[1])] == []
+
+
 @pytest.mark.parametrize(("words", "page"), [
     (["timestamp"], "measured_files"), (["peltier"], "from_tec_tool"), (["peltier"], "api/index"),
     (["thermistor"], "measured_files"), (["safe", "current"], "explanations/limits"),
