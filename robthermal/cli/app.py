@@ -27,6 +27,7 @@ from .terminal import (
     SystemFile,
     answer,
     exit_unless,
+    free,
     place,
     progress,
     progress_bar,
@@ -214,7 +215,7 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
                                             structure=structure, large=large, parameters=parameters or [],
                                             confidence=confidence)
     ranges = rt.jobs.request.ranges_from_text(found, parameters or [], confidence)
-    rt.jobs.folder.check_free(out)
+    free(out)
     with progress() as stage:
         result = rt.jobs.certify_system(found, boxes, stage, parameters=ranges or None)
         stage("writing the report")
@@ -259,7 +260,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
     """
     if method in rt.jobs.synthesize.METHODS:
         job = rt.jobs.read_plant_file(system)
-        rt.jobs.folder.check_free(out)
+        free(out)
         with progress() as stage:
             stage(f"designing by {method}")
             synthesis = rt.jobs.synthesize_plant(job, method)
@@ -273,7 +274,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
         bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method, regulate=regulate or [],
         margins=margin or [], export=export,
         parameters=rt.jobs.request.ranges_from_text(found, parameters or [], confidence))
-    rt.jobs.folder.check_free(out)
+    free(out)
     with progress() as stage:
         result = rt.jobs.design_system(found, wanted, stage)
         stage("writing the report")
@@ -303,7 +304,7 @@ def limit_map(system: SystemFile, out: Out = Path("robthermal-map"),
     found = rt.read_system(system)
     wanted = rt.jobs.map.map_from_text(found, ambient=ambient, load=load, setpoint=setpoint, temperature=temperature,
                                        method=method)
-    rt.jobs.folder.check_free(out)
+    free(out)
     with progress_bar("conditions") as done:
         result = rt.jobs.map_system(found, wanted, done)
     report = rt.jobs.write_map(result, found, (system,), out)
@@ -318,7 +319,7 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
     Example: robthermal couple SPEC.toml --out coupled
     """
     job = rt.jobs.read_coupling(spec)
-    rt.jobs.folder.check_free(out)
+    free(out)
     with progress() as stage:
         result = rt.jobs.couple_subsystems(job, stage)
         stage("writing the report")

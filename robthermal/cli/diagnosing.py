@@ -19,6 +19,7 @@ from .terminal import (
     SystemFile,
     answer,
     exit_unless,
+    free,
     progress,
     reading,
     say,
@@ -47,7 +48,7 @@ def diagnose(system: SystemFile,
     found = rt.read_system(system)
     tables = reading(record, column)
     point = rt.jobs.request.point_from_text(found, operating_point or [])
-    rt.jobs.folder.check_free(out)
+    free(out)
     with progress() as stage:
         stage("reading measured files")
         train, held_out, healthy = (rt.jobs.measured.read_measured(paths, found, tables=tables)

@@ -71,10 +71,19 @@ def reading(record: list[str] | None, column: list[str] | None) -> tuple[Any, ..
 
 
 def place(file: Path | None) -> Path | None:
-    """An output file whose folder exists: said before the work, not after it."""
+    """An output file whose folder exists: said before the work, not after it, as is a file that is replaced."""
     if file is not None and not file.parent.is_dir():
         raise typer.BadParameter(f"the folder {str(file.parent)!r} does not exist")
+    if file is not None and file.is_file():
+        typer.echo(f"note: {file} exists, and is replaced", err=True)
     return file
+
+
+def free(out: Path) -> None:
+    """Refuse a folder with other things in it before the work; an earlier result there is replaced, and said."""
+    rt.jobs.folder.check_free(out)
+    if (out / rt.jobs.folder.MARKER).is_file():
+        typer.echo(f"note: {out} holds an earlier result, which is replaced", err=True)
 
 
 def drawing(file: Path | None) -> Path | None:

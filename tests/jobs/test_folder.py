@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import robthermal as rt
+from robthermal.cli.terminal import free, place
 
 
 def fill(folder: Path, text: str) -> None:
@@ -62,3 +63,19 @@ def test_what_is_not_a_result_is_refused(tmp_path: Path) -> None:
         rt.jobs.folder.check_free(tmp_path / "photos" / "cat.jpg")
     with pytest.raises(rt.InputError, match=r"cat\.jpg.*not a folder"):
         rt.jobs.folder.check_free(tmp_path / "photos" / "cat.jpg" / "deeper" / "out")
+
+
+def test_an_earlier_result_that_is_replaced_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    free(tmp_path / "out")
+    place(tmp_path / "checks.xml")
+    assert capsys.readouterr().err == ""
+    (tmp_path / "out").mkdir()
+    fill(tmp_path / "out", "old")
+    (tmp_path / "checks.xml").write_text("old", encoding="utf-8")
+    free(tmp_path / "out")
+    place(tmp_path / "checks.xml")
+    assert capsys.readouterr().err.splitlines() == [
+        f"note: {tmp_path / 'out'} holds an earlier result, which is replaced",
+        f"note: {tmp_path / 'checks.xml'} exists, and is replaced"]
+    with pytest.raises(rt.InputError, match="other things in it"):
+        free(tmp_path)
