@@ -28,7 +28,7 @@ help:
 	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"
-	@echo "make bench   the timings quoted in the documentation"
+	@echo "make bench   the timings quoted in the documentation, kept in docs/benchmarks.json"
 	@echo "make clean   remove everything the targets above made"
 
 demo: $(VENV)/.installed
@@ -54,7 +54,7 @@ docs: $(VENV)/.test
 	@echo "build/docs/index.html"
 
 bench: $(VENV)/.installed
-	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python $$script || exit 1; done
+	$(ONE_THREAD) $(BIN)/python tests/benchmarks/run_benchmarks.py
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -7,6 +7,7 @@ import os
 import platform
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -23,12 +24,21 @@ def best_of(run: Callable[[], Result], *, repeats: int = 3) -> tuple[float, Resu
     return min(times), result
 
 
+def processor() -> str:
+    """Name of the processor, how many of its cores this machine has, and its kind."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        name = next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        name = platform.processor() or "unnamed processor"
+    return f"{name}, {os.cpu_count()} cores, {platform.machine()}"
+
+
 def header(title: str) -> None:
     """Print a title and the machine the rows below belong to."""
     threads = os.environ.get("OMP_NUM_THREADS", "not set")
     print(f"\n{title}\n{'-' * len(title)}")
-    machine = f"{platform.machine()}, {os.cpu_count()} cores"
-    print(f"Python {platform.python_version()}, {machine}, OMP_NUM_THREADS {threads}")
+    print(f"Python {platform.python_version()}, {processor()}, OMP_NUM_THREADS {threads}")
 
 
 def row(what: str, seconds: float, note: str = "") -> None:

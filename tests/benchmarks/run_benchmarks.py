@@ -1,0 +1,53 @@
+"""Run benchmarks and keep what they print in docs/benchmarks.json, one entry per processor.
+
+python tests/benchmarks/run_benchmarks.py [SCRIPT ...]; by default every bench_*.py. What was there of other scripts and
+of other processors stays.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from _timing import processor
+
+HERE = Path(__file__).parent
+KEPT = HERE.parents[1] / "docs" / "benchmarks.json"
+
+
+def run(script: Path) -> dict[str, object]:
+    """Run one script; what it printed, its processor time with all its children [s], versions and the day."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, encoding="utf-8") as process:
+        lines = []
+        for line in process.stdout or ():
+            print(line, end="", flush=True)
+            lines.append(line.rstrip())
+    if process.returncode:
+        raise SystemExit(f"{script.name} ended with status {process.returncode}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return {"processor_seconds": round(spent, 1), "day": datetime.now(UTC).date().isoformat(),
+            "versions": {name: version(name) for name in ("robthermal", "numpy", "scipy")},
+            "load_of_the_machine": round(os.getloadavg()[0], 1), "printed": [line for line in lines if line]}
+
+
+def main(names: list[str]) -> None:
+    """Run them one after the other, and write after each."""
+    scripts = [HERE / name for name in names] or sorted(HERE.glob("bench_*.py"))
+    for script in scripts:
+        found = run(script)
+        kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+        kept.setdefault(processor(), {})[script.name] = found
+        KEPT.write_text(json.dumps(kept, indent=1, sort_keys=True, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
