@@ -32,7 +32,7 @@ CODES = {
     "identify": "?constant_input +estimated -frf_without_covariance -suspect -undetermined",
     "jobs": "-bins_left_out -circles_left_out -frf_without_covariance",
     "signals": "+designed -not_lower +resolved -undetermined -unresolved",
-    "synthesis": "+at_the_bins +certified +step -infeasible -no_step -not_certified -not_found",
+    "synthesis": "+at_the_bins +certified +certified_region +step -infeasible -no_step -not_certified -not_found",
     "thermal": "+agrees +closed -disagrees +found +held -none -not_held -not_reducible +reduced +rounded +unchecked",
 }
 

@@ -239,6 +239,13 @@ def test_anti_windup_from_a_file(run, tmp_path):
     assert done.status == 0, done.out + done.err
     report = (tmp_path / "out" / "report.html").read_text()
     assert "no actuator saturates" not in report and "actuators that saturate" in report
+    (tmp_path / "region").mkdir()
+    region = design_by(run, tmp_path / "region", WINDUP.replace("[[-0.1]]", "[[0.3]]"), "anti-windup")
+    made = json.loads((tmp_path / "region" / "out" / "design.json").read_text())
+    assert region.status == 0 and made["outcome"]["code"] == "certified_region" and made["level"] == 1.0
+    assert "in a region only" in (tmp_path / "region" / "out" / "report.html").read_text()
+    files = sorted((tmp_path / "region" / "out" / "certificates").glob("*"))
+    assert len(files) == 2 and run("verify", "--second", *map(str, files)).status == 0
     (tmp_path / "no").mkdir()
     missing = design_by(run, tmp_path / "no", WINDUP.replace("controller]", "other]"), "anti-windup")
     assert missing.status == 2

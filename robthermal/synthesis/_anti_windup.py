@@ -198,7 +198,7 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
     words = "" if more is None else (
         f" From rest, disturbances of energy up to {more.region['level']:.4g} have an L2 gain below "
         f"{more.region['bound']:.6g}.")
-    outcome = SynthesisCode.CERTIFIED.outcome(
+    outcome = SynthesisCode.CERTIFIED_REGION.outcome(
         "Certified for the numbers of the controller as returned, in a region: within these limits the loop comes to "
         f"rest from every start in x'Px <= {region.level:g}, with the controller at rest from every state of the plant "
         f"of norm up to {reach:.4g}.{words} For every start, no gain was proven"

@@ -12,6 +12,8 @@ class SynthesisCode(OutcomeCode):
     """Codes of the outcomes of `robthermal.synthesis`."""
 
     CERTIFIED = (True, "Certified for the numbers of the controller as returned.")
+    CERTIFIED_REGION = (True, "Certified for the numbers of the controller as returned, from the starts of a region "
+                        "only; from others nothing is claimed.")
     AT_THE_BINS = (True, "Every plant of the confidence circles keeps the margin at the bins of the response; nothing "
                    "is claimed between them.")
     INFEASIBLE = (False, "No controller reaches what was asked for; the text says what is reached.",

@@ -118,7 +118,10 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
 def _check(k: int, certificate: Certificate) -> Checked:
     measure = str(certificate.region.get("measure", certificate.kind))
     verdict = verify(certificate) if certificate.holds else None
-    return Checked(f"{k + 1}_{measure}", _TITLES.get(measure, measure), certificate, verdict, True)
+    title = _TITLES.get(measure, measure)
+    if certificate.kind == "ellipsoid" and "bound" in certificate.region:
+        title = "L2 gain from rest, for disturbances of limited energy"
+    return Checked(f"{k + 1}_{measure}", title, certificate, verdict, True)
 
 
 def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..._pandas import pd
-from ...design import Design, FeedbackDesign, LpvDesign, MpcDesign
+from ...design import AntiWindupDesign, Design, FeedbackDesign, LpvDesign, MpcDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
 from ..claims import ARITHMETIC, GateCode, kind_assumptions, machine_assumptions
@@ -124,6 +124,10 @@ def _reached(result: Synthesis) -> str:
         words += [f"{one.title} below {one.certificate.region['bound']:.6g}" for one in result.checked
                   if "bound" in one.certificate.region]
         return f"Proven: {', '.join(words)}."
+    if isinstance(result.design, AntiWindupDesign) and np.isfinite(result.design.level):
+        gain = (f": L2 gain {result.design.value:.6g} for disturbances of energy up to {result.design.energy:.6g}, from "
+                "rest" if result.design.energy > 0 else "")
+        return f"Proven in a region only{gain}."
     if isinstance(result.design, MpcDesign):
         level = result.design.terminal.level
         return f"Proven: from every start in the terminal set x'Px <= {level:.6g} the cost is at most x'Px."
