@@ -125,8 +125,8 @@ def _reached(result: Synthesis) -> str:
                   if "bound" in one.certificate.region]
         return f"Proven: {', '.join(words)}."
     if isinstance(result.design, AntiWindupDesign) and np.isfinite(result.design.level):
-        gain = (f": L2 gain {result.design.value:.6g} for disturbances of energy up to {result.design.energy:.6g}, from "
-                "rest" if result.design.energy > 0 else "")
+        gain = (f": L2 gain {result.design.value:.6g} from rest, for disturbances of energy up to "
+                f"{result.design.energy:.6g}" if result.design.energy > 0 else "")
         return f"Proven in a region only{gain}."
     if isinstance(result.design, MpcDesign):
         level = result.design.terminal.level
