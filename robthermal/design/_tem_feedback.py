@@ -235,7 +235,8 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     """
     start = time.perf_counter()
     if method != "quadratic":
-        raise InputError(f"method = {quoted(method)}", where="argument method", expected='"quadratic"')
+        raise InputError(f"method = {quoted(method)}", where="argument method",
+                         expected='"quadratic": the certificate knows one quadratic form for the whole box')
     asked = positive_number(rate, "rate", "1/s")
     box = read_box(system, temperature, current, covariance, probability, ambient)
     point = _operating(system, operating, box, heat)

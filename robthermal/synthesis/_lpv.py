@@ -127,7 +127,8 @@ class _Run:
         mean, best = _mean(self.given), self._best()
         lower = -np.inf
         if len(self.given) <= _MOST_LOWER:
-            lower = max(best_of(one, 0.005, None, {}, None)[1] for one in self.given)
+            optima = [best_of(one, 0.005, None, {}, None)[1] for one in self.given]
+            lower = max((value for value in optima if np.isfinite(value)), default=-np.inf)
         holds = best is not None and (self.asked is None or best[2] <= self.asked)
         shown = best[0] if holds and best is not None else [zero_controller(mean)] * len(self.given)
         controller, loop = named(listed[0], mean, average(shown, np.full(len(shown), 1 / len(shown))))
@@ -192,7 +193,8 @@ class _Run:
             return SynthesisCode.INFEASIBLE.outcome(
                 f"gamma = {self.asked:g}: the best achievable with one quadratic form is about {self.level:#.4g}.")
         if self.count:
-            return SynthesisCode.NOT_CERTIFIED.outcome()
+            return SynthesisCode.NOT_CERTIFIED.outcome(
+                remedy="Give a larger gamma, scale the plants, or take fewer vertices and weights that are less slow.")
         return SynthesisCode.INFEASIBLE.outcome(
             "No scheduled controller was found with one quadratic form for all plants of the hull.",
             remedy="Take fewer or closer vertices, or add controls or sensors; bounded rates do not help here.")
