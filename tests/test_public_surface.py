@@ -44,7 +44,7 @@ SURFACE = {
         StepResponseLinearity Tuning certify_loop protection setpoint_ramp
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
-        loop_poles observer pid place_sensors reachable regulated_points simulate_loop state_feedback
+        loop_poles observer pid place_sensors reachable regulated_points simulate_law simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         AntiWindupDesign
         Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst Terminal
@@ -110,7 +110,7 @@ SURFACE = {
         Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties PwmRipple Rating
         Reduction DrivableRange drivable_range pwm_ripple Supply
         Sensor SheetInversion SinkSize SplitLump SteadyState Step Stepper System ThermalCode Trajectory add_effect
-        effects
+        effects exchange_faces
         fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials
         module_from_datasheet module_from_polynomials module_point
         parameter_in_words parameter_label parse_system read_matrices read_system reduce

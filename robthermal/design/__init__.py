@@ -76,6 +76,7 @@ from ._regulated_points import RegulatedPoint as RegulatedPoint
 from ._regulated_points import regulated_points as regulated_points
 from ._robust_feedback import corner_plants as corner_plants
 from ._sampling import loop_poles as loop_poles
+from ._simulate_law import simulate_law as simulate_law
 from ._state_feedback import StateFeedback as StateFeedback
 from ._state_feedback import state_feedback as state_feedback
 from ._step_response_linearity import StepResponseLinearity as StepResponseLinearity
@@ -93,15 +94,15 @@ Seen = ControllerInput
 collapse = step_response_linearity
 
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
-           "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate",
-           "ExtendedKalmanFilter", "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController",
-           "LoopMargins", "Margins", "Matrices", "MatrixController", "ObserverModel", "PID", "Placement",
-           "PlantMargins", "Polarity", "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint",
-           "Seen", "SetpointRamp", "StateFeedback", "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop",
-           "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain", "corner_plants",
-           "disturbance_observer", "face_ranges", "feed_forward", "feedback_linearization", "gains_digest",
-           "linear_controller", "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors",
-           "protection", "reachable", "regulated_points", "setpoint_ramp", "simulate_loop", "state_feedback",
+           "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
+           "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
+           "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity",
+           "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint", "Seen", "SetpointRamp",
+           "StateFeedback", "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity",
+           "checked_margins", "cold_side", "collapse", "constant_gain", "corner_plants", "disturbance_observer",
+           "face_ranges", "feed_forward", "feedback_linearization", "gains_digest", "linear_controller",
+           "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "protection",
+           "reachable", "regulated_points", "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback",
            "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi", "unobservable"]
 # of synthesis
 __all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign",

@@ -79,7 +79,7 @@ class ClosedLoop:
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
         _, axes = plt.subplots(2, sharex=True, layout="constrained", figsize=(8.0, 4.8))
-        for i, name in enumerate(_base(self.law).names):
+        for i, name in enumerate(base_law(self.law).names):
             line, = axes[0].plot(self.time, self.regulated[:, i] - ZERO_CELSIUS, label=f"{name}: {self.points[i]}")
             if (self.regulated[:, i] != self.cold[:, i]).any():
                 axes[0].plot(self.time, self.cold[:, i] - ZERO_CELSIUS, ":", color=line.get_color(),
@@ -155,10 +155,11 @@ def simulate_loop(system: System, controller: Controller, reference: ArrayLike |
     """
     run = _Run(system, controller, law, duration, inputs or {}, load or {}, initial, drive, observer, noise_seed,
                regulate)
-    return run.go(reference, _base(law).modules.vector(current, "current", "A"))
+    return run.go(reference, base_law(law).modules.vector(current, "current", "A"))
 
 
-def _base(law: Law) -> FeedbackLinearization:
+def base_law(law: Law) -> FeedbackLinearization:
+    """The linearizing law itself, or the one that a constant gain is the tangent of."""
     if isinstance(law, ConstantGain):
         return law.law
     if not isinstance(law, FeedbackLinearization):
@@ -175,7 +176,7 @@ class _Run:
                  observer: Observer | None, noise_seed: int | None, regulate: Regulate):
         check_system(system)
         expect_controller(controller)
-        base = _base(law)
+        base = base_law(law)
         if not set(base.names) <= set(system.modules) or system.lump_names != base.system.lump_names:
             raise InputError("lumps or modules differ from those of the feedback law's system", where="argument system",
                              expected="the same names")

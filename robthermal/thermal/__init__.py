@@ -6,6 +6,7 @@ from ._datasheet import module_from_datasheet as module_from_datasheet
 from ._drivable import DrivableRange as DrivableRange
 from ._drivable import drivable_range as drivable_range
 from ._equations import Equations as Equations
+from ._exchange import exchange_faces as exchange_faces
 from ._file import fit_in_kelvin as fit_in_kelvin
 from ._file import format_system as format_system
 from ._file import parse_system as parse_system
@@ -86,8 +87,9 @@ __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "Dat
            "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
            "PwmRipple", "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState",
            "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "drivable_range",
-           "effects", "fit_in_kelvin", "fold", "format_modelica", "format_system", "hinf_error", "invert_datasheet",
-           "linearize", "load_curve", "materials", "module_from_datasheet", "module_from_polynomials", "module_point",
-           "parameter_in_words", "parameter_label", "parse_system", "pwm_ripple", "read_matrices", "read_system",
-           "reduce", "simulate", "size_sink", "split_lump", "steady_state", "system_from_matrices", "time_constants",
-           "trajectory", "voltage_slopes", "ways_to_split", "write_modelica", "write_system"]
+           "effects", "exchange_faces", "fit_in_kelvin", "fold", "format_modelica", "format_system", "hinf_error",
+           "invert_datasheet", "linearize", "load_curve", "materials", "module_from_datasheet",
+           "module_from_polynomials", "module_point", "parameter_in_words", "parameter_label", "parse_system",
+           "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink", "split_lump",
+           "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes", "ways_to_split",
+           "write_modelica", "write_system"]
