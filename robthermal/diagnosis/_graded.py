@@ -58,6 +58,28 @@ def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple
     return tuple(out)
 
 
+def lasting_beyond_steps(judged: Judged) -> Judged:
+    """Names from readings in coarse steps have to hold in block after block: errors of rounding are not white.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer with the network taken to be right; returned as it is where no sensor is quantized.
+    """
+    state = judged.state
+    rounded = [name for name in state.nominal.floor.quantized if name in state.nominal.system.thermometers]
+    if judged.verdict not in ("named", "ambiguous") or not rounded:
+        return judged
+    found = evidence_of(state.rounds, state.fit, state.nominal)
+    fleeting = [round_.best.candidate.label for round_, one in zip(state.rounds, found, strict=True) if not one.lasting]
+    if not fleeting:
+        return judged
+    text = (f"{', '.join(fleeting)} would explain the records, but does not hold over parts of them: it may be the "
+            f"error of rounding, because the steps of {', '.join(rounded)} are larger than the noise.")
+    return replace(judged, verdict="unexplained", outcome=DiagnosisCode.UNEXPLAINED.outcome(
+        text, remedy="Read finer, or let the noise reach the converter and average."))
+
+
 def _stability(fit: Refit, place: int) -> Stability:
     """Of the size of an effect, relative to it."""
     structure = fit.structure

@@ -12,7 +12,7 @@ from ..fitting import Choice
 from ..thermal import System
 from ._changed import changed
 from ._doubts import doubts, may_be_the_room
-from ._graded import evidence_of, graded
+from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from ._refine import refine as refined
 from ._searching import searched
@@ -124,7 +124,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
     refuse_constant(nominal.system, [path.one for path in nominal.records])
-    judged = judge(searched(nominal, names, checked, progress), checked, progress)
+    judged = lasting_beyond_steps(judge(searched(nominal, names, checked, progress), checked, progress))
     judged = graded(reconsider_noise(judged, checked), checked, progress)
     progress("locating the misfit and planning the next experiment")
     found = concluded(judged)

@@ -54,15 +54,19 @@ def stepped(seed: int = 3) -> np.ndarray:
     return np.repeat(np.random.default_rng(seed).choice([0.0, 20.0, 50.0, 100.0], N // 20), 20)
 
 
-def oven(heater: Any, room: Any = 22.0, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Heater column [%] and readings [°C]; `heater` is a column, or a law of the sample and the readings."""
+def oven(heater: Any, room: Any = 22.0, seed: int = 1, noise: float = NOISE, path: float = 0.0
+         ) -> tuple[np.ndarray, np.ndarray]:
+    """Heater column [%] and readings [°C]; `heater` is a column, or a law of the sample and the readings.
+
+    `path` is a conductance from the block to the room that the file does not have [W/K].
+    """
     rng, rooms = np.random.default_rng(seed), np.broadcast_to(room, N)
-    A = np.array([[-1.4, 1.4], [1.4, -1.4 - 0.85]]) / np.array([200.0, 150.0])[:, None]
-    B = np.array([[0.2 / 200.0, 0.0], [0.0, 0.85 / 150.0]])
+    A = np.array([[-1.4 - path, 1.4], [1.4, -1.4 - 0.85]]) / np.array([200.0, 150.0])[:, None]
+    B = np.array([[0.2 / 200.0, path / 200.0], [0.0, 0.85 / 150.0]])
     M = expm(np.block([[A, B], [np.zeros((2, 4))]]) * STEP)[:2]
     T, u, out = np.full(2, rooms[0]), [], []
     for k in range(N):
-        out.append(T + NOISE * rng.standard_normal(2))
+        out.append(T + noise * rng.standard_normal(2))
         u.append(heater(k, out[-1]) if callable(heater) else heater[k])
         T = M @ np.array([*T, u[-1], rooms[k]])
     return np.array(u), np.array(out)
@@ -170,6 +174,29 @@ def test_steps_of_half_a_kelvin_are_neither_stuck_nor_saturated(run: Run, tmp_pa
     status, found, _ = diagnosed(run, tmp_path, u, np.round(2.0 * y) / 2.0)
     assert status == 0 and found["verdict"] == "consistent"
     assert not any(word in found["outcome"]["text"] for word in ("stuck", "saturated", "held", "restart"))
+
+
+def rounded(seed: int, path: float) -> rt.Record:
+    """Readings in steps of 0.5 K, without any noise of their own: the error of rounding is the same for minutes."""
+    u, y = oven(stepped(seed), noise=0.0, path=path)
+    return rt.Record(sample_time=STEP, inputs=u, outputs=np.round(2.0 * y) / 2.0 + 273.15, input_names=["q"],
+                     output_names=["T_block", "T_plate"])
+
+
+@pytest.mark.parametrize("seed", [5, 17])
+def test_the_error_of_rounding_gets_no_name(seed: int) -> None:
+    """Without the test over blocks and segments both are named `periodic_load(plate)`."""
+    found = rt.diagnose(rt.thermal.parse_system(SYSTEM), rounded(seed, 0.0), effects=["periodic_load"])
+    assert found.verdict == "unexplained" and found.effects == ()
+    assert "error of rounding" in found.outcome.text and "T_block" in found.noise_floor.quantized
+
+
+def test_a_missing_path_is_found_in_rounded_readings() -> None:
+    found = rt.diagnose(rt.thermal.parse_system(SYSTEM), rounded(5, 0.2),
+                        effects=["periodic_load", "missing_ambient_link"])
+    assert [(one.effect, one.where) for one in found.effects] == [("missing_ambient_link", ("block", "room"))]
+    value, std, _ = found.effects[0].values["conductance"]
+    assert abs(value - 0.2) < 0.05 and std < 0.05
 
 
 def test_a_clock_that_begins_again_names_the_remedy(run: Run, tmp_path: Path) -> None:
