@@ -99,16 +99,21 @@ class InvariantEllipsoid:
         matplotlib.axes.Axes
         """
         ax = axes_for(ax)
-        n = len(self.matrix)
         if self.matrix.any():
-            both = np.zeros((2, 2))
-            both[:min(n, 2), :min(n, 2)] = np.linalg.inv(self.matrix)[:2, :2] * self.level
-            angle = np.linspace(0, 2 * np.pi, _OUTLINE)
-            root = np.linalg.cholesky(both + 1e-300 * np.eye(2)) if n > 1 else np.sqrt(both)
-            ax.plot(*(root @ np.vstack([np.cos(angle), np.sin(angle)])), label="never left")
-            ax.legend(loc="best")
-        ax.set(xlabel="state 0 [unit of the state]", ylabel="state 1 [unit of the state]")
+            shadow(ax, self.matrix, self.level, "never left")
+        ax.set(xlabel="state 0", ylabel="state 1")
         return ax
+
+
+def shadow(ax: Any, P: Array, level: float, label: str) -> None:
+    """Draw the outline of what the first two states can be in x'Px <= level; one state alone is a line."""
+    n = min(len(P), 2)
+    both = np.zeros((2, 2))
+    both[:n, :n] = np.linalg.inv(P)[:n, :n] * level
+    root = np.linalg.cholesky(both) if n > 1 else np.sqrt(both)
+    angle = np.linspace(0, 2 * np.pi, _OUTLINE)
+    ax.plot(*(root @ np.vstack([np.cos(angle), np.sin(angle)])), label=label)
+    ax.legend(loc="best")
 
 
 def invariant_ellipsoid(A_vertices: ArrayLike, B_vertices: ArrayLike, *, disturbance: ArrayLike = 1.0,

@@ -15,9 +15,11 @@ from scipy.linalg import expm
 from .._arrays import Array
 from .._checks import positive_number, quoted, whole_number
 from .._control import control
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..linear import Plant, read_plant
 from ._design import Design, RobustAgainst, as_system
+from ._ellipsoid import shadow
 from ._mpc_limits import Limits, read_limits
 from ._mpc_step import MpcStep, Prediction, Program
 from ._mpc_terminal import Terminal, optimal, terminal
@@ -126,6 +128,24 @@ class MpcDesign(Design):
         still = replace(self, controller=control.ss([], [], [], self.controller.D, inputs=self.controller.input_labels,
                                                     outputs=self.controller.output_labels))
         Design.export(still, path, name)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the shadow of the terminal set on the first two states.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        ax = axes_for(ax)
+        if self.terminal.level > 0:
+            shadow(ax, self.terminal.P, self.terminal.level, "terminal set")
+        ax.set(xlabel="state 0", ylabel="state 1")
+        return ax
 
     def _facts(self) -> dict[str, Any]:
         return super()._facts() | {"terminal": {"P": self.terminal.P, "K": self.terminal.K,

@@ -183,6 +183,12 @@ def test_sets_that_break_a_limit_are_never_certified(cart):
         assert not establish("ellipsoid", **changed, made_by={}, margin={}).holds
 
 
+def test_the_picture_is_the_boundary_of_the_terminal_set(cart):
+    line, = cart.plot().lines
+    points = np.stack(line.get_data())
+    assert np.einsum("ik,ij,jk->k", points, cart.terminal.P, points) == pytest.approx(cart.terminal.level)
+
+
 def test_files_hold_the_terminal_set_and_no_program(cart, tmp_path):
     cart.export(tmp_path / "out")
     facts = json.loads((tmp_path / "out" / "design.json").read_text())
