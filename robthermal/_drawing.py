@@ -9,6 +9,28 @@ from .errors import InputError
 # Okabe and Ito (2008): told apart with every common color vision; without the yellow, too pale on white. The n-th
 # sensor of a machine has the n-th color in every figure.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_DASHES = ("-", "--", ":", "-.")
+
+
+def line_of(number: int) -> dict[str, str]:
+    """Color and dashes of the n-th curve, for `Axes.plot`: after the last color they begin again, dashed.
+
+    Parameters
+    ----------
+    number : int
+        Place of the curve among all channels, from 0; -1, -2, … take the colors from the other end.
+
+    Returns
+    -------
+    dict
+
+    Examples
+    --------
+    >>> line_of(0), line_of(6), line_of(-1)["linestyle"]
+    ({'color': '#0072B2', 'linestyle': '-'}, {'color': '#0072B2', 'linestyle': '--'}, '-')
+    """
+    rounds = max(number, -1 - number) // len(COLORS)
+    return {"color": COLORS[number % len(COLORS)], "linestyle": _DASHES[rounds % len(_DASHES)]}
 
 
 def axes_for(ax: Any, **figure: Any) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._celsius import ZERO_CELSIUS
-from .._drawing import COLORS
+from .._drawing import line_of
 from ..signals import Record
 from ._score import Score
 
@@ -44,10 +44,11 @@ def _pair(above: Any, below: Any, record: Record, residuals: Mapping[str, NDArra
     """Readings of one unit, and their residuals below."""
     label, zero = _SHOWN[unit]
     for i, (name, residual) in enumerate(residuals.items()):
-        above.plot(record.time, record[name] - zero, ".", color=COLORS[i % len(COLORS)], markersize=2, alpha=0.4)
-        above.plot(record.time, record[name] - residual - zero, color=COLORS[i % len(COLORS)],
+        line = line_of(i)
+        above.plot(record.time, record[name] - zero, ".", color=line["color"], markersize=2, alpha=0.4)
+        above.plot(record.time, record[name] - residual - zero, **line,
                    label=f"{name}, {score.rmse[name]:.3g} {unit}")
-        below.plot(record.time, residual, color=COLORS[i % len(COLORS)], linewidth=0.7)
+        below.plot(record.time, residual, color=line["color"], linewidth=0.7)
     above.set(ylabel=label)
     if residuals:
         above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",

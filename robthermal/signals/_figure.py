@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from .._drawing import COLORS
+from .._drawing import line_of
 
 if TYPE_CHECKING:
     from ._record import Record
@@ -29,7 +29,7 @@ def draw(record: Record) -> NDArray[Any]:
             style: dict[str, Any] = {"where": "post"} if kind == "inputs" else {}
             paint = axis.step if kind == "inputs" else axis.plot
             place = own.index(name) if kind == "outputs" else -1 - own.index(name)  # inputs from the other end
-            paint(record.time, record[name], label=name, color=COLORS[place % len(COLORS)], **style)
+            paint(record.time, record[name], label=name, **line_of(place), **style)
         axis.set_ylabel(f"{_QUANTITIES.get(unit, kind)} [{unit or 'no unit given'}]")
         axis.grid(True, alpha=0.3)
         axis.set_title(kind, loc="left", fontsize="small")
