@@ -101,7 +101,7 @@ class InvariantEllipsoid:
         ax = axes_for(ax)
         if self.matrix.any():
             shadow(ax, self.matrix, self.level, "never left")
-        ax.set(xlabel="state 0", ylabel="state 1")
+        ax.set(xlabel="state 0 [its unit]", ylabel="state 1 [its unit]")
         return ax
 
 

@@ -144,7 +144,7 @@ class MpcDesign(Design):
         ax = axes_for(ax)
         if self.terminal.level > 0:
             shadow(ax, self.terminal.P, self.terminal.level, "terminal set")
-        ax.set(xlabel="state 0", ylabel="state 1")
+        ax.set(xlabel="state 0 [its unit]", ylabel="state 1 [its unit]")
         return ax
 
     def _facts(self) -> dict[str, Any]:
