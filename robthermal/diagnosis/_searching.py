@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from ._judge import Progress, Validation
-from .evidence import validation_data
-from .fit import Refit, coarsened
+from .evidence import promised, validation_data
+from .fit import Refit, coarsened, extended
 from .search import (
     Accepted,
     SearchState,
@@ -20,6 +21,7 @@ from .search import (
     validate,
 )
 
+_FEW = 5  # evaluations with other filters, from the optimum with its own
 _NOISE_ONLY = 1.2  # whitened variance up to which a fit leaves noise, its level renewed
 
 
@@ -97,24 +99,33 @@ def accepted_effects(state: SearchState, progress: Progress, known: Accepted | N
         if state.rounds:
             progress(f"trying every effect again beside {len(state.rounds)} accepted")
         state = shortlist(state)
+        if state.rounds and not state.misfit_left and _only_coarse(state):
+            return replace(state, complete=True, misfit_left=True)
         if not state.complete:
             progress("refitting the best candidates")
             state = refit_candidates(state)
             if known is not None and not state.rounds:
                 state = replace(state, short=beside(state.short, known.best))
             state = accept(state)
-            if _only_coarse(state):
-                state = replace(state, complete=True, misfit_left=True)
     return state
 
 
 def _only_coarse(state: SearchState) -> bool:
-    """Whether what is left beside the effects accepted is what a finer network would change: no more effects then."""
+    """Whether what is left beside the effects accepted is what a finer network would change: no more effects then.
+
+    It is not where one more effect promises to explain it with fewer unknowns, by BIC.
+    """
     fit = state.fit
-    if state.complete or fit.structure.coarse or not fit.records or _noise_only(fit):
+    if fit.structure.coarse or not fit.records or _noise_only(fit):
         return False
     finer = coarsened(fit)
-    return bool(finer.structure.n_coarse) and _noise_only(finer)
+    # random heat is a guess more often than the noise of a sensor: at its limit it is no sign of missing physics
+    if not finer.structure.n_coarse or finer.variance >= _NOISE_ONLY or finer.levels.sensors_exhausted:
+        return False
+    least = fit.rss if state.complete else min(promised(fit, state.current, i) for i in state.current.order)
+    alike = extended(fit, finer.structure, finer.v, _FEW)
+    n = fit.n_readings
+    return n * math.log(least / alike.rss) > finer.structure.n_coarse * math.log(n)
 
 
 def _noise_only(fit: Refit) -> bool:

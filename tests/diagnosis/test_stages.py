@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal.diagnosis import search
+from robthermal.diagnosis import _searching, search
 from robthermal.diagnosis.evidence import validation_data
+from robthermal.diagnosis.fit import NoiseScaling
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 FEW = ("natural_convection", "sensor_lag", "sensor_offset")
@@ -117,3 +119,23 @@ def test_diagnose_is_the_stages_in_a_row(plant: rt.System, convected: tuple[rt.R
     assert found.fit.v.tolist() == by_hand.fit.v.tolist()
     assert said.index("refitting the best candidates") < said.index("testing whether anything is left")
     assert len(said) == len(set(said)) and len(said) >= 7
+
+
+@pytest.mark.parametrize(("promise", "random_heat", "sensor", "stops"), [
+    (1500.0, 1.0, 1.0, True), (1500.0, 1.4, 1.0, True), (1500.0, 1.0, 1.4, False), (1100.0, 1.0, 1.0, False),
+    (1020.0, 1.0, 1.0, False)])
+def test_one_more_effect_is_tried_where_it_needs_fewer_unknowns_than_a_finer_network(
+        monkeypatch: pytest.MonkeyPatch, promise: float, random_heat: float, sensor: float, stops: bool) -> None:
+    # 1000 readings: 14 unknowns of a finer network cost as much as a sum of squares that is larger by a factor 1.102.
+    def fit(rss: float, columns: int, levels: NoiseScaling) -> SimpleNamespace:
+        structure = SimpleNamespace(coarse=(0,) * bool(columns), n_coarse=columns)
+        return SimpleNamespace(rss=rss, variance=rss / 1000.0, n_readings=1000, records=(0,), levels=levels,
+                               structure=structure, v=np.zeros(1))
+
+    exact = fit(2000.0, 0, NoiseScaling(1.4, {"T": 1.4}))
+    finer = fit(1000.0, 14, NoiseScaling(random_heat, {"T": sensor}))
+    monkeypatch.setattr(_searching, "coarsened", lambda one: finer)
+    monkeypatch.setattr(_searching, "extended", lambda one, structure, v, limit: finer)
+    monkeypatch.setattr(_searching, "promised", lambda one, scores, i: promise)
+    state = SimpleNamespace(fit=exact, complete=False, current=SimpleNamespace(order=[0]))
+    assert _searching._only_coarse(state) is stops  # type: ignore[arg-type]

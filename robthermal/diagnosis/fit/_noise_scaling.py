@@ -49,6 +49,11 @@ class NoiseScaling:
     memory: float = 0.0
 
     @property
+    def sensors_exhausted(self) -> bool:
+        """Whether the level of any sensor would be higher still, but for the limit."""
+        return max(self.noise.values(), default=0.0) > 0.98 * self.limit
+
+    @property
     def exhausted(self) -> bool:
         """Whether any level would be higher still, but for the limit."""
         return max([self.disturbance, *self.noise.values()]) > 0.98 * self.limit
