@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test quick lint docs bench clean
+.PHONY: help demo test exhaustive quick lint docs bench clean
 
 # Tests that together take less than half a minute on two cores: one or more of every package, chosen by measured times.
 QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py tests/test_project.py tests/diagnosis/test_structure.py \
@@ -24,7 +24,8 @@ QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py t
 
 help:
 	@echo "make demo    (simulated) records -> calibrated model -> certificates -> build/demo/report.html"
-	@echo "make test    lint, types, then all tests (import contract, doctests, docs build included)"
+	@echo "make test    lint, types, then the tests (import contract, doctests, notebooks, docs build included)"
+	@echo "make exhaustive   the tests that make test leaves to CI: many random draws, brute force"
 	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"
@@ -36,7 +37,10 @@ demo: $(VENV)/.installed
 	$(BIN)/robthermal demo --out build/demo
 
 test: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m "not exhaustive"
+
+exhaustive: $(VENV)/.test
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m exhaustive tests
 
 quick: $(VENV)/.test
 	$(BIN)/ruff check .
