@@ -16,6 +16,7 @@ import robthermal as rt
 from robthermal.diagnosis.evidence import left, reproducible, sandwich, stability
 from robthermal.diagnosis.fit import coarsened, exact
 from robthermal.diagnosis.path import coarse_names
+from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from foreign.cases import Case, Made, made  # noqa: E402 - beside the benchmarks
@@ -99,6 +100,16 @@ def test_the_dominant_effect_is_named_with_its_remainder():
     gap = found.gap["validation"]
     assert rest.gaps["validation"].rms == pytest.approx((gap.after**2 - gap.noise**2) ** 0.5)
     assert sum(share for _, share in rest.where[:1]) <= 1.0 and rest.share >= 0.8 and rest.low < rest.high
+
+
+def test_a_report_with_a_remainder_passes_with_the_remark():
+    found = diagnosed("hidden", "heater_power_slope", 0)
+    report = diagnosis_report(Diagnosed(found, (), (), ()))
+    assert (report.verdict, report.holds) == ("PASS WITH REMARKS", True)
+    assert [(one.code, one.text) for one in report.reasons] == [("remainder", str(found.remainder))]
+    unexplained = rt.diagnosis.DiagnosisCode.UNEXPLAINED.outcome()
+    refused = diagnosis_report(Diagnosed(replace(found, verdict="unexplained", outcome=unexplained), (), (), ()))
+    assert refused.verdict == "FAIL" and {one.level for one in refused.reasons} == {"fail"}
 
 
 def test_the_file_holds_what_the_contract_asks_for():

@@ -29,6 +29,8 @@ class GateCode(Enum):
                            "Make the experiment that the diagnosis proposes.")
     DIAGNOSIS_NAMED = ("The diagnosis names an effect that the certified model does not have.",
                        "Put it into the system file and run the job again.")
+    REMAINDER = ("Beside what the diagnosis names an error beyond the noise is left; it is stated, and has no name.",
+                 "Judge whether an error of that size matters; the diagnosis says what would resolve it.")
     NOT_CONVERGED = ("The calibration stopped before it converged: its parameters are no estimate, and have no ranges.",
                      "Raise [calibrate] max_iterations, start closer, or calibrate fewer parameters.")
     UNDETERMINED_PARAMETER = ("The records do not determine a parameter: its range is that of [fit].",

@@ -51,7 +51,7 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
                  "within ΔBIC 10 of it are alternatives"
                  + (f", but {ruled_out}: more than 10 behind with the density of the validation records added."
                     if ruled_out else "."))
-    if found.reference is not None:
+    if found.reference is not None or found.verdict == "named_with_remainder":  # a remark states what is left
         return
     yield _claim("Nothing is left in the training records", "What the model leaves is white, and no lump has a heat "
                  "left over.", found.adequacy.outcome.ok, found.adequacy.outcome.text, _records(result, "train"),

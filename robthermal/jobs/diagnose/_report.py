@@ -11,9 +11,10 @@ import numpy as np
 from ..._pandas import pd
 from ...diagnosis import Diagnosis, Found, effects
 from ...fitting import rmse
-from ...report import Figure, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
+from ...report import Figure, Reason, Report, Section, Table, house_style, residuals_before_after, spectra_before_after
 from ...signals import Record
 from ...thermal import write_system
+from ..claims import GateCode
 from ..evidence import write_report
 from ..folder import output_folder
 from ..network import network_section
@@ -82,7 +83,13 @@ def diagnosis_report(result: Diagnosed) -> Report:
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
                   generated=now(), answer=found.verdict.upper(), headline=answer_sentence(found),
-                  numbers=(number_that_matters(found),))
+                  numbers=(number_that_matters(found),), gate=tuple(_remarks(found)), gates=(GateCode.REMAINDER.code,))
+
+
+def _remarks(found: Diagnosis) -> Iterator[Reason]:
+    if found.verdict == "named_with_remainder":
+        code = GateCode.REMAINDER
+        yield Reason("remark", code.code, "diagnose", "records", str(found.remainder or code.meaning), code.remedy)
 
 
 def save_diagnosis(found: Diagnosis, folder: Path) -> None:
