@@ -79,11 +79,12 @@ def diagnosis_report(result: Diagnosed) -> Report:
         Diagnosis, as `diagnose_records` returns it.
     """
     found = result.diagnosis
+    remarks = tuple(_remarks(found))
     return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
                   generated=now(), answer=found.verdict.upper(), headline=answer_sentence(found),
-                  numbers=(number_that_matters(found),), gate=tuple(_remarks(found)), gates=(GateCode.REMAINDER.code,))
+                  numbers=(number_that_matters(found),), gate=remarks, gates=tuple(one.code for one in remarks))
 
 
 def _remarks(found: Diagnosis) -> Iterator[Reason]:
