@@ -23,8 +23,8 @@ def doubts(system: System, remainder: bool) -> list[str]:
     """
     if not system.modules or not remainder:
         return []
-    return ["A module has no inside of its own in this test. On 18 simulated stacks with a module none of the names was "
-            "wrong, which does not exclude one in five: confirm this name on the machine."]
+    return ["A module has no inside of its own in this test. On 18 simulated stacks with a module none of the names "
+            "was wrong, which does not exclude one in five: confirm this name on the machine."]
 
 
 def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
