@@ -282,6 +282,16 @@ def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
     assert everything(tmp_path) == set()
 
 
+def test_an_interrupt_that_python_loses_ends_the_job_at_its_next_step() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), progress() as told:
+        told("simulating")
+        with contextlib.suppress(KeyboardInterrupt):  # as inside a callback of an import
+            signal.raise_signal(signal.SIGINT)
+        told("writing")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
 def test_interrupt_while_writing_leaves_nothing(run: Run, system: Path, tmp_path: Path,
                                                 monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[set[Path]] = []

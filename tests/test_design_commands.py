@@ -166,6 +166,7 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -
     assert page.count("<svg") >= 4 and "How linear the loop is" in page
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("without_linearity")
 def test_a_distant_sensor_is_regulated(run: Run, file: Path, tmp_path: Path) -> None:
     """The set-point is what the lagging sensor on the part reads; the report and the file say what is regulated."""
@@ -434,6 +435,7 @@ def test_request_refuses_a_module_without_set_point() -> None:
         rt.jobs.design.design_from_text(rt.systems.two_module(), setpoint=["m1=5"])
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("without_linearity")
 def test_margins_over_parameter_ranges_are_reported(run: Run, file: Path, tmp_path: Path) -> None:
     """Tuned by margins for all corners: design.json, summary.json and report; nominal and robust side by side."""
@@ -456,6 +458,7 @@ def test_margins_over_parameter_ranges_are_reported(run: Run, file: Path, tmp_pa
     assert run("verify", tmp_path / "out").status == 0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("without_linearity")
 def test_a_missed_margin_fails_with_the_best_bandwidth(run: Run, file: Path, tmp_path: Path) -> None:
     said = run("design", file, "--setpoint", "m1=12", "--regulate", "m1=T_slow", "--margin", "phase=60", "--bandwidth",

@@ -229,6 +229,7 @@ def test_infinite_circles_between_decided_bins_are_refused(run: Run, pair: Path,
     assert "not stabilize" not in warned and f"Measure {frequencies[7]:.4g}" in warned
 
 
+@pytest.mark.exhaustive
 def test_confidence_is_a_key_and_wider_with_more(run: Run, pair: Path, tmp_path: Path) -> None:
     spoiled(pair, tmp_path)
     robust = []

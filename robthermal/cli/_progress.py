@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import Protocol
 
 import typer
@@ -23,17 +24,45 @@ class Told(Protocol):
     def __call__(self, what: str, done: int | None = None, total: int | None = None) -> None: ...
 
 
-def progress() -> AbstractContextManager[Told]:
+@contextmanager
+def progress() -> Iterator[Told]:
     """Percentage and remaining time on a terminal; elsewhere a plain line every 10 s. Standard output is untouched.
 
-    Returns
-    -------
-    context manager of `Told`
+    Yields
+    ------
+    Told
         ``told("simulating")``, or ``told("certify", 3, 6)`` where three of six stages are done; a later sentence alone
         leaves the count as it is.
     """
     # isatty: FORCE_COLOR makes rich take a pipe for a terminal.
-    return _bar() if sys.stderr.isatty() else _lines(EVERY)
+    with _interrupts() as interrupted, _bar() if sys.stderr.isatty() else _lines(EVERY) as told:
+
+        def say(what: str, done: int | None = None, total: int | None = None) -> None:
+            if interrupted.is_set():
+                raise KeyboardInterrupt
+            told(what, done, total)
+
+        yield say
+
+
+@contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Remember Ctrl-C: Python loses the exception where it strikes inside a callback, of an import or a finalizer."""
+    seen = threading.Event()
+
+    def remember(*args: object) -> None:
+        seen.set()
+        raise KeyboardInterrupt
+
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield seen
+        return
+    signal.signal(signal.SIGINT, remember)
+    try:
+        yield seen
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

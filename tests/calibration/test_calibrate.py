@@ -52,6 +52,7 @@ def noisy(run: rt.Record, seed: int, pole: float = 0.0, sigma: float = 0.1) -> r
     return run.with_outputs(run.outputs + sigma * noise(run.outputs.shape, seed, pole))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("pole", "n"), [(0.0, 150), (0.8, 300)])
 def test_intervals_cover_and_deviations_match_the_scatter(pole: float, n: int) -> None:
     # 100 runs: a 95 % interval covers between 88 % and 99 % of them except by a chance of about 1 in 100. With the slow

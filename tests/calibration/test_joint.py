@@ -80,6 +80,7 @@ def test_information_of_the_record_is_that_of_own_derivatives() -> None:
     np.testing.assert_allclose(list(fit.std.values()), np.sqrt(np.diag(own)), rtol=0.05)
 
 
+@pytest.mark.exhaustive
 def test_ranges_cover_the_truth_and_the_estimates_are_those_of_least_variance() -> None:
     """95 % ranges of both kinds together, 40 repetitions, bound at a chance of 0.1 %; scatter as stated."""
     count, truth = 40, np.array(list(TRUTH.values()))

@@ -46,6 +46,7 @@ def start(**options: float) -> rt.System:
     return plant(**options).with_parameters({"lumps.a.capacity": 80.0, "links.a-room.conductance": 0.3})
 
 
+@pytest.mark.exhaustive
 def test_prediction_error_scatters_less_and_its_intervals_cover() -> None:
     estimates, deviations = {}, {}
     records = runs(40)

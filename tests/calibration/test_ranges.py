@@ -66,6 +66,7 @@ def test_white_noise() -> None:
     assert sum(scale > 1.5 for scale in scales) <= 0.06 * len(scales)  # blocks of white noise: 1 %, if that
 
 
+@pytest.mark.exhaustive
 def test_colored_noise() -> None:
     """Pole 0.8: a hundred readings are eleven independent ones, and 1.96 deviations cover far less often."""
     fit = cache(lambda seed: calibrated(seed, 0.8))
@@ -78,6 +79,7 @@ def test_colored_noise() -> None:
     assert sum(scale > 2.0 for scale in scales) <= 0.06 * len(scales)
 
 
+@pytest.mark.exhaustive
 def test_one_undetermined_direction() -> None:
     """Capacity, conductance and gain have a common factor; the offset beside them is determined."""
     bounds = BOUNDS | {GAIN: (0.5, 2.0), OFFSET: (-5.0, 5.0)}
@@ -98,6 +100,7 @@ def test_one_undetermined_direction() -> None:
     assert covers(lambda seed: inside(fit(seed)))
 
 
+@pytest.mark.exhaustive
 def test_a_prior_closes_the_direction() -> None:
     """The prior is what is known before: its center scatters about the truth with its standard deviation."""
     sigma = 0.05
@@ -133,6 +136,7 @@ def test_a_prior_of_one_parameter_does_not_stand_for_another() -> None:
     assert all(ends == (0.01, 4.0) for ends in free.ranges().values())
 
 
+@pytest.mark.exhaustive
 def test_frequency_response() -> None:
     drive = np.random.default_rng(5).choice([0.0, 8.0], 400)
     run = rt.thermal.simulate(bar(), rt.Record(sample_time=20.0, inputs=drive, outputs=np.zeros((400, 0)),
@@ -171,6 +175,7 @@ def test_positive_parameters_stay_positive_and_ranges_grow_with_confidence() -> 
     assert box[CAPACITY][1] - fit.parameters[CAPACITY] > single
 
 
+@pytest.mark.exhaustive
 def test_a_parameter_at_its_bound_has_a_range_from_the_bound() -> None:
     """Truth at the bound, so that half of the estimates run into it: both true values are inside as often."""
     bounds = {CAPACITY: (60.0, 600.0), CONDUCTANCE: (0.04, 4.0)}

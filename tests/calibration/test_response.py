@@ -78,6 +78,7 @@ def test_pom_conductivity_is_recovered_within_its_uncertainty() -> None:
     assert 0.7 < fit.misfit < 1.4
 
 
+@pytest.mark.exhaustive
 def test_intervals_cover_although_bins_share_data() -> None:
     fits = [rt.calibrate(bar(), rt.identify.lrmp(record(seed, 500), poles=pole_list()), parameters=RANGES)
             for seed in range(30)]

@@ -39,6 +39,7 @@ def test_the_rig_of_algorithm_1_gives_its_module(clean: np.ndarray) -> None:
     assert "V1 0.00" in str(fit) and " V\n" in str(fit).replace(" V,", " V\n")
 
 
+@pytest.mark.exhaustive
 def test_ranges_cover_the_truth(clean: np.ndarray) -> None:
     """60 logs: a 95 % interval of every parameter covers as a 95 % interval does (two-sided test, 1 in 1000)."""
     inside = dict.fromkeys(NAMES, 0)

@@ -85,6 +85,7 @@ def population():
     return found
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("method", rt.certify._contraction.METHODS)
 def test_no_random_system_with_an_unstable_frozen_jacobian_is_certified(method, population):
     unstable = certified = 0

@@ -85,6 +85,7 @@ def test_random_machines_and_observers():
     assert held >= 3
 
 
+@pytest.mark.exhaustive
 def test_loops_that_oscillate_are_never_certified_for_the_machine():
     """Observer gains, sample times and bandwidths at random: whoever keeps oscillating has no certificate."""
     rng, oscillating = np.random.default_rng(14), 0

@@ -21,6 +21,7 @@ def test_limits_of_the_errata_for_constant_modules(two, direction, reference, fr
     assert limit.certificate.holds and rt.verify(limit.certificate).valid
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("structure", ["full", "block"])
 def test_a_box_close_to_the_limit_of_the_errata(two, structure):
     cert = rt.certify.contraction(two, current=same(two, -2.69, 2.69), temperature=BOX, method="lyapunov",
@@ -78,6 +79,7 @@ UNCERTAIN = {"modules.m1.conductance.value": (0.267, 0.327), "modules.m2.seebeck
              "links.x1-room.conductance": (0.6, 0.8), "lumps.x9.capacity": (4.0, 5.5)}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("method", ["energy", "sum", "max", "lyapunov"])
 def test_every_machine_in_the_ranges_decays_as_claimed(two, method):
     ranges = {name: pair for name, pair in UNCERTAIN.items() if method != "lyapunov" or "capacity" not in name}
@@ -100,6 +102,7 @@ def test_uncertain_machines_that_may_run_away_are_not_certified(method):
     assert not cert.holds and not rt.verify(cert).valid
 
 
+@pytest.mark.exhaustive
 def test_random_uncertain_machines():
     """Never certified when a sampled machine of the ranges is unstable, for any method."""
     rng = np.random.default_rng(3)

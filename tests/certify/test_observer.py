@@ -67,6 +67,7 @@ def test_unstable_observer_of_the_errata_is_refused(two):
         assert "grows by" in cert.reason and "x12" in cert.reason  # says where to add sensors
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("sensors", [["T6", "T7"], ["T6", "T7", "T13", "T16"]])
 def test_ninety_five_per_cent_of_the_frozen_limit(two, sensors):
     L = kalman(two, sensors)
@@ -127,6 +128,7 @@ def test_never_certified_where_a_frozen_matrix_is_unstable():
     assert {(True, False), (False, True)} <= seen
 
 
+@pytest.mark.exhaustive
 def test_eighteen_lumps_on_two_sensors(two):
     cert = certify(two, kalman(two, ["T6", "T7"]), ["T6", "T7"], (-1.0, 1.5))
     assert cert.holds and rt.verify(cert).valid

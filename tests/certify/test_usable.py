@@ -56,6 +56,7 @@ def test_headline_of_a_small_module_is_not_its_contraction_limit():
     assert axes.get_xlim()[1] < 17
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("direction", "lower"), [("cooling", "reported"), ("cooling", "inside"), ("heating", "inside"),
                                                   ("symmetric", "inside")])
 def test_nothing_leaves_the_box_at_the_headline(two, direction, lower):
@@ -78,6 +79,7 @@ def test_nothing_leaves_the_box_at_the_headline(two, direction, lower):
         assert (states >= box[0] - 1e-4).all() and (states <= box[1] + 1e-4).all()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("direction", ["cooling", "heating", "symmetric"])
 def test_wider_ranges_never_allow_more_current(two, direction):
     """Certificates are searched for finely enough that a proof for ranges is not found above one without them."""

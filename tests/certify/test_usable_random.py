@@ -1,6 +1,7 @@
 """Usable currents of random machines: never left at 100 %, and not much below what an own simulation survives."""
 
 import numpy as np
+import pytest
 from own_simulation import Network, switching
 from random_machines import machine, simulated_limit
 
@@ -9,6 +10,7 @@ from robthermal.certify._sections import system_section
 from robthermal.verification import Certificate, establish
 
 
+@pytest.mark.exhaustive
 def test_random_machines_stay_in_their_boxes_and_use_most_of_what_they_bear() -> None:
     rng, ratios = np.random.default_rng(0), []
     for _ in range(9):

@@ -161,6 +161,7 @@ def turns(values: Array) -> int:
     return round(float(np.sum(np.angle(fine[1:] / fine[:-1]))) / (2 * np.pi))
 
 
+@pytest.mark.exhaustive
 def test_where_a_count_is_accepted_all_plants_of_the_set_have_it() -> None:
     """Random discs of det: an accepted or refused count is that of 40 drawn members; where undecided, some differ."""
     rng = np.random.default_rng(0)
@@ -201,6 +202,7 @@ def test_all_circles_hold_at_once(random_pair: Callable[[int], Pair]) -> None:
     assert binom.ppf(1e-3, 400, 0.95) <= inside
 
 
+@pytest.mark.exhaustive
 def test_robust_means_stable_for_plants_of_the_confidence_set(random_pair: Callable[[int], Pair]) -> None:
     """Every drawn plant in all circles and under the envelope between them is stable with the coupling controller."""
     drawn, hertz = 0, np.linspace(0.25, 49.75, 160)

@@ -116,6 +116,7 @@ def test_state_feedback_with_given_gains(plant):
     np.testing.assert_allclose(ours, theirs, atol=1e-9)
 
 
+@pytest.mark.exhaustive
 def test_feed_forward_holds_the_set_point_without_integral_action(plant, law, system):
     p = rt.design.pid(plant, proportional=0.5, sample_time=1.0)
     n = 3000
@@ -127,6 +128,7 @@ def test_feed_forward_holds_the_set_point_without_integral_action(plant, law, sy
     assert np.abs(alone.cold[-1] - 288.15).min() > 0.5
 
 
+@pytest.mark.exhaustive
 def test_the_disturbance_observer_finds_and_cancels_a_load(plant, law, system):
     p = rt.design.pid(plant, proportional=0.5, sample_time=1.0)
     fed = rt.design.feed_forward(plant, p)

@@ -100,6 +100,7 @@ def settled(system, observer, feedback, controller, setpoint, regulate, duration
     return np.concatenate([stepper.state, loop.estimate[-1], loop.wanted[-1]])
 
 
+@pytest.mark.exhaustive
 def test_margins_with_an_observer_and_another_plant(loop_parts):
     """The observer and the law keep the nominal parameters; the plant is a corner of the ranges."""
     nominal, _, pi = loop_parts
@@ -118,6 +119,7 @@ def test_margins_with_an_observer_and_another_plant(loop_parts):
     assert found.worst("m1").gain == min(plant.margins["m1"].gain for plant in found.plants)
 
 
+@pytest.mark.exhaustive
 def test_margins_of_two_loops_are_opened_one_at_a_time(system, law, plant):
     """Two modules, an observer: one loop opened, the other closed, on differences of the simulated machine."""
     pi = rt.design.pid(plant, bandwidth=0.2, sample_time=1.0)
@@ -199,6 +201,7 @@ def test_a_corner_that_cannot_hold_the_set_point_is_said(loop_parts):
     assert found.outcome.code == "not_held" and "seebeck.value = 0.02" in str(found.outcome)
 
 
+@pytest.mark.exhaustive
 def test_many_parameters_are_searched_where_the_margins_fall(loop_parts):
     """Eleven parameters have 2048 corners: 64 are computed, among them one as bad as the worst of all single moves."""
     nominal, plant, _ = loop_parts

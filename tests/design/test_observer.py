@@ -94,6 +94,7 @@ def _frozen(obs, current):
             yield np.column_stack(columns)
 
 
+@pytest.mark.exhaustive
 def test_a_certificate_ends_at_the_frozen_limit(system):
     obs = rt.design.observer(system, ["T6", "T7"])
     limit = obs.frozen_limit(BOX)
@@ -102,6 +103,7 @@ def test_a_certificate_ends_at_the_frozen_limit(system):
     assert not refused.holds and refused.reason
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("method", ["kalman", "positive", "ekf"])
 def test_estimates_converge_on_the_nonlinear_plant(system, method):
     t = np.arange(900)
@@ -211,6 +213,7 @@ def test_records_that_do_not_fit_are_refused(system):
         obs.run(record.select(outputs=[]))
 
 
+@pytest.mark.exhaustive
 def test_placement_is_the_smallest_certified_set(system):
     """Up to 3.8 A: no single candidate is stable, a pair is certified."""
     box = {"current": both(3.8), "temperature": BOX, "candidates": ["T6", "T15", "T16"]}

@@ -62,6 +62,7 @@ def test_corner_plants_are_the_derivatives_of_what_the_constant_gain_does(plain,
     assert any(np.isclose(p.B[0, 0], gain, rtol=1e-6) and np.isclose(p.B[0, 2], touch, rtol=1e-5) for p in at)
 
 
+@pytest.mark.exhaustive
 def test_it_stabilizes_every_corner_and_switching_between_them(plant, corners):
     loop = rt.design.state_feedback(plant, bandwidth=0.05, sample_time=1.0, method="lmi", plants=corners)
     assert loop.outcome
@@ -82,6 +83,7 @@ def test_plants_that_no_gain_stabilizes_are_refused(plant):
     np.testing.assert_array_equal(loop.K, own.K)
 
 
+@pytest.mark.exhaustive
 def test_on_the_nonlinear_plant_it_does_as_well_as_the_lqr(plant, plain, corners, system):
     """Without the law, on the constant gain that the plants were made for: it settles, and overshoots no more."""
     runs = [rt.design.simulate_loop(system, loop, 289.15, law=plain, duration=600.0) for loop in (

@@ -30,6 +30,7 @@ def strong(system):
     return rt.design.observer(system, ["T6", "T7"], method="lmi", current=heating(system, 5.25), temperature=BOX)
 
 
+@pytest.mark.exhaustive
 def test_it_holds_where_the_kalman_observer_is_unstable(system, strong):
     box = heating(system, 5.25)
     kalman = rt.design.observer(system, ["T6", "T7"])
@@ -44,6 +45,7 @@ def test_the_frozen_limit_lies_beyond_the_current_it_was_made_for(system, strong
     assert strong.frozen_limit(BOX, "heating") > max(5.25, 2 * kalman)
 
 
+@pytest.mark.exhaustive
 def test_errors_die_out_under_arbitrary_switching(system, strong):
     """Brute force: products of error matrices at random points, currents jumping, not one frozen matrix at a time."""
     rng = np.random.default_rng(1)

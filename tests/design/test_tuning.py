@@ -30,6 +30,7 @@ def kept(law, bandwidth, parameters, sample_time=2.0):
                for plant in found.plants for one in plant.margins.values())
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("parameters", [{}, RANGES])
 def test_it_is_the_largest_bandwidth(law, parameters):
     found = rt.design.tune_pi(law, 288.15, margins=WANTED, sample_time=2.0, regulate=REGULATE, parameters=parameters)

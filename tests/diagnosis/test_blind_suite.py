@@ -74,6 +74,7 @@ def test_one_case_of_each_plant_runs_and_is_scored(case, capsys, monkeypatch):
     assert "CPU seconds" in capsys.readouterr().out
 
 
+@pytest.mark.exhaustive
 def test_a_small_mass_in_a_bent_valley_is_found():
     """Beside a capacity that gives way no step from nothing along the tangent survives: the neighbor got the name."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 12))
@@ -83,6 +84,7 @@ def test_a_small_mass_in_a_bent_valley_is_found():
     assert abs(value - truth.effects[0][2]["capacity"]) < 3.0 * std
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("seed", [49, 95])  # 95: only with the parameters as they were before the mass
 def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
     """The refit of the right mass ends in the lesser of two minima; a mass in the neighboring lump got the name."""
@@ -97,6 +99,7 @@ def test_the_other_minimum_along_a_time_constant_is_found(seed, monkeypatch):
     assert rt.diagnosis.refit_short_list(fit, scores).entries[0].candidate.where == ("cover",)
 
 
+@pytest.mark.exhaustive
 def test_an_effect_that_shrinks_to_nothing_is_no_name():
     """The neighbor is accepted first; once the right mass is found, nothing is left of it."""
     given, truth = made(Case("C", "hidden", "hidden_mass", 78))
@@ -156,6 +159,7 @@ def test_interval_is_clopper_and_pearsons():
     assert interval(100, 100) == (pytest.approx(0.025 ** (1 / 100)), 1.0)
 
 
+@pytest.mark.exhaustive
 def test_a_short_catalog_holds_the_truth():
     for case in (Case("B", "hidden", "input_lag", 20), Case("A", "outside", "fan", 40)):
         given, truth = made(case)

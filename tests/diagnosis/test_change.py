@@ -99,6 +99,7 @@ def test_a_room_warmer_than_recorded_is_no_change_of_a_parameter(rig: rt.System,
     assert ("ambient_gradient", ("sink",)) in names and "parameter_change" not in {effect for effect, _ in names}
 
 
+@pytest.mark.exhaustive
 def test_several_new_records_scatter_as_healthy_ones_do(rig: rt.System, old: list[rt.Record]) -> None:
     new = [record(seed, Day({"fan": 0.5}), **SIZES) for seed in (11, 13)]
     found = rt.diagnose(rig, new, reference=old, effects=FEW)
@@ -107,6 +108,7 @@ def test_several_new_records_scatter_as_healthy_ones_do(rig: rt.System, old: lis
                        ).verdict == "consistent"
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("day", [Day(draught=3.0), Day(drift=2.0)], ids=["gusts", "drifting sensor"])
 def test_what_is_in_no_catalog_is_unexplained(rig: rt.System, old: list[rt.Record], day: Day) -> None:
     found = rt.diagnose(rig, record(71, day, **SIZES), reference=old, effects=[*FEW, "periodic_load", "hidden_mass"])
@@ -148,6 +150,7 @@ def test_a_hotter_healthy_day_is_no_change(rig: rt.System, lossy: list[rt.Record
     assert found.verdict == "consistent" and found.reference is not None
 
 
+@pytest.mark.exhaustive
 def test_gusts_beside_a_remainder_are_not_named(rig: rt.System, lossy: list[rt.Record]) -> None:
     found = rt.diagnose(rig, record(1997, Day(loss=0.15, draught=6.0), **SIZES), reference=lossy,
                         effects=[*FEW, "periodic_load"])

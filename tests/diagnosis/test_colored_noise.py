@@ -122,6 +122,7 @@ def test_the_slow_part_is_never_more_than_the_declared_noise(bar: rt.System) -> 
     assert slow.pole == pytest.approx(np.exp(-3.0 / 9.0))
 
 
+@pytest.mark.exhaustive
 def test_colored_noise_of_three_sensors_is_consistent() -> None:
     given, _ = made(Case("C", "noise", "colored", 2))
     found = rt.diagnose(given.system, given.train, validation=given.validation)
@@ -134,6 +135,7 @@ def test_colored_noise_of_three_sensors_is_consistent() -> None:
     assert found.gap["train"].noise == pytest.approx(found.gap["train"].after, rel=0.3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("step", [0.0, 0.01])
 def test_without_random_heat_and_with_steps_and_a_spike(plant: rt.System, hide: Hide, step: float) -> None:
     train, validation = (colored(record, 0.008, seed) for seed, record in enumerate(hide(), start=1))
@@ -148,12 +150,14 @@ def test_without_random_heat_and_with_steps_and_a_spike(plant: rt.System, hide: 
     assert "slow part" in found.outcome.text
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("effect", "topology"), [("humidity", "C"), ("fan", "C"), ("melting", "C"), ("fan", "A")])
 def test_what_the_catalog_does_not_know_is_no_noise(effect: str, topology: str) -> None:
     given, _ = made(Case(topology, "outside", effect, 0))
     assert with_wider_noise(rt.diagnosis.refit(given.system, given.train), None) is None
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("effect", "seed", "factor"), [("fan", 0, 8.0), ("fan", 1, 40.0), ("melting", 0, 24.0)])
 def test_weak_physics_is_no_noise_either(effect: str, seed: int, factor: float) -> None:
     # Whitened variance 1.00 to 1.04: small slow noise with a long memory would explain the second, the third if one
@@ -170,6 +174,7 @@ def test_weak_physics_is_no_noise_either(effect: str, seed: int, factor: float) 
     assert with_wider_noise(fit, None) is None
 
 
+@pytest.mark.exhaustive
 def test_a_hidden_effect_in_colored_noise_is_not_called_noise(plant: rt.System, hide: Hide, rate: Callable) -> None:
     def lagged(t: float, x: Array, u: Array) -> Array:
         return np.append(rate(x[:2], u), (x[1] - x[2]) / 25.0)

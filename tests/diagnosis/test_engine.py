@@ -88,6 +88,7 @@ def test_strong_effect_is_reached_although_the_nominal_fit_is_far_off(plant: rt.
     assert values["time_constant"] == pytest.approx(tau, rel=0.05)
 
 
+@pytest.mark.exhaustive
 def test_time_of_a_step_is_looked_for_beyond_the_nearest_minimum(plant: rt.System, hide: Hide, rate: Callable) -> None:
     # The link between plate and block doubles at 1230 s, inside a dwell of 100 s: near 1330 s is another minimum.
     def hidden(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:

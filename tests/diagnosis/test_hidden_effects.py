@@ -91,6 +91,7 @@ def test_constant_source_is_a_declared_alias(plant: rt.System, hide: Hide, rate:
     assert {"heat_source(plate)", "ambient_gradient(plate)", "sensor_self_heating(Tp)"} <= names(found)
 
 
+@pytest.mark.exhaustive
 def test_physics_outside_the_catalog_is_not_named(plant: rt.System, hide: Hide, rate: Callable) -> None:
     def melting(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
         slow = 1.0 + 4.0 * np.exp(-(((T[0] - 303.0) / 1.0) ** 2))  # heat of fusion about 303 K

@@ -154,6 +154,7 @@ def test_nothing_hidden_selects_nothing(plant: rt.System, hide: Hide) -> None:
     assert found.outcome.code == "nothing" and not found.sets
 
 
+@pytest.mark.exhaustive
 def test_diagnose_compares_both_ways(plant: rt.System, hide: Hide, rate: Callable) -> None:
     train, validation = hide(heated(rate))
     found = rt.diagnose(plant, train, validation=validation, effects=["input_saturation", "heater_power_slope",

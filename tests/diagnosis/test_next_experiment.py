@@ -87,6 +87,7 @@ CASES = {
 }
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("case", CASES)
 def test_recommended_experiment_makes_the_name_unique(bench: rt.System, case: str) -> None:
     run, seed, name, confused = CASES[case]

@@ -97,6 +97,7 @@ def test_a_damaged_index_of_an_archive(content: dict[str, Any], tmp_path: Path) 
         rt.identify.FrequencyResponse.load(archive)
 
 
+@pytest.mark.exhaustive
 def test_ten_thousand_damaged_matlab_files_never_crash(content: dict[str, Any], tmp_path: Path) -> None:
     """Bytes overwritten, cut off or doubled: loaded if it still can be, rejected with a message otherwise."""
     path, mat = tmp_path / "G.json", tmp_path / "G.mat"

@@ -110,6 +110,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", sorted(HOSTILE))
 def test_work_is_bounded(name, tmp_path):
     """With the right sentence, so that the work begins; at most 1 GB, and far less than a minute each."""

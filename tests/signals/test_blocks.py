@@ -118,6 +118,7 @@ def inspection(path: Path, options: dict[str, Any]) -> str:
         return str(error)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", FILES)
 def test_blocks_of_a_few_rows_give_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     content, options = FILES[name]

@@ -151,6 +151,7 @@ def test_noise_gain_is_that_of_lpm_at_every_line(case: int) -> None:
     np.testing.assert_allclose(check.noise_gain, np.einsum("iif->if", G.gram).real[:, bins_of(check)], rtol=1e-8)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("case", range(len(CASES)))
 def test_expected_variance_is_the_scatter_of_lpm(case: int) -> None:
     u, settings = CASES[case]

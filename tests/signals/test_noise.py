@@ -35,6 +35,7 @@ def test_filtered_noise_has_the_spectrum_of_the_filter(band: tuple[float, float]
     assert density[f > 2.5 * band[1]].max() < 1e-2 * density.max()
 
 
+@pytest.mark.exhaustive
 def test_filtered_noise_is_stationary_at_once() -> None:
     first = np.array([noise(2, sample_time=1.0, rms=2.0, band=(0.05, 0.2), seed=s)[0] for s in range(2000)])
     assert first.std() == pytest.approx(2.0, rel=4 / np.sqrt(4000))  # no switch-on

@@ -60,6 +60,7 @@ def test_h2_riccati_and_inequalities_agree(seed):
     assert d.lower == pytest.approx(h2_level(read_generalized(P, 2, 2)), rel=1e-4)
 
 
+@pytest.mark.exhaustive
 def test_one_step_of_the_margin_program_agrees():
     G = control.tf([1], [1, 3, 3, 1])
     discs = read_discs(G, 0.99)

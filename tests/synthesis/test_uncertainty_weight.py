@@ -49,6 +49,7 @@ def test_plants_drawn_from_the_covariance_lie_below(kind, dt):
     assert max(part.max() for part in limits) < 1
 
 
+@pytest.mark.exhaustive
 def test_the_true_plant_lies_below_in_the_stated_share_of_measurements():
     """Few degrees of freedom: circles by F(2, 2q). 60 measurements, p = 0.9; at most 13 misses has probability 0.99."""
     missed = 0

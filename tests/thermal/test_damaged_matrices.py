@@ -36,6 +36,7 @@ def test_every_layout_is_read_as_scipy_reads_it(tmp_path: Path, symmetry: str, d
     np.testing.assert_array_equal(read_market(path).toarray(), reference if dense else reference.toarray())
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("ending", [".mtx", ".mtx.gz", ".dense.npz", ".csr.npz", ".coo.npz"])
 def test_a_thousand_damaged_files_never_crash(tmp_path: Path, ending: str) -> None:
     path, A = tmp_path / f"A{ending}", symmetric()

@@ -262,6 +262,7 @@ def test_equations_and_their_jacobians_agree_with_all_effects_at_once():
         assert exact == pytest.approx(difference, rel=1e-7, abs=1e-9 * np.abs(difference).max() + 1e-8), name
 
 
+@pytest.mark.exhaustive
 def test_all_effects_together_have_exact_sensitivities():
     system, run = everything(), record().select(inputs=["q", "m"], outputs=[])
     names = ["ambients.room.temperature", "inputs.q.gain", "inputs.q.feedthrough.share", "lumps.plate.gradient",

@@ -236,6 +236,7 @@ def test_one_file_must_hold_both_matrices(tmp_path: Path) -> None:
         read_matrices(tmp_path / "E.mtx")
 
 
+@pytest.mark.exhaustive
 def test_a_hundred_thousand_lumps_take_seconds() -> None:
     """A plane of 250 by 400 lumps, cooled at one side; about 3 s on a slow core, and linear in the links."""
     index = np.arange(100_000).reshape(250, 400)

@@ -31,6 +31,7 @@ def test_one_lump_is_the_exponential():
     assert run["bar"] == pytest.approx(300 + 1.5 * (1 - np.exp(-run.time / 25)), abs=1e-11)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("make", [lambda full: full, lambda full: rt.systems.two_module()])
 def test_agrees_with_a_tight_integrator(full, drive, make):
     system = make(full)
@@ -40,6 +41,7 @@ def test_agrees_with_a_tight_integrator(full, drive, make):
     assert np.abs(run.lumps - reference(system, record, start)).max() < 1e-5
 
 
+@pytest.mark.exhaustive
 def test_long_samples_are_refined_until_the_tolerance_is_met(full, drive):
     record = drive(6, sample_time=300.0)
     run = rt.thermal.trajectory(full, record)
@@ -54,6 +56,7 @@ def test_energy_balances_to_rounding(full, drive):
         assert np.abs(run.stored).max() > 1.0  # something happened
 
 
+@pytest.mark.exhaustive
 def test_implicit_method_agrees_and_balances(full, drive, monkeypatch):
     record = drive(80)
     exact = rt.thermal.trajectory(full, record)
@@ -96,6 +99,7 @@ offset = -0.2
     assert rt.thermal.simulate(system, record)["T"] == pytest.approx(300 + 1.1 * lagged - 0.2, abs=2e-4)
 
 
+@pytest.mark.exhaustive
 def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
     record = drive(14)
     full = full.with_parameters({"lumps.plate.initial": 296.0})

@@ -67,6 +67,7 @@ PARAMETERS = {"modules.m1.seebeck.value": 1e-5, "modules.m1.seebeck.slope": 1e-7
               "ambients.room.temperature": 1e-2}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("slow", [{}, {"modules.m1.drive.time_constant": 6.0}, {"modules.m1.drive.delay": 5.0}],
                          ids=["prompt", "lagged", "delayed"])
 def test_sensitivities_are_derivatives(slow: dict) -> None:

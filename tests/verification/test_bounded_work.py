@@ -131,6 +131,7 @@ FILES = {
 }
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", FILES)
 def test_no_file_takes_minutes_or_gigabytes(name, tmp_path):
     kind, system, region, evidence = FILES[name]()
@@ -148,6 +149,7 @@ def assert_answered(path):
     assert done.stdout.startswith(("valid", "not valid", "refused")), done.stdout[:300]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("text", ["[" + "[]," * 1_000_000 + "[]]", "[" + "{}," * 1_000_000 + "1]",
                                   "[" + "1e-300," * 300_000 + "1]", "[" * 1_000_000 + "]" * 1_000_000,
                                   "[" + "1" * 9_000_000 + "]", '[' + f"0.{LONG}," * 1000 + "1]"],

@@ -139,6 +139,7 @@ def test_never_valid_where_a_sample_violates(method, seed):
     assert held == 0 if method == "lyapunov" and seed % 3 == 1 else held >= 4  # no full P with convection
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("method", METHODS)
 def test_not_more_cautious_than_the_samples(method):
     """The checker must not refuse what is true with a small distance: 10 different systems, dense samples."""

@@ -188,6 +188,7 @@ def test_peak_at_the_nyquist_frequency():
     assert made("frequency", system, norm_region([6.28], [2, 2]), {}).holds
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("m", "p", "dt"), [(1, 1, 0.0), (2, 3, 0.0), (3, 2, 0.1), (2, 2, 0.1)])
 def test_bounds_against_dense_grids(m, p, dt):
     rng = np.random.default_rng(10 * m + p)

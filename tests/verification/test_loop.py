@@ -68,6 +68,7 @@ def test_certified_loop_contracts_in_simulated_pairs():
     assert growth(document(), np.random.default_rng(1), 60) < 1
 
 
+@pytest.mark.exhaustive
 def test_mutated_loops_are_never_wrongly_accepted():
     rng = np.random.default_rng(2)
     numeric = [path for section in ("system", "region", "evidence") for path in

@@ -47,6 +47,7 @@ def violation(document, rng, count=40, nominal=None):
     return worst
 
 
+@pytest.mark.exhaustive
 def test_random_and_mutated_observers_are_never_wrongly_accepted():
     rng = np.random.default_rng(4)
     accepted = refused = 0
@@ -107,6 +108,7 @@ def test_an_uncertain_conductance_that_plant_and_observer_share():
     assert "'links.rod-room.conductance' in [0.3, 0.6], the same in plant and observer" in certificate.claim
 
 
+@pytest.mark.exhaustive
 def test_no_machine_of_the_ranges_violates_an_accepted_observer():
     rng = np.random.default_rng(9)
     accepted = violated = 0

@@ -99,6 +99,7 @@ def test_the_reduced_equations_have_the_jacobian_of_the_proof():
             assert (sides[0] - sides[1]) / 2e-4 == pytest.approx(J[:, column], rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.exhaustive
 def test_random_and_mutated_certificates_are_never_wrongly_accepted():
     rng = np.random.default_rng(2)
     accepted = refused = 0
@@ -130,6 +131,7 @@ def mutated(document, rng):
     return truth.replaced(document, path, lambda value: truth.number(value) * factor)
 
 
+@pytest.mark.exhaustive
 def test_pairs_of_states_approach_each_other():
     """Not only derivatives: two states with the same loads and set-points, their currents solved from the balances."""
     rng, seen = np.random.default_rng(8), 0

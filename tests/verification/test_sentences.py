@@ -134,8 +134,8 @@ def test_no_number_of_machine_or_region_can_change_behind_the_sentence(kind):
     sentence = claim_sentence(kind, **parts)
     assert f"machine {machine_hash(parts['system'])}" in sentence
     assert re.search("nominal parameters|for all values of|for all conductances within", sentence)
-    assert re.search("continuous plant|sampled model|as given, continuous|as given, sampled at|"
-                     r"u = K y, (continuous|sampled at [^,]*), of the plant as given", sentence)
+    assert re.search("continuous plant|sampled model|as given, continuous|as given, sampled at|u = K" +
+                     r"(\(w\))? y, (continuous|sampled at [^,]*), (of the plant as given|the average of)", sentence)
     changed = 0
     with localcontext() as context:
         context.prec = 60

@@ -35,6 +35,7 @@ def test_the_claim_names_the_ranges():
     assert "'links.rod-room.conductance' in [0.4, 0.7]" in claim
 
 
+@pytest.mark.exhaustive
 def test_no_machine_of_the_ranges_violates_an_accepted_claim():
     rng = np.random.default_rng(11)
     accepted = violated = 0
