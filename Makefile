@@ -37,16 +37,16 @@ demo: $(VENV)/.installed
 	$(BIN)/robthermal demo --out build/demo
 
 test: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m "not exhaustive"
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not exhaustive"
 
 exhaustive: $(VENV)/.test
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m exhaustive tests
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m exhaustive tests
 
 quick: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist loadfile $(QUICK)
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder $(QUICK)
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .

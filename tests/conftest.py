@@ -20,6 +20,12 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]  # what
 from commands import Run, command  # noqa: E402
 
 DRAW = vars(rt.report.Figure)["draw"]
+LONGEST = ("test_notebooks.py", "test_docs.py", "test_cli.py", "test_design_commands.py", "test_results.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take longest come first, so that two processes end at the same time."""
+    items.sort(key=lambda item: item.path.name not in LONGEST)
 
 
 @pytest.fixture(autouse=True)

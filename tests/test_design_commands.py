@@ -306,6 +306,7 @@ def test_the_worst_ambient_counts(bench: rt.System) -> None:
     assert [float(value) for value in ambient] == [288.15, 308.15]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("without_linearity")
 def test_a_set_point_that_needs_more_than_the_usable_current_is_not_certified(bench: rt.System, tmp_path: Path) -> None:
     """60 °C needs more heating than the box that is never left allows: the design is written, its claim fails."""

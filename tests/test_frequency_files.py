@@ -155,6 +155,7 @@ def test_to_couple_with_its_covariance(pair: Path, tmp_path: Path, kind: str) ->
     assert not plant.response[0, 1].any() and not plant.confidence_radius()[0, 1].any()
 
 
+@pytest.mark.exhaustive
 def test_the_circles_are_in_the_envelope_unless_the_file_says_otherwise(run: Run, pair: Path, tmp_path: Path) -> None:
     (tmp_path / "SPEC.toml").write_text(SPEC, encoding="utf-8")
     (tmp_path / "without.toml").write_text(SPEC.replace("[design]", "circles = false\n[design]"), encoding="utf-8")

@@ -58,6 +58,7 @@ def covers(happens: Callable[[int], bool]) -> bool:
     return probable(happens, least=0.95, not_below=0.85)
 
 
+@pytest.mark.exhaustive
 def test_white_noise() -> None:
     fit = cache(calibrated)
     assert covers(lambda seed: inside(fit(seed)))

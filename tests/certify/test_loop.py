@@ -217,6 +217,7 @@ def test_with_an_observer_too_large_for_the_search_it_is_the_sampled_model(monke
     assert np.abs(ends[0] - ends[1]).max() < 0.1 * np.abs(starts[0] - starts[1]).max()
 
 
+@pytest.mark.exhaustive
 def test_two_modules_in_sampled_form():
     """The demo set-up, limits 0 to 0.5 A, over the box that these currents cannot leave."""
     system = rt.systems.two_module()

@@ -11,6 +11,7 @@ BOX = (278.15, 358.15)
 
 
 # errata, "Largest |I| certified", full-P LMI: symmetric 2.72; constant S, R 4.92 / 17.03 / 4.92
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("direction", "reference", "frozen"),
                          [("symmetric", 4.92, 4.93243), ("cooling", 17.03, 17.0433), ("heating", 4.92, 4.93243)])
 def test_limits_of_the_errata_for_constant_modules(two, direction, reference, frozen):

@@ -147,6 +147,7 @@ def test_the_disturbance_observer_finds_and_cancels_a_load(plant, law, system):
         rt.design.disturbance_observer(plant, p, time_constant=1.0)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("kind", ["pid", "state", "lti"])
 def test_anti_windup_lets_go_of_a_limit(plant, system, kind):
     """Held at a current limit for 600 s, then asked for something easy: with the law's information it follows at once,

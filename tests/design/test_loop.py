@@ -33,6 +33,7 @@ def test_a_load_enters_its_lump():
         rt.thermal.Stepper(bar, 7.0, initial=[25.0])
 
 
+@pytest.mark.exhaustive
 def test_the_set_point_case_of_the_errata(system, pi):
     """10 °C with 5 W per module, infeasible by 1.6 K: limited to 1.55 A it settles at 11.7 °C, with 3.294 A it touches
     9.9 °C and then runs away to 54 °C cold, 142 °C hot."""

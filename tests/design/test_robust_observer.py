@@ -111,6 +111,7 @@ def test_the_gain_is_the_nearest_to_the_kalman_gain_that_keeps_half_of_the_margi
     np.testing.assert_allclose(nearest_gain(norm, model, central)[0], central, rtol=1e-4)  # good enough: kept
 
 
+@pytest.mark.exhaustive
 def test_sensors_that_would_help_are_named(system):
     box = {"current": heating(system, 5.25), "temperature": BOX}
     poor = rt.design.observer(system, ["T6"], method="lmi", **box)

@@ -42,6 +42,7 @@ def test_it_is_the_largest_bandwidth(law, parameters):
     assert min(worst.gain / 2.0, worst.phase / 45.0, worst.modulus / 0.5) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.exhaustive
 def test_ranges_cost_bandwidth(law):
     nominal, robust = (rt.design.tune_pi(law, 288.15, margins=WANTED, sample_time=2.0, regulate=REGULATE,
                                          parameters=p).bandwidth for p in (None, RANGES))

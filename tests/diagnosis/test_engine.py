@@ -231,6 +231,7 @@ def test_steps_of_a_converter_make_no_name(plant: rt.System, hide: Hide) -> None
     assert found.noise_floor.quantized == ("Tp", "Tb")
 
 
+@pytest.mark.exhaustive
 def test_an_effect_is_named_through_the_steps_of_a_converter(plant: rt.System, hide: Hide, rate: Callable) -> None:
     train, validation = (stepped(record, 0.25) for record in hide(convection(0.3, rate)))
     found = rt.diagnose(plant, train, validation=validation)

@@ -122,6 +122,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robthermal.jobs.diagnose._diagnose.diagnose", tried)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("few")
 @pytest.mark.parametrize(("made", "words"), [
     (stuck, "T_plate in record 'log.csv' reads 30 °C in all 300 samples: stuck"),

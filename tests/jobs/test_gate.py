@@ -194,6 +194,7 @@ def test_a_claim_that_fails_for_the_ranges_names_the_parameter(limit: float, tmp
     assert "For the parameters as they stand" in page and "For all parameters in their ranges" in page
 
 
+@pytest.mark.exhaustive
 def test_usable_currents_of_every_direction_are_found_for_the_ranges_too(limit: float, tmp_path: Path) -> None:
     """Cooling is asked for only; what is certified for the ranges is certified for the parameters as they stand."""
     value = stage().parameter("modules.m1.resistance.value")

@@ -39,6 +39,7 @@ def document_of(certificate) -> dict:
             **{key: getattr(certificate, key) for key in ("system", "region", "evidence", "margin", "made_by")}}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("kind", COVERED)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_no_disagreement_on_certificates_and_mutants(kind):

@@ -232,6 +232,7 @@ def write_tdms(path: Path, channels: list[tuple[str, str, Any, dict[str, Any]]])
         file.write_segment([nptdms.ChannelObject(*channel) for channel in channels])
 
 
+@pytest.mark.exhaustive
 def test_no_byte_of_the_head_of_a_tdms_file_ends_in_a_traceback(tmp_path: Path) -> None:
     path = tmp_path / "run.tdms"
     write_tdms(path, [("a", name, column, {}) for name, column in {"time": TIME, "u": U, "T": T}.items()])

@@ -59,6 +59,7 @@ def test_every_perturbation_of_the_claim_keeps_the_performance(design):
     assert 0.5 * design.value < worst < design.value
 
 
+@pytest.mark.exhaustive
 def test_distillation_column():
     """1.18 after the first iteration; dkpy prints 1.036 for orders 4 and 22 states."""
     blocks = [("full", 1, 1), ("full", 1, 1), ("full", 2, 2)]

@@ -88,6 +88,7 @@ def test_eighteen_lumps_are_verified_in_a_blink(shared, tmp_path, capsys):
             print(f"\n18 lumps, {method}: verified in {verdict.seconds * 1e3:.1f} ms", end="")
 
 
+@pytest.mark.exhaustive
 def test_decay_of_reference(shared):
     """The largest proven rate is that of the generalized eigenvalues at the vertices of the box, and below it."""
     system = two_module(shared)
@@ -157,6 +158,7 @@ def test_not_more_cautious_than_the_samples(method):
     assert decided > 7
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("method", METHODS)
 def test_mutations(method):
     """Whatever is changed in a valid file, the checker never says valid where a sample says false."""

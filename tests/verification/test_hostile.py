@@ -135,6 +135,7 @@ def test_vertices_by_the_million_are_refused_before_they_are_listed():
         assert contraction(system, region, "max", weights=[1.0, 1.0]).holds
 
 
+@pytest.mark.exhaustive
 def test_dense_matrices_beyond_reach_are_refused_before_they_are_factored():
     system, region = parallel(1, 670)
     n = len(system["lumps"])

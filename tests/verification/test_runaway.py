@@ -55,6 +55,7 @@ def test_published_table(g, current, heat):
     assert enclosed(system).holds
 
 
+@pytest.mark.exhaustive
 def test_random_modules_only_the_true_fold():
     rng = np.random.default_rng(0)
     held = 0
