@@ -169,10 +169,11 @@ def concluded(judged: Judged) -> Diagnosis:
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves)
+    caveats = (*may_be_the_room(nominal, state.fit.structure.effects),
+               *doubts(nominal.system, judged.plain is not None))
     said = [judged.outcome.text, *nominal.floor.remarks, *map(str, filter(None, (rest, resolves))),
-            *fit.contradictions, *may_be_the_room(nominal, state.fit.structure.effects),
-            *doubts(nominal.system, judged.plain is not None)]
-    return replace(diagnosis, outcome=replace(judged.outcome, text=" ".join(said)))
+            *fit.contradictions, *caveats]
+    return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=" ".join(said)))
 
 
 def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:

@@ -99,6 +99,8 @@ class Diagnosis:
     refinement : Refinement or None
         What splitting a lump does to the remainder, if it was asked for and there is one; the rest of the answer is of
         the network as it is.
+    caveats : tuple of str
+        What to hold against a name, a sentence each; the outcome's text has them too.
     """
 
     verdict: Verdict
@@ -124,6 +126,7 @@ class Diagnosis:
     resolving: Resolving | None = None
     reference: Compared | None = None
     refinement: Refinement | None = None
+    caveats: tuple[str, ...] = ()
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:

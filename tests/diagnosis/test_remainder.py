@@ -107,6 +107,8 @@ def test_a_report_with_a_remainder_passes_with_the_remark():
     report = diagnosis_report(Diagnosed(found, (), (), ()))
     assert (report.verdict, report.holds) == ("PASS WITH REMARKS", True)
     assert [(one.code, one.text) for one in report.reasons] == [("remainder", str(found.remainder))]
+    doubted = diagnosis_report(Diagnosed(replace(found, caveats=("Record the room.",)), (), (), ()))
+    assert not found.caveats and doubted.headline == f"{report.headline} Record the room."  # on the first screen
     unexplained = rt.diagnosis.DiagnosisCode.UNEXPLAINED.outcome()
     refused = diagnosis_report(Diagnosed(replace(found, verdict="unexplained", outcome=unexplained), (), (), ()))
     assert refused.verdict == "FAIL" and {one.level for one in refused.reasons} == {"fail"}

@@ -29,7 +29,8 @@ def answer_sentence(found: Diagnosis) -> str:
     if found.effects:
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
             f"The model lacks {accepted_in_words(found)}")
-        return f"{said}. With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
+        falls = f"With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
+        return " ".join([f"{said}. {falls}", *found.caveats])
     if found.verdict == "consistent":
         if found.reference:
             return nothing_changed(found)
