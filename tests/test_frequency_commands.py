@@ -97,3 +97,29 @@ def test_no_input_that_changes_is_refused_with_its_name(bar):
     rest.save(folder / "rest.csv")
     done = command("frf", "rest.csv", "--system", "bar.toml", folder=folder)
     assert done.status == 2 and "no input changes: q" in done.err
+
+
+def test_a_noisy_room_takes_a_second_sensor_or_its_noise(bar):
+    """The response to the room, not drawn towards zero by the noise of the sensor that measures it."""
+    _, folder = bar
+    rng = np.random.default_rng(4)
+    q, room, T = rng.normal(size=1500), rng.normal(size=1500), np.zeros(1500)
+    for k in range(1499):
+        T[k + 1] = 0.5 * T[k] + 0.3 * q[k] + 0.5 * room[k]
+    one, two = (room + 0.5 * rng.normal(size=1500) for _ in range(2))
+    rt.Record(sample_time=1.0, inputs=np.column_stack([q, one, two]), outputs=T + 0.01 * rng.normal(size=1500),
+              input_names=["q", "room", "room 2"], output_names=["T"]).save(folder / "noisy.csv")
+    found = {}
+    for key, more in (("exact", ()), ("instrument", ("--instrument", "room=room 2")),
+                      ("noise", ("--input-noise", "room=0.5"))):
+        done = command("frf", "noisy.csv", "--input", "q", "--input", "room", "--output", "T", "--half-width", 20,
+                       *more, "--out", f"{key}.json", "--json", folder=folder)
+        assert done.status == 0, done.err
+        G = rt.identify.FrequencyResponse.load(folder / f"{key}.json")
+        truth = 0.5 / (np.exp(2j * np.pi * G.frequencies) - 0.5)
+        found[key] = abs(np.mean((G.response[0, 1] / truth)[30:300]))
+    assert found["exact"] < 0.87 and abs(found["instrument"] - 1) < 0.05 and abs(found["noise"] - 1) < 0.05
+    both = command("frf", "noisy.csv", "--input", "room", "--output", "T", "--instrument", "room=room 2",
+                   "--input-noise", "room=0.5", folder=folder)
+    bad = command("frf", "noisy.csv", "--input", "room", "--output", "T", "--instrument", "room", folder=folder)
+    assert both.status == bad.status == 2 and "given together" in both.err and "INPUT=COLUMN" in bad.err

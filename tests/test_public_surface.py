@@ -63,7 +63,8 @@ SURFACE = {
         Diverged InputError Outcome OutcomeCode RobthermalError
     """,
     "identify": """
-        FrequencyResponse IdentifyCode bla closed_loop etfe is_response lpm lrm lrmp mean_inputs read_response spectral
+        FrequencyResponse IdentifyCode bla closed_loop errors_in_variables etfe is_response lpm lrm lrmp mean_inputs
+        read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system compare_modules couple_subsystems demo_project design_system

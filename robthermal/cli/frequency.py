@@ -24,6 +24,12 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         reference: Annotated[list[str] | None, typer.Option(
             "--reference", help="Of a closed loop: column of a set-point or added excitation, one per input, may "
             "repeat.", metavar="COLUMN")] = None,
+        instrument: Annotated[list[str] | None, typer.Option(
+            "--instrument", help="Of a noisy input, as a measured room: column of a second sensor of it, may repeat.",
+            metavar="INPUT=COLUMN")] = None,
+        input_noise: Annotated[list[str] | None, typer.Option(
+            "--input-noise", help="Standard deviation of the noise of an input [its unit], may repeat.",
+            metavar="INPUT=VALUE")] = None,
         out: Annotated[Path, typer.Option("--out", help="Result (.json, .mat, .npz).", callback=place)] = Path(
             "frf.json"),
         plot: Annotated[Path | None, typer.Option("--plot", help="Bode plot with 95 % bands (.svg, .png, .pdf).",
@@ -38,7 +44,9 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         stage("estimating the frequency response")
         G = rt.jobs.measured.estimate_response(records, system=model, inputs=inputs or [], outputs=outputs or [],
                                                method=method, half_width=half_width, degree=degree, poles=poles or [],
-                                               band=band, tables=reading(record, column), reference=reference or [])
+                                               band=band, tables=reading(record, column), reference=reference or [],
+                                               instruments=rt.jobs.measured.instruments_from_text(instrument or []),
+                                               input_noise=rt.jobs.measured.noise_from_text(input_noise or []))
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)

@@ -2,6 +2,7 @@
 
 from ._bla import bla as bla
 from ._closed_loop import closed_loop as closed_loop
+from ._errors_in_variables import errors_in_variables as errors_in_variables
 from ._etfe import etfe as etfe
 from ._lpm import lpm as lpm
 from ._lrm import lrm as lrm
@@ -13,5 +14,5 @@ from ._response import FrequencyResponse as FrequencyResponse
 from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
-__all__ = ["FrequencyResponse", "IdentifyCode", "bla", "closed_loop", "etfe", "is_response", "lpm", "lrm", "lrmp",
-           "mean_inputs", "read_response", "spectral"]
+__all__ = ["FrequencyResponse", "IdentifyCode", "bla", "closed_loop", "errors_in_variables", "etfe", "is_response",
+           "lpm", "lrm", "lrmp", "mean_inputs", "read_response", "spectral"]

@@ -76,7 +76,8 @@ def _estimate(project: Project, one: Identification, model: System | None) -> Fr
         found = estimate_response(one.records, system=model, inputs=options.inputs, outputs=options.outputs,
                                   method=options.method, half_width=options.half_width, degree=options.degree,
                                   poles=options.poles, band=options.band, reading=project.reading,
-                                  reference=one.reference)
+                                  reference=one.reference, instruments=options.instruments,
+                                  input_noise=options.input_noise)
     except InputError as error:
         if any(path.name in error.where for path in one.records):
             raise

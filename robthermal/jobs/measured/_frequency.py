@@ -26,7 +26,7 @@ from ...identify import (
 from ...signals import Excitation, Record, multisines
 from ...thermal import System
 from ._import import ReadTable, read_files
-from ._reference import closed_loop_response, with_reference
+from ._reference import closed_loop_response, noisy_input_response, with_reference
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
                       outputs: Sequence[str] = (), method: str = "lpm", half_width: int = 8, degree: int = 2,
                       poles: Sequence[float] = (), band: tuple[float, float] | None = None,
                       operating_point: Mapping[str, float] | None = None, tables: Sequence[ReadTable] = (),
-                      reading: Mapping[Path, Sequence[ReadTable]] | None = None, reference: Sequence[str] = ()
+                      reading: Mapping[Path, Sequence[ReadTable]] | None = None, reference: Sequence[str] = (),
+                      instruments: Mapping[str, str] | None = None, input_noise: Mapping[str, float] | None = None
                       ) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
@@ -68,6 +69,10 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     reference : sequence of str, optional
         Records of a closed loop: columns of set-points or of excitation added to the inputs, one per input. The plant
         is the response from them to the outputs over that to the inputs, by local polynomials ("lpm").
+    instruments : mapping, optional
+        Noisy input, as a measured room: column of a second sensor of the same quantity, in any unit ("lpm").
+    input_noise : mapping, optional
+        Noisy input: standard deviation of its noise [unit of the input, kelvin of ambients] ("lpm").
 
     Returns
     -------
@@ -91,10 +96,9 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     """
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
-    if reference and method != "lpm":
-        raise InputError(f"method is {method!r} with a reference", where="--method", expected="lpm",
-                         remedy="A closed loop is estimated by local polynomials: leave method out.")
-    parts, references = _read(paths, system, inputs, outputs, tables, reading or {}, reference)
+    _one_way(method, reference, instruments, input_noise)
+    beside = list((instruments or {}).values()) or reference
+    parts, references = _read(paths, system, inputs, outputs, tables, reading or {}, beside)
     chosen = [part.select(inputs=list(inputs or part.input_names), outputs=list(outputs or part.output_names))
               for part in parts]
     records, constant = _changing(chosen)
@@ -104,12 +108,30 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
          "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}
-    G = closed_loop_response(list(zip(records, references, strict=True)), reference, degree=degree,
-                             half_width=half_width) if reference else estimators[method]()
+    if reference:
+        G = closed_loop_response(list(zip(records, references, strict=True)), reference, degree=degree,
+                                 half_width=half_width)
+    elif instruments or input_noise:
+        G = noisy_input_response(records, references, instruments or {}, input_noise or {}, degree=degree,
+                                 half_width=half_width)
+    else:
+        G = estimators[method]()
     note = (f"Left out because they never change: {', '.join(constant)} ({IdentifyCode.CONSTANT_INPUT.code}).",)
     G = G.replace(notes=G.notes + (note if constant else ()),
                   operating_point=mean_inputs(parts) | dict(operating_point or {}))
     return G.between(*band) if band else G
+
+
+def _one_way(method: str, reference: Sequence[str], instruments: Mapping[str, str] | None,
+             input_noise: Mapping[str, float] | None) -> None:
+    """A closed loop, instruments and known noise are three estimators, all by local polynomials."""
+    given = [name for name, value in (("reference", reference), ("instrument", instruments),
+                                      ("input-noise", input_noise)) if value]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} are given together", where=f"--{given[1]}", expected="one of them")
+    if given and method != "lpm":
+        raise InputError(f"method is {method!r} with {given[0]}", where="--method", expected="lpm",
+                         remedy="It is estimated by local polynomials: leave method out.")
 
 
 def _read(paths: Sequence[Path], system: System | None, inputs: Sequence[str], outputs: Sequence[str],

@@ -1,15 +1,16 @@
-"""Records of a closed loop: the plant as it was measured, and beside it the reference that no noise gets into."""
+"""Columns beside the plant: the reference of a closed loop, a second sensor of a noisy input."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...identify import FrequencyResponse, closed_loop
+from ...identify import FrequencyResponse, closed_loop, errors_in_variables
 from ...signals import Record, read_records
 from ._import import ReadTable
 
@@ -84,3 +85,100 @@ def closed_loop_response(pairs: Sequence[tuple[Record, Array]], names: Sequence[
                          expected="set-points that step, or an excitation added to the input",
                          remedy="Name the column that was excited; robthermal excitation designs such a signal.")
     return closed_loop(records, [reference for _, reference in pairs], degree=degree, half_width=half_width)
+
+
+def noisy_input_response(records: Sequence[Record], beside: Sequence[Array], instruments: Mapping[str, str],
+                         noise: Mapping[str, float], *, degree: int, half_width: int) -> FrequencyResponse:
+    """Response where some inputs are measured with noise.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Measured inputs and outputs.
+    beside : sequence of ndarray
+        Columns of the instruments at the same samples, in the order of `instruments`; unused with `noise`.
+    instruments : mapping
+        Noisy input: name of its instrument.
+    noise : mapping
+        Noisy input: standard deviation of its noise [unit of the input].
+    degree : int
+        Degree of the local polynomials [-].
+    half_width : int
+        Bins on either side of the center of a window.
+
+    Returns
+    -------
+    FrequencyResponse
+    """
+    signals: dict[str, Any] = {name: [z[:, i] for z in beside] for i, name in enumerate(instruments)}
+    return errors_in_variables(list(records), instruments=signals, noise=noise, degree=degree, half_width=half_width)
+
+
+def instruments_from_text(texts: Sequence[str]) -> dict[str, str]:
+    """Instruments of noisy inputs from "INPUT=COLUMN".
+
+    Parameters
+    ----------
+    texts : sequence of str
+        One text for each noisy input.
+
+    Returns
+    -------
+    dict
+        Input: name of the column.
+
+    Raises
+    ------
+    InputError
+        For a text without one of the two, and an input named twice.
+
+    Examples
+    --------
+    >>> instruments_from_text(["room=room 2"])
+    {'room': 'room 2'}
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, _, column = text.partition("=")
+        if not name or not column or name in found:
+            raise InputError(f"{text!r} {'repeats an input' if name in found else 'names no input or no column'}",
+                             where="--instrument", expected="INPUT=COLUMN, every input once")
+        found[name] = column
+    return found
+
+
+def noise_from_text(texts: Sequence[str]) -> dict[str, float]:
+    """Noise of inputs from "INPUT=VALUE".
+
+    Parameters
+    ----------
+    texts : sequence of str
+        One text for each noisy input, its standard deviation in the unit of the input.
+
+    Returns
+    -------
+    dict
+        Input: standard deviation of its noise [its unit].
+
+    Raises
+    ------
+    InputError
+        For a text without name or number, and an input named twice.
+
+    Examples
+    --------
+    >>> noise_from_text(["room=0.02"])
+    {'room': 0.02}
+    """
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not name or not number > 0.0 or name in found:
+            raise InputError(f"{text!r} {'repeats an input' if name in found else 'names no input or no noise'}",
+                             where="--input-noise", expected="INPUT=VALUE, a deviation above 0, every input once")
+        found[name] = number
+    return found

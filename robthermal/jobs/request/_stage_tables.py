@@ -37,6 +37,8 @@ class IdentifyTable(Table):
     poles: list[Number] = []
     band: Pair | None = None
     reference: str | list[str] = []
+    instruments: dict[str, str] = {}
+    input_noise: dict[str, Positive] = {}
     use: Use = "train"
     operating_point: dict[str, Number] = {}
 
