@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import control
 import numpy as np
@@ -66,7 +67,9 @@ def test_pid_of_a_measured_response(run, tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert [reason["code"] for reason in summary["reasons"]] == ["at_the_bins"]
     assert summary["verdict"] == "PASS WITH REMARKS"
-    assert "not proven: 1." in (tmp_path / "out" / "report.html").read_text()
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "not proven: 1." in page and "tested on data; nothing here is proven" in page
+    assert "below is proven" not in page and not re.search("stability certification", page, re.IGNORECASE)
 
 
 @pytest.mark.parametrize(("content", "method", "words"), [
@@ -283,3 +286,21 @@ def test_bad_files_of_state_feedback_name_what_is_wrong(run, tmp_path, content, 
     done = design_by(run, tmp_path, content, method)
     assert done.status == 2 and words in " ".join((done.out + done.err).split()), done.out + done.err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_page_built_again_says_the_same(run, tmp_path):
+    """Titles, sentences and margins are made from the certificates alone; bounds of six digits are never below them."""
+    done = design_by(run, tmp_path, PLANT + "[design]\nhinf_limit = 12.0\n", "mixed")
+    assert done.status == 0, done.out + done.err
+    out = tmp_path / "out"
+    said = json.loads((out / "summary.json").read_text())["claims"]
+    saved = [rt.Certificate.load(out / claim["file"]) for claim in said]
+    assert [claim["title"] for claim in said] == ["H2 norm", "H-infinity norm"]
+    for claim, one in zip(said, saved, strict=True):
+        shown = float(claim["margin"].removeprefix("below "))
+        assert one.region["bound"] <= shown <= one.region["bound"] * (1 + 1e-5)
+        assert claim["sentence"].endswith(f"is {claim['margin']}.") and one.claim in (out / "report.html").read_text()
+    assert run("report", str(out)).status == 0
+    assert json.loads((out / "summary.json").read_text())["claims"] == said
+    page = (out / "report.html").read_text()
+    assert "Controller design report" in page and "All 2 claims below are proven" in page

@@ -162,7 +162,7 @@ class TemFeedback(FeedbackDesign):
         ax.errorbar(places, x0 - ZERO_CELSIUS, reach, fmt="o", capsize=3, label="operating point, starts")
         ax.set_xticks(places, names, rotation=90)
         ax.set_ylabel("temperature [°C]")
-        ax.legend(loc="best")
+        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
         return ax
 
 

@@ -218,7 +218,8 @@ def _distrusted(report: Report, folder: Path) -> Report:
     return replace(report, title=f"Results in {folder.resolve().name}", subtitle="", label="", claims=claims,
                    evidence=tuple(replace(one, assumptions=kind_assumptions(one.kind)) for one in report.evidence),
                    sections=(), first=(), usable=(), gate=(reason,), gates=(reason.code,), answer="", data={},
-                   assumptions=(ARITHMETIC,), provenance=versions(), stages=(), headline="", numbers=(), identity={})
+                   assumptions=(ARITHMETIC,), provenance=versions(), stages=(), headline="", numbers=(), identity={},
+                   kind="")
 
 
 def _write(report: Report, folder: Path) -> None:

@@ -211,6 +211,8 @@ class Report:
         The number that matters: what it is, the number, and what to compare it with.
     identity : mapping, optional
         Which machine and which document, by name: serial number, operator, revision, date.
+    kind : str, optional
+        What kind of report stands above the title; default from what it claims.
 
     Examples
     --------
@@ -239,6 +241,7 @@ class Report:
     headline: str = ""
     numbers: Sequence[tuple[str, str, str]] = ()
     identity: Mapping[str, str] = field(default_factory=dict)
+    kind: str = ""
 
     @property
     def holds(self) -> bool:

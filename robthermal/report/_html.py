@@ -61,6 +61,8 @@ def write_html(report: Report, path: str | Path) -> Path:
         amps=_amps, least=lambda row: "–" if row.current is None else rounded_down(row.current),
         cards=_cards(report.claims),
         paired=any(claim.parameters == "ranges" for claim in report.claims),
+        kind=report.kind or ("Diagnosis report" if report.answer else "Stability certification report"),
+        proven=_proven(report.claims),
         about=": about the model, which the data contradict" if report.contradicted else "",
         machine={one.file: one.machine for one in report.evidence},
         twice={one.file for one in report.evidence if one.good and one.second == "valid"},
@@ -68,6 +70,19 @@ def write_html(report: Report, path: str | Path) -> Path:
         style=_template("report.css").render(running_head=css_text(report.label, 90),
                                              running_foot=css_text(_running_foot(report), 110)))
     return save_text(printable(page), path)
+
+
+def _proven(claims: Sequence[Claim]) -> str:
+    """Beside the badge of a report that holds: how much of it is proven; a test on data proves nothing."""
+    tests = sum(claim.tested for claim in claims)
+    proofs = len(claims) - tests
+    if not proofs:
+        return "What is claimed below was tested on data; nothing here is proven."
+    confirmed = "an independent check confirmed " + ("it" if proofs == 1 else "each")
+    if not tests:
+        return f"{'The claim below is' if proofs == 1 else f'All {proofs} claims below are'} proven, and {confirmed}."
+    return (f"{proofs} of the {len(claims)} claims below {'is' if proofs == 1 else 'are'} proven, and {confirmed}; "
+            f"{tests} {'is a test' if tests == 1 else 'are tests'} on data, which prove nothing.")
 
 
 _IDENTITY = ("serial number", "revision", "operator", "date")  # on the page to sign; the others are filled by hand

@@ -62,6 +62,7 @@ class _Stored(_Strict):
     headline: str = ""
     numbers: list[tuple[str, str, str]] = []
     identity: dict[str, str] = {}
+    kind: str = ""
     digest: str
 
 
@@ -101,7 +102,7 @@ def write_content(report: Report, path: str | Path) -> Path:
                "usable": [asdict(one) for one in report.usable], "first": _stored(report.first),
                "data": dict(report.data), "stages": [asdict(one) for one in report.stages],
                "headline": report.headline, "numbers": [list(one) for one in report.numbers],
-               "identity": dict(report.identity)}
+               "identity": dict(report.identity), "kind": report.kind}
     return save_json({**content, "digest": _digest(content)}, path)
 
 
@@ -188,7 +189,7 @@ def read_content(path: str | Path) -> Report:
     return Report(stored.title, stored.subtitle, stored.label, stored.claims, sections, stored.provenance,
                   stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
                   stored.gates, stored.usable, first, stored.data, stored.stages, stored.headline, stored.numbers,
-                  stored.identity)
+                  stored.identity, stored.kind)
 
 
 def _printed(table: Table | Printed) -> Printed:

@@ -116,7 +116,7 @@ class Design:
         return "\n".join([*lines, f"  {self.robust_against}"])
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the largest singular value of the closed loop over frequency, with the proven bound.
+        """Draw the largest singular value of the closed loop over frequency, with the bound where one of it is proven.
 
         Parameters
         ----------
@@ -134,12 +134,19 @@ class Design:
         omega = np.geomspace(low, min(high, loop.end), 600)
         ax = axes_for(ax)
         ax.loglog(omega, [np.linalg.norm(value, 2) for value in responder(loop)(omega)], label="closed loop")
-        if np.isfinite(self.value):
-            ax.axhline(self.value, color="0.5", linestyle="--", label="proven bound")
+        for bound in self._gain_bounds():
+            ax.axhline(bound, color="0.5", linestyle="--", label="proven bound")
         ax.set_xlabel("frequency [rad/s]")
         ax.set_ylabel("largest singular value of w to z [z/w]")
         ax.legend(loc="best")
         return ax
+
+    def _gain_bounds(self) -> list[float]:
+        """Proven bounds of the H-infinity norm from all of w to all of z: an H2 norm is no bound of singular values."""
+        every = (self.closed_loop.noutputs, self.closed_loop.ninputs)
+        regions = [one.region for one in self.certificates if one.region.get("measure") == "hinf"]
+        return [one["bound"] for one in regions if "channels" not in one or
+                tuple(len(one["channels"][side]) for side in ("outputs", "inputs")) == every]
 
     def export(self, path: str | Path, name: str = "controller") -> None:
         """Write the controller for other programs.

@@ -13,11 +13,13 @@ import numpy as np
 from .._arrays import Array
 from .._checks import finite_number, positive_number, quoted, whole_number
 from .._control import control
+from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate
 from ._design import Design, RobustAgainst, as_system
 from ._frf_data import Discs, direction, read_discs, resonance_missed, winding
+from ._frf_plot import draw_sensitivity
 from ._frf_program import Bins, best_start
 from ._margins import Margins
 from ._outcomes import SynthesisCode
@@ -94,6 +96,23 @@ class FrfDesign(Design):
                 "delay": float((phase / one.omega[crossing]).min()) if len(phase) else np.inf,
                 "modulus": float(abs(1 + L).min())}
         return found
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the sensitivity over frequency, of the responses and of the worst plants in their circles.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, optional
+            Axes to draw into; default new ones.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        gains = np.array(list(self.gains.values()))
+        C = [self.structure.basis(one.omega) @ gains if self.structure else 0 * one.center
+             for one in self.discs]
+        return draw_sensitivity(axes_for(ax), self.discs, C, self.modulus_margin.get("stated"))
 
 
 def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5, probability: float = 0.99,

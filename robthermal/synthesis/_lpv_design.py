@@ -112,9 +112,11 @@ class LpvDesign(Design):
         """
         ax = super().plot(ax)
         omega = ax.get_lines()[0].get_xdata()
-        for P, K in zip(self.plants, self.controllers, strict=True):
+        for k, (P, K) in enumerate(zip(self.plants, self.controllers, strict=True)):
             respond = responder(close(read_plant(P), read_plant(K)))
-            ax.loglog(omega, [np.linalg.norm(value, 2) for value in respond(omega)], color="0.7", zorder=0)
+            ax.loglog(omega, [np.linalg.norm(value, 2) for value in respond(omega)], color="0.6", zorder=0,
+                      label="" if k else "loops at the vertices")
+        ax.legend(loc="best")
         return ax
 
     def export(self, path: str | Path, name: str = "controller") -> None:

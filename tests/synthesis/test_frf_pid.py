@@ -203,3 +203,18 @@ def test_a_loop_that_crosses_one_outside_of_the_bins_is_refused(high):
     d = rt.design.frf_pid(G, modulus_margin=0.5)
     assert not d.holds and d.outcome.code == "infeasible"
     assert "crosses 1 below the first bin" in d.outcome.text, d.outcome.text
+
+
+def test_the_picture_is_the_sensitivity_of_the_centers_and_of_the_worst_plants():
+    """Against plants drawn on the edges of the circles: none is more sensitive than the dotted curve."""
+    G = measured(LAG, noise=0.01)
+    d = rt.design.frf_pid(G, modulus_margin=0.6)
+    centers, worst, asked = d.plot().get_lines()
+    f, radius = centers.get_xdata() / (2 * np.pi), d.discs[0].radius
+    assert f == pytest.approx(G.frequencies)
+    C = d.gains["Kp"] + d.gains["Ki"] / (2j * np.pi * f)
+    assert centers.get_ydata() == pytest.approx(abs(1 / (1 + G.response[0, 0] * C)))
+    turns = np.exp(2j * np.pi * np.arange(720) / 720)[:, None]
+    drawn = abs(1 / (1 + (G.response[0, 0] + radius * turns) * C)).max(axis=0)
+    assert (drawn <= worst.get_ydata() * (1 + 1e-9)).all() and drawn == pytest.approx(worst.get_ydata(), rel=1e-3)
+    assert worst.get_ydata().max() <= asked.get_ydata()[0] == 1 / 0.6

@@ -155,3 +155,14 @@ def test_models_of_compleib(name):
                     np.pad(D11, ((0, m), (0, p))), np.vstack([D12, eps * np.eye(m)]), np.hstack([D21, eps * np.eye(p)]))
     d = rt.design.h2(P, p, m)
     assert d.holds and reference["h2"] * (1 - 1e-6) < d.value < reference["h2"] * 1.002
+
+
+def test_only_a_bound_of_singular_values_is_drawn_beside_them() -> None:
+    """An H2 norm is no bound of the curve; an H-infinity norm is, and no point of the curve lies above it."""
+    labels = {}
+    for synthesis in (rt.design.h2, rt.design.hinf):
+        ax = synthesis(scherer(), 1, 1).plot()
+        labels[synthesis] = [line.get_label() for line in ax.get_lines()]
+    assert labels[rt.design.h2] == ["closed loop"] and labels[rt.design.hinf] == ["closed loop", "proven bound"]
+    curve, bound = (np.asarray(line.get_ydata(), float) for line in ax.get_lines())
+    assert curve.max() <= bound[0] <= 1.01 * curve.max()

@@ -10,6 +10,7 @@ from ..._celsius import ZERO_CELSIUS
 from ..._digits import downwards, inward, outward, upwards
 from ...report import Claim, Parameters
 from ...verification import Certificate, Verdict
+from ._linear_words import is_of_synthesis, loop_margin, loop_proof, loop_sentence, loop_title
 
 _ENDING = "_ranges"
 _LISTED = 3  # parameters named in the box of a claim; the exact claim names all
@@ -65,6 +66,8 @@ def claim_of(file: str, certificate: Certificate, verdict: Verdict | None, *, ti
         Duration of the check, if another than that of `verdict` is to be shown [s].
     """
     stem = file.rpartition("/")[2].removesuffix(".json")
+    if is_of_synthesis(stem):
+        return _of_synthesis(file, certificate, verdict, seconds)
     ranges = stem.endswith(_ENDING)
     key = stem.removesuffix(_ENDING)
     titles = _TITLES.get(key, (key.replace("_", " ").capitalize(),))
@@ -83,6 +86,16 @@ def claim_of(file: str, certificate: Certificate, verdict: Verdict | None, *, ti
 
 
 _JOB = ("contraction", "box", "box_contraction", "observer")
+
+
+def _of_synthesis(file: str, certificate: Certificate, verdict: Verdict | None, seconds: float | None) -> Claim:
+    good = certificate.holds and verdict is not None and verdict.valid
+    reason = certificate.reason if not certificate.holds else "" if good else verdict.reason if verdict else (
+        "not verified")
+    box = box_of(certificate) if certificate.kind == "scheduled" else "the plant of the file"
+    return Claim(loop_title(certificate), loop_sentence(certificate), certificate.holds, good, box,
+                 loop_margin(certificate) if good else "none", loop_proof(certificate), reason, file, certificate.kind,
+                 seconds if seconds is not None else verdict.seconds if verdict else 0.0)
 
 
 def _sentence(key: str, certificate: Certificate, usable: bool) -> str:

@@ -24,7 +24,7 @@ from ...design import (
 )
 from ...errors import InputError
 from ...verification import Certificate, verify
-from ..claims import Checked
+from ..claims import Checked, loop_title, measure_of
 from ._file import SynthesisJob
 
 METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "lpv", "tem",
@@ -41,9 +41,6 @@ _VERBS: dict[str, Callable[..., Design]] = {"hinf": hinf, "h2": h2, "mixed": mix
                                            "output-feedback": output_feedback, "frf-pid": frf_pid,
                                            "polytope": polytopic_feedback, "lpv": _lpv, "tem": tem_feedback,
                                            "anti-windup": anti_windup, "mpc": mpc}
-_TITLES = {"frequency": "Structured singular value", "hinf": "H-infinity norm", "h2": "H2 norm",
-           "region": "Region of the eigenvalues", "stability": "Stability", "peak": "Peak gain",
-           "scheduled": "From every start in the ellipsoid", "ellipsoid": "The ellipsoid is never left"}
 
 
 @dataclass(frozen=True)
@@ -116,12 +113,8 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
 
 
 def _check(k: int, certificate: Certificate) -> Checked:
-    measure = str(certificate.region.get("measure", certificate.kind))
     verdict = verify(certificate) if certificate.holds else None
-    title = _TITLES.get(measure, measure)
-    if certificate.kind == "ellipsoid" and "bound" in certificate.region:
-        title = "L2 gain from rest, for disturbances of limited energy"
-    return Checked(f"{k + 1}_{measure}", title, certificate, verdict, True)
+    return Checked(f"{k + 1}_{measure_of(certificate)}", loop_title(certificate), certificate, verdict, True)
 
 
 def _first(job: SynthesisJob, method: str) -> tuple[Any, ...]:

@@ -11,11 +11,12 @@ from ..._pandas import pd
 from ...design import AntiWindupDesign, Design, FeedbackDesign, LpvDesign, MpcDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
-from ..claims import ARITHMETIC, GateCode, kind_assumptions, machine_assumptions
+from ..claims import ARITHMETIC, GateCode, claim_of, kind_assumptions, machine_assumptions
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance
+from ._first_screen import first_screen, numbers_of
 from ._synthesize import Synthesis
 
 _ASSUMED = ("Plant and controller are linear and do not vary with time; no actuator saturates.",
@@ -23,12 +24,11 @@ _ASSUMED = ("Plant and controller are linear and do not vary with time; no actua
 _SATURATED = ("Plant and controller are linear and do not vary with time, but for actuators that saturate at once.",)
 _SOLVED = ("The plant moves as the sampled matrices say; disturbances are not covered.",
            "The quadratic program of every sample is solved; what its solver returns is checked in floats only.")
-_FORMED = "Loop formed from plant and controller in rational numbers; re-derived in ball arithmetic."
-_HOW = {"frequency": "About the loop's matrices in floating-point numbers, as in the file; re-derived in ball "
-                     "arithmetic at every frequency.",
-        "polytope": "Loops at the vertices formed in rational numbers; one form for all, decided in ball arithmetic.",
-        "ellipsoid": "Loop formed in rational numbers; set, limits and cost decided in ball arithmetic.",
-        "scheduled": "Hull of all slopes of the box built by the checker in rational numbers; decided in balls."}
+_TITLES = {"hinf": "H-infinity controller", "h2": "H2 controller", "mixed": "Mixed H2 and H-infinity controller",
+           "mu": "Controller by D-K iteration", "output-feedback": "Controller of fixed order",
+           "frf-pid": "PID from a frequency response", "polytope": "State feedback for a polytope of plants",
+           "lpv": "Scheduled controller", "tem": "Current law for thermoelectric modules",
+           "anti-windup": "Anti-windup compensator", "mpc": "Predictive controller"}
 
 
 def write_synthesis(result: Synthesis, out: str | Path) -> Report:
@@ -64,8 +64,9 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
     design = result.design
     data = {"synthesis": {"method": result.method, "value": plain(design.value), "lower": plain(design.lower),
                           "margins": plain(design.margins), "code": design.outcome.code}}
-    report = Report(title=f"Controller by {result.method}", subtitle=result.job.files[0].name, label="",
-                    claims=tuple(_claims(result)), sections=tuple(_sections(result)),
+    report = Report(title=_TITLES[result.method], subtitle=_subtitle(result), label="",
+                    claims=tuple(_claims(result)), first=first_screen(design), numbers=tuple(numbers_of(design)),
+                    sections=(_section(result),), kind="Controller design report",
                     provenance=provenance(result.job.files), assumptions=_assumed(result), generated=now(),
                     gate=tuple(_remarks(result)), gates=(GateCode.AT_THE_BINS.code,), data=data)
     with output_folder(out) as folder:
@@ -109,11 +110,7 @@ def _claims(result: Synthesis) -> Iterator[Claim]:
         yield Claim("Margin at the bins", design.robust_against.text, True, None, box="the bins of the response",
                     margin=f"sensitivity at most {design.value:.4g}", how=design.method, tested=True)
     for one in result.checked:
-        reason = "" if one.good or one.verdict is None else one.verdict.reason
-        yield Claim(one.title, one.certificate.claim, one.certificate.holds, one.good, "the plant of the file",
-                    f"bound {one.certificate.region.get('bound', 'as stated')}" if one.good else "none",
-                    _HOW.get(one.certificate.kind, _FORMED), reason,
-                    one.file, one.certificate.kind, one.verdict.seconds if one.verdict else 0.0)
+        yield claim_of(one.file, one.certificate, one.verdict)
 
 
 def _reached(result: Synthesis) -> str:
@@ -130,20 +127,35 @@ def _reached(result: Synthesis) -> str:
         return f"Proven in a region only{gain}."
     if isinstance(result.design, MpcDesign):
         level = result.design.terminal.level
-        return f"Proven: from every start in the terminal set x'Px <= {level:.6g} the cost is at most x'Px."
+        return f"Proven: from every start in the terminal set x'Px ≤ {level:.6g} the cost is at most x'Px."
     how = "Proven" if result.checked else "Evaluated at the bins in floating point, not proven"
     return f"{how}: {result.design.value:.6g}."
 
 
-def _sections(result: Synthesis) -> Iterator[Section]:
+def _subtitle(result: Synthesis) -> str:
+    """Which file, and what the controller consists of."""
+    K = result.design.controller
+    if not result.design.holds:
+        return result.job.files[0].name
+    counts = {"state": K.nstates, "input": K.ninputs, "output": K.noutputs}
+    sizes = ", ".join(f"{n} {what}{'s' * (n != 1)}" for what, n in counts.items())
+    return f"{result.job.files[0].name}: {sizes}, {f'sampled at {K.dt:g} s' if K.dt else 'continuous'}"
+
+
+def _section(result: Synthesis) -> Section:
     design = result.design
-    K = design.controller
-    sizes = f"{K.nstates} states, {K.ninputs} inputs, {K.noutputs} outputs"
-    best = f" Best possible, estimated: {design.lower:.6g}." if np.isfinite(design.lower) else ""
-    text = (f"{design.method}, {design.solver}; {design.solve_time:.3g} s.\n\nController: {sizes}, "
-            f"{f'sampled at {K.dt:g} s' if K.dt else 'continuous'}.\n\n{_reached(result)}{best}\n\n"
-            f"{design.outcome.text}\n\n{design.robust_against.text}")
-    rows = pd.DataFrame([{"loop": name, **{key: f"{value:.4g}" for key, value in one.items()}}
-                         for name, one in design.margins.items()])
-    tables = (Table(rows, "Margins, in floats: gain [-], phase [deg], delay [s]."),) if len(rows) else ()
-    yield Section("Controller", text, tables=tables)
+    best = f" Best possible, estimated: {design.lower:.4g}." if np.isfinite(design.lower) else ""
+    text = (f"{_capital(design.method)}, computed by: {design.solver}; {design.solve_time:.3g} s.\n\n"
+            f"{_reached(result)}{best}\n\n{design.outcome.text}")
+    if design.holds:
+        text += f"\n\n{design.robust_against.text}"
+    rows = pd.DataFrame([{"loop": name, "disk margin [-]": one["disk"], "gain margin [-]": one["gain"],
+                          "phase margin [deg]": one["phase"], "delay [s]": one["delay"],
+                          "modulus [-]": one["modulus"]} for name, one in design.margins.items()])
+    shown = rows.map(lambda cell: cell if isinstance(cell, str) else f"{cell:.3g}" if np.isfinite(cell) else "no limit")
+    tables = (Table(shown, "Margins of the loops, computed, not proven."),) if len(rows) else ()
+    return Section("Controller", text, tables=tables)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
