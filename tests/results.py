@@ -18,7 +18,7 @@ import numpy as np
 import robthermal as rt
 
 # Short examples that together make nearly every class.
-EXAMPLES = """calibration.calibrate calibration.convection_law calibration.join_models calibration.module_properties
+EXAMPLES = """calibration.calibrate calibration.convection_law calibration.join_models calibration.module_batch
 certify.gains certify.hinf certify.largest_current certify.limit_map certify.runaway certify.runaway_free
 certify.thesis_bounds certify.usable_current coupling.CoprimeFactors coupling.FixedPoint coupling.Joint
 coupling.MuBound coupling.Simulation coupling.Spectra coupling.destabilizing coupling.normalized coupling.worst_case

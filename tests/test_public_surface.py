@@ -21,8 +21,8 @@ SURFACE = {
         signals synthesis systems thermal verification verify
     """,
     "calibration": """
-        CalibrationCode ConvectionLaw Estimates Fit ModuleProperties ResponseComparison Score VaryingModel Whiteness
-        calibrate convection_law convection_of_body join_models module_properties
+        CalibrationCode ConvectionLaw Estimates Fit ModuleBatch ModuleProperties ResponseComparison Score VaryingModel
+        Whiteness calibrate convection_law convection_of_body join_models module_batch module_properties
     """,
     "certify": """
         CertifyCode CurrentBound CurrentLimit GainBound Gains LimitMap Runaway RunawayFree ThesisBounds UsableCurrent

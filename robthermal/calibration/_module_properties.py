@@ -14,6 +14,7 @@ from ..thermal import Linear, Module
 from ._plateaus import Plateau, column, plateaus
 
 _SETTLED = 0.02  # K: drift of a face over the end of a plateau up to which it counts as steady
+PROPERTIES = ("seebeck.value", "seebeck.slope", "resistance.value", "resistance.slope", "conductance")
 _APART = 1.0  # K between the faces, below which neither S nor K shows
 
 
@@ -26,12 +27,12 @@ class ModuleProperties:
     seebeck, resistance : Linear
         S [V/K, V/K²] and R [Ω, Ω/K] about the reference temperature.
     conductance : float
-        K [W/K], mean over the steady states.
+        K [W/K], by least squares over the balances of the steady states.
     reference_temperature : float
         Temperature about which S and R are linear [K].
-    std : dict
-        Standard deviations from the scatter of the points: "seebeck.value", "seebeck.slope", "resistance.value",
-        "resistance.slope", "conductance".
+    covariance : ndarray, shape (5, 5)
+        Of "seebeck.value", "seebeck.slope", "resistance.value", "resistance.slope", "conductance", in this order: from
+        the scatter of the points, with what the uncertainty of R does to S and K.
     steps, steady : pandas.DataFrame
         Per step of current: "temperature" [K], "resistance" [Ω]. Per steady state: "temperature" [K], "seebeck" [V/K],
         "conductance" [W/K].
@@ -41,9 +42,20 @@ class ModuleProperties:
     resistance: Linear
     conductance: float
     reference_temperature: float
-    std: dict[str, float]
+    covariance: Floats
     steps: pd.DataFrame
     steady: pd.DataFrame
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The five numbers by name, as a system names them: "seebeck.value" [V/K], "seebeck.slope" [V/K²] …"""
+        found = (self.seebeck.value, self.seebeck.slope, self.resistance.value, self.resistance.slope, self.conductance)
+        return dict(zip(PROPERTIES, found, strict=True))
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviations of the five numbers, in the units of `values`."""
+        return dict(zip(PROPERTIES, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def module(self, hot: str, cold: str) -> Module:
         """A module with these properties for a system.
@@ -112,26 +124,44 @@ def module_properties(record: Record, *, current: str, voltage: str, hot: str, c
     mean = (Th + Tc) / 2
     jumps = [p.start for p in levels if p.start]
     at = np.array([mean[k - 1] for k in jumps])
-    ratios = np.array([(V[k] - V[k - 1]) / (i_all[k] - i_all[k - 1]) for k in jumps])
-    R, R_std = _line(at - reference_temperature, ratios)
+    dI, dV = (np.array([signal[k] - signal[k - 1] for k in jumps]) for signal in (i_all, V))
+    X = dI[:, None] * _line(at - reference_temperature)  # in volts every jump is read equally well
+    R = np.linalg.lstsq(X, dV)[0]
     steady = [p for p in levels if _is_steady(p, Th, Tc)]
     if len(steady) < 3:
         raise InputError(f"{len(steady)} plateaus are steady with {_APART} K or more between the faces",
                          where="argument record", expected="at least 3",
                          remedy="Wait longer at every step, or use larger currents.")
     i, v, h, c = (np.array([p.tail(signal).mean() for p in steady]) for signal in (i_all, V, Th, Tc))
-    T = (h + c) / 2
-    own = R[0] + R[1] * (T - reference_temperature)
-    seebeck = (v - own * i) / (h - c)
-    K = (seebeck * c * i - own * i**2 / 2 - load) / (h - c)
-    S, S_std = _line(T - reference_temperature, seebeck)
+    line, apart = _line((h + c) / 2 - reference_temperature), h - c
+    emf = v - line @ R * i
+    back = emf / apart * c * i - line @ R * i**2 / 2 - load  # conducted back from the hot face [W]
+    Z = apart[:, None] * line
+    S, K = np.linalg.lstsq(Z, emf)[0], float(apart @ back / (apart @ apart))
+    by_R = np.array([-i, -c * i**2 / apart - i**2 / 2])[:, :, None] * line  # derivatives of emf and back by R
     return ModuleProperties(
-        seebeck=_linear(S, "seebeck"), resistance=_linear(R, "resistance"), conductance=float(K.mean()),
+        seebeck=_linear(S, "seebeck"), resistance=_linear(R, "resistance"), conductance=K,
         reference_temperature=reference_temperature,
-        std={"seebeck.value": S_std[0], "seebeck.slope": S_std[1], "resistance.value": R_std[0],
-             "resistance.slope": R_std[1], "conductance": float(K.std(ddof=1) / np.sqrt(K.size))},
-        steps=pd.DataFrame({"temperature": at, "resistance": ratios}),
-        steady=pd.DataFrame({"temperature": T, "seebeck": seebeck, "conductance": K}))
+        covariance=_covariance(X, dV - X @ R, Z, np.column_stack([emf - Z @ S, back - K * apart]), by_R),
+        steps=pd.DataFrame({"temperature": at, "resistance": dV / dI}),
+        steady=pd.DataFrame({"temperature": (h + c) / 2, "seebeck": emf / apart, "conductance": back / apart}))
+
+
+def _covariance(X: Floats, off: Floats, Z: Floats, scatter: Floats, by_R: Floats) -> Floats:
+    """Covariance (5, 5) of S, R and K from what is left of the jumps [V], of the emf [V] and of the balances [W].
+
+    X (n, 2), Z (m, 2) are the regressors of R and S, `off` (n,) and `scatter` (m, 2) the residuals, `by_R` (2, m, 2)
+    the derivatives of emf and balance by the line of R.
+    """
+    of_R = np.linalg.inv(X.T @ X) * (off @ off) / max(len(off) - 2, 1)
+    m, apart = len(Z), Z[:, 0]
+    own = scatter.T @ scatter / np.array([[m - 2, m - 2], [m - 2, m - 1]])
+    weights = [np.linalg.pinv(Z), apart[None, :] / (apart @ apart)]  # the estimates of S and of K, as sums over points
+    alone = np.block([[own[a, b] * weights[a] @ weights[b].T for b in (0, 1)] for a in (0, 1)])
+    through = np.vstack([weight @ each for weight, each in zip(weights, by_R, strict=True)])
+    total = np.block([[alone + through @ of_R @ through.T, through @ of_R], [of_R @ through.T, of_R]])
+    order = [0, 1, 3, 4, 2]  # S, K, R -> S, R, K
+    return total[np.ix_(order, order)]
 
 
 def _is_steady(plateau: Plateau, hot: Floats, cold: Floats) -> bool:
@@ -139,16 +169,12 @@ def _is_steady(plateau: Plateau, hot: Floats, cold: Floats) -> bool:
     return apart >= _APART and max(abs(plateau.drift(hot)), abs(plateau.drift(cold))) < _SETTLED
 
 
-def _line(x: Floats, y: Floats) -> tuple[Floats, list[float]]:
-    """Straight line by least squares, and standard deviations of its value at 0 and its slope."""
-    X = np.column_stack([np.ones_like(x), x])
-    found, _, rank, _ = np.linalg.lstsq(X, y, rcond=None)
-    beta = np.asarray(found, np.float64)
-    if rank < 2:
+def _line(x: Floats) -> Floats:
+    """Regressors of a straight line."""
+    if np.ptp(x) < 1e-9:
         raise InputError("all steps are at one mean temperature", where="argument record",
                          expected="a range of mean temperatures", remedy="Use currents of several sizes.")
-    variance = float(np.sum((y - X @ beta) ** 2)) / max(x.size - 2, 1)
-    return beta, np.sqrt(variance * np.diag(np.linalg.inv(X.T @ X))).tolist()
+    return np.column_stack([np.ones_like(x), x])
 
 
 def _linear(line: Floats, name: str) -> Linear:
