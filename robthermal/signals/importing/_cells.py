@@ -12,7 +12,7 @@ from ...errors import InputError
 from ._columns import Channel, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
-from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short
+from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short, thousands_of
 from ._units import split_header
 
 _CODES = (-127.0, -127.94, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)
@@ -89,7 +89,7 @@ def _number(table: Table, line: int, header: str, text: str) -> float:
             f"{short(text)} has a decimal and a thousands separator",
             where=where,
             expected="plain numbers",
-            remedy='Declare both, for example decimal = "," and thousands = ".".',
+            remedy=f"Declare both: {thousands_of(text)}.",
         )
     if decimal == "." and DECIMAL_COMMA.fullmatch(text):
         raise InputError(
@@ -214,12 +214,16 @@ def from_thermistor(table: Table, channel: Channel, raw: Array) -> None:
         raw[part] = channel.thermistor.temperature(channel.scale * raw[part] + channel.offset)
     coldest, hottest = channel.thermistor.range
     header = table.headers[channel.place]
-    faults = (("an open", "below", coldest, known & ~(raw >= coldest + ZERO_CELSIUS)),
-              ("a shorted", "above", hottest, raw > hottest + ZERO_CELSIUS))
+    faults = (
+        ("an open", "below", coldest, known & ~(raw >= coldest + ZERO_CELSIUS)),
+        ("a shorted", "above", hottest, raw > hottest + ZERO_CELSIUS),
+    )
     for what, side, limit, hit in faults:
         if hit.any():
             n = int(hit.sum())
-            text = (f"{channel.name}: {n} reading{'s' * (n > 1)} of {what} thermistor, {side} {limit:g} °C, taken as "
-                    "missing")
+            text = (
+                f"{channel.name}: {n} reading{'s' * (n > 1)} of {what} thermistor, {side} {limit:g} °C, taken as "
+                "missing"
+            )
             table.actions.append(Action("fault_code", n, text, header, table.lines.of(hit)))
             raw[hit] = np.nan

@@ -8,6 +8,7 @@ from typing import Any
 from ...errors import InputError
 from ._dates import date_reader, stamp_reader
 from ._options import ImportOptions
+from ._proposals import time_headers, unnamed_stamps
 from ._table import Action, Source, Table
 from ._times import Counted, TimeReader
 from ._tokens import short
@@ -17,20 +18,18 @@ _NAMES = (
     "time",
     "t",
     "timestamp",
+    "timestamps",
+    "time stamp",
     "datetime",
-    "date/time",
+    "date time",
     "zeit",
     "zeitstempel",
+    "datum zeit",
+    "datum uhrzeit",
     "elapsed",
     "elapsed time",
     "seconds",
-    "datum/zeit",
-    "date time",
-    "date_time",
-    "datum/uhrzeit",
-    "time stamp",
-    "timestamps",
-)
+)  # with a blank for every "/", "_", "-" and "&"
 _PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
 
 
@@ -54,7 +53,7 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
     if options.time is not None:
         asked = (options.time,) if isinstance(options.time, str) else options.time
         return tuple(_place(table, name) for name in asked)
-    names = [split_header(header)[0].strip().lower() for header in table.headers]
+    names = [re.sub(r"[\s_/&-]+", " ", split_header(header)[0]).strip().lower() for header in table.headers]
     free = [
         k
         for k, header in enumerate(table.headers)
@@ -72,12 +71,19 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
     if not found:
         if options.sample_time is not None:
             return ()
+        place = unnamed_stamps(table)
+        if place is not None:
+            table.actions.append(
+                Action("mapped", 1, "time taken from the only column without a name, which holds stamps")
+            )
+            return (place,)
         listed = ", ".join(header for header in table.headers if header)[:200]
+        proposed = time_headers(table) or 'time = "HEADER"'
         raise InputError(
             "there is no column 'time'",
             where=table.where,
             expected="one column 'time', or a declared one",
-            remedy=f'Write time = "HEADER", or sample_time = 1.0. Columns: {listed}.',
+            remedy=f"Write {proposed}, or sample_time = 1.0. Columns: {listed}.",
         )
     numeric = [k for k in found if table.columns[k].dtype.kind == "f" and _in_seconds(table.headers[k])]
     if len(numeric) == 1:

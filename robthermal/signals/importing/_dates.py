@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..._pandas import pd
 from ...errors import InputError
 from ._options import ImportOptions
+from ._proposals import time_format_of
 from ._table import Block, Table
 from ._times import CLOCK, DURATION, NUMERIC, CellReader, Clock, Durations, Numbers, TimeReader, TimesOfDay, texts_of
 from ._tokens import NUMBER, short
@@ -212,11 +213,14 @@ def _patterns(table: Table, header: str, first: str) -> list[str]:
     if slash:
         sign, year, rest = slash[2], _year(slash[4]), _time_of_day(first)
         return [f"%d{sign}%m{sign}{year}{rest}", f"%m{sign}%d{sign}{year}{rest}"]
+    proposed = time_format_of(first)
     raise InputError(
         f"{short(first)} is no time that is known" if first else "is empty or no time",
         where=table.place(0, header) if len(table.lines) else f"{table.where}, column {header!r}",
         expected="ISO 8601, dd.mm.yyyy hh:mm:ss, h:mm:ss, or numbers",
-        remedy='Declare it, for example time_format = "%d-%b-%Y %H:%M:%S".',
+        remedy=f'Write time_format = "{proposed}".'
+        if proposed
+        else 'Declare it, for example time_format = "%d-%b-%Y %H:%M:%S".',
     )
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...errors import InputError
 from ._options import ImportOptions
-from ._tokens import DECIMAL_COMMA, DECIMAL_POINT, THOUSANDS, is_missing, is_value, short
+from ._tokens import DECIMAL_COMMA, DECIMAL_POINT, NUMBER, THOUSANDS, is_missing, is_value, short, thousands_of
 from ._units import unit_of
 
 DELIMITERS = (";", "\t", ",", "|")
@@ -52,13 +53,20 @@ class Layout:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, quotes taken off, blanks trimmed."""
+    """Cells of a line, quotes taken off, blanks trimmed; a blank as delimiter stands for any number of blanks."""
+    if delimiter == " ":
+        line = collapsed(line)
     if '"' in line:
         try:
             return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
         except (csv.Error, StopIteration):
             pass
     return [cell.strip() for cell in line.split(delimiter)]
+
+
+def collapsed(text: str) -> str:
+    """Lines with one blank where there were several blanks or tabs, and none at their ends."""
+    return re.sub(r"(?m)^ +| +$", "", re.sub(r"[ \t]+", " ", text))
 
 
 def is_content(line: str) -> bool:
@@ -123,13 +131,17 @@ def _candidates(lines: Sequence[str], content: list[int], d: str, options: Impor
         if len(cells) < least or not _names(cells) and options.header_line is None:
             continue
         after = content[place + 1 :]
-        if after and _is_units(split.get(after[0], [])):
+        if options.units_line is not None:
+            after = [j for j in after if j >= options.units_line]
+        elif after and _is_units(split.get(after[0], []), split.get(after[1], []) if len(after) > 1 else []):
             after = after[1:]
         rows = [split[j] for j in after[:_ROWS] if j in split]
         enough = len(rows) == _ROWS or (place == 0 or options.header_line is not None) and rows
         width = len(rows[0]) if rows else 0
         if enough and all(_fits(row, width, cells) for row in rows):
-            if found and (_is_units(cells) or cells == split[found[0][0]]):  # its units row, or it stands there again
+            if found and (
+                _is_units(cells, rows[0]) or cells == split[found[0][0]]
+            ):  # its units row, or it stands there again
                 continue
             found.append((k, d, width))
     return found
@@ -150,30 +162,34 @@ def _fits(row: list[str], width: int, header: list[str]) -> bool:
     return len(row) == width and same and values * 2 >= len(filled) and values > 0
 
 
-def _is_units(cells: list[str]) -> bool:
+def _is_units(cells: list[str], row: list[str]) -> bool:
+    """Whether most cells above numbers are units and none is a number; above stamps and words anything may stand."""
     filled = [cell for cell in cells if cell and cell not in ("-", "--")]
-    return len(filled) > 0 and all(unit_of(cell) is not None for cell in filled) and len(cells) > 1
+    above = [cell for cell, value in zip(cells, row, strict=False) if cell in filled and NUMBER.fullmatch(value)]
+    units = sum(unit_of(cell) is not None for cell in above)
+    return units * 2 > len(above) and not any(is_value(cell) for cell in filled) and len(cells) > 1
 
 
 def _declared(
     lines: Sequence[str], content: list[int], tried: Sequence[str], options: ImportOptions, where: str
 ) -> Layout:
-    """Layout of a file whose headers are declared: its first content line is data."""
+    """Layout of a file whose headers are declared: its first line of numbers and stamps only is data."""
     header = options.header or ()
     for d in tried:
-        rows = [cells_of(lines[k], d) for k in content[:_ROWS]]
-        if all(_fits(row, len(rows[0]), list(header)) for row in rows):
+        start = _first_values(lines, content, d)
+        rows = [cells_of(lines[k], d) for k in content[start : start + _ROWS]]
+        if rows and all(_fits(row, len(rows[0]), list(header)) for row in rows):
             names = (*header, *("" for _ in range(len(rows[0]) - len(header))))
             return Layout(
                 d,
-                _decimal(lines, content, d, options, where),
+                _decimal(lines, content[start:], d, options, where),
                 options.thousands,
                 names[: len(rows[0])],
                 0,
                 (),
                 0,
-                content[0] + 1,
-                (),
+                content[start] + 1,
+                tuple(k + 1 for k in content[:start]),
             )
     raise InputError(
         f"header has {len(header)} names and the first row reads {short(lines[content[0]])}",
@@ -181,6 +197,15 @@ def _declared(
         expected="one name per cell",
         remedy="Correct header = [...].",
     )
+
+
+def _first_values(lines: Sequence[str], content: list[int], d: str) -> int:
+    """Number of content lines before the first that holds nothing but numbers, stamps and missing readings."""
+    for place, k in enumerate(content[:_SEARCHED]):
+        cells = cells_of(lines[k], d)
+        if len(cells) > 1 and any(map(is_value, cells)) and all(is_value(cell) or is_missing(cell) for cell in cells):
+            return place
+    return 0
 
 
 def _layout(
@@ -192,7 +217,9 @@ def _layout(
     after = content[place + 1 :]
     units: tuple[str, ...] = ()
     units_line = 0
-    if options.units_line is not None or (after and _is_units(cells_of(lines[after[0]], d))):
+    if options.units_line is not None or (
+        len(after) > 1 and _is_units(cells_of(lines[after[0]], d), cells_of(lines[after[1]], d))
+    ):
         row = options.units_line - 1 if options.units_line is not None else after[0]
         if row not in content or row <= header:
             raise InputError(
@@ -225,7 +252,7 @@ def _decimal(lines: Sequence[str], rows: list[int], d: str, options: ImportOptio
                     f"{short(cell)} has a decimal and a thousands separator",
                     where=f"{where}, line {k + 1}",
                     expected="plain numbers",
-                    remedy='Declare both, for example decimal = "," and thousands = ".".',
+                    remedy=f"Declare both: {thousands_of(cell)}.",
                 )
             if d != "," and DECIMAL_COMMA.fullmatch(cell):
                 comma = comma or (k, place)
@@ -285,9 +312,27 @@ def _no_header(
                         expected="as many cells as the header",
                         remedy="Repair or remove the line.",
                     )
+    if options.delimiter is None and (blank := _blanks_between(lines, content, options)):
+        return InputError(
+            f"blanks are between the cells; line {first + 1} reads {short(lines[first])}",
+            where=where,
+            expected='cells separated by ";", tab, "," or "|", or a declared delimiter',
+            remedy=f"Write {blank}.",
+        )
     return InputError(
         f"no line is followed by rows of as many cells with numbers; line {first + 1} reads {short(lines[first])}",
         where=where,
         expected='a header row; cells separated by ";", tab, "," or "|"',
         remedy='Write header_line = N, or delimiter = "…".',
     )
+
+
+def _blanks_between(lines: Sequence[str], content: list[int], options: ImportOptions) -> str:
+    """Declaration that reads a file whose cells are separated by blanks; empty where that does not help."""
+    if _candidates(lines, content, " ", options):
+        return 'delimiter = " "'
+    rows = [cells_of(lines[k], " ") for k in content[: _ROWS + 1]]
+    values = all(is_value(cell) or is_missing(cell) for row in rows for cell in row)
+    if not values or len({len(row) for row in rows}) > 1 or len(rows[0]) < 2:
+        return ""
+    return f'delimiter = " " and header = ["time", …], {len(rows[0])} names'

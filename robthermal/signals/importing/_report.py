@@ -132,9 +132,10 @@ class Import:
         )
         if self.delimiter:
             delimiter = {"\t": "tab"}.get(self.delimiter, repr(self.delimiter))
+            header = f"header in line {self.header_line}" if self.header_line else "headers declared"
             lines.append(
-                f"  text: {self.encoding}, delimiter {delimiter}, decimal {self.decimal!r}, header in line "
-                f"{self.header_line}" + (f", {self.skipped_lines} lines skipped" if self.skipped_lines else "")
+                f"  text: {self.encoding}, delimiter {delimiter}, decimal {self.decimal!r}, {header}"
+                + (f", {self.skipped_lines} lines skipped" if self.skipped_lines else "")
             )
         zone = f", zone {self.time['timezone']}" if self.time.get("timezone") else ""
         origin = f", zero is {self.time['origin']}" if self.time.get("origin") else ""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ._layout import Layout, cells_of, is_content
+from ._layout import Layout, cells_of, collapsed, is_content
 from ._table import Action
 from ._tokens import NUMBER, short
 
@@ -100,6 +100,8 @@ class RowReader:
             part = rest + piece
             stop = part.rfind("\n") + 1
             part, rest = part[:stop], part[stop:]
+            if self._layout.delimiter == " ":
+                part = collapsed(part)
             skip = self._layout.first_line - number
             if skip > 0:  # the lines up to the header
                 place = _after(part, skip)
@@ -110,7 +112,8 @@ class RowReader:
                 yield from self._of(lines, number)
                 number += len(lines)
         if rest and number >= self._layout.first_line:
-            yield from self._of(_Lines(rest + "\n"), number)
+            last = collapsed(rest) if self._layout.delimiter == " " else rest
+            yield from self._of(_Lines(last + "\n"), number)
 
     def _of(self, lines: _Lines, first: int) -> Iterator[tuple[bytes, Any]]:
         keep = self._kept(lines, first)

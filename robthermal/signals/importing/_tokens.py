@@ -72,6 +72,18 @@ def short(text: object, most: int = 40) -> str:
     return repr(words if len(words) <= most else words[: most - 3] + "...")
 
 
+def thousands_of(cell: str) -> str:
+    """Declaration that reads a number with a decimal and a thousands separator.
+
+    Examples
+    --------
+    >>> thousands_of("1,234.5")
+    'decimal = "." and thousands = ","'
+    """
+    decimal = max(".,", key=cell.rfind)
+    return f'decimal = "{decimal}" and thousands = "{",."[decimal == ","]}"'
+
+
 def na_values(extra: tuple[float | str, ...], numbers: bool = False) -> list[str]:
     """Spellings that a table parser takes as missing: each word in lower, upper and capitalized form."""
     words = [word for base in MISSING for word in (base, base.upper(), base.capitalize())]
