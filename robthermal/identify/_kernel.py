@@ -215,8 +215,14 @@ def fit_of_triangle(triangle: Array) -> tuple[Array, Array]:
     inverse = _invert_triangle(triangle[:, :n_u])
     if n_u == 1:
         return (inverse * triangle[:, 1:]).swapaxes(0, 1), inverse * inverse.conj()
-    response = np.einsum("ijb,job->oib", inverse, triangle[:, n_u:])
-    return response, np.einsum("iab,jab->ijb", inverse, inverse.conj())
+    response, gram = np.empty((triangle.shape[1] - n_u, *inverse.shape[1:]), dtype=complex), np.empty_like(inverse)
+    for i in range(n_u):  # plane by plane: several times faster than np.einsum over the first axes
+        for o, output in enumerate(response):
+            output[i] = sum(inverse[i, j] * triangle[j, n_u + o] for j in range(i, n_u))
+        for j in range(i, n_u):
+            gram[i, j] = sum(inverse[i, a] * inverse[j, a].conj() for a in range(j, n_u))
+            gram[j, i] = gram[i, j].conj()
+    return response, gram
 
 
 def _invert_triangle(triangle: Array) -> Array:

@@ -45,9 +45,9 @@ class _Work:
         self.real_blocks = np.empty(self.blocks.shape)
         self.real_sums, self.sums = np.empty((2 * size - 1, width)), np.empty((2 * size - 1, width), dtype=complex)
         self.transient, self.conjugate = np.empty((2, n, size, width), dtype=complex)
-        self.term, self.scaled = np.empty((2, n, width), dtype=complex)
-        self.inverse = np.zeros(width, dtype=complex)  # its imaginary part stays zero
-        self.triangle = np.empty((n_u, n_u + n_y, width), dtype=complex)
+        self.term = np.empty((n, width), dtype=complex)
+        # Real numbers stored as complex, imaginary part zero: products of one type run several times faster.
+        self.inverse, self.factors = np.zeros(width, dtype=complex), np.zeros((size, size, width), dtype=complex)
 
     def power_of(self, sequence: Array) -> Array:
         """|.|^2 of a sequence, in blocks."""
@@ -99,7 +99,8 @@ class NormalKernel:
         work = self._work(width)
         part = slice(start - 1 - self.basis.half_width, stop - 1 + self.basis.half_width)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            known = self._weighted.weights(start, width, work.real_blocks) if self._weighted else None
+            known = (self._weighted.weights(start, work.real_blocks, work.real_sums, work.factors)
+                     if self._weighted else None)
             for place, spectrum in enumerate(self.spectra):
                 U, Y = _padded(spectrum.U[:, part], width - count), _padded(spectrum.Y[:, part], width - count)
                 if place:
@@ -109,7 +110,7 @@ class NormalKernel:
                     work.H += before[0]
                     work.energy += before[1]
             weak = self._eliminate(work, known.least if known else np.ones(width), full_noise)
-            response, gram = fit_of_triangle(ordered(work.triangle, count))
+            response, gram = fit_of_triangle(ordered(work.H[n_k - self.n_u : n_k, n_k - self.n_u :], count))
         if known:
             w = known.sequence[self.basis.half_width : self.basis.half_width + count]
             response *= w
@@ -121,7 +122,7 @@ class NormalKernel:
         if self._weighted and known:
             U = U * known.sequence
             self._multiply(U, Y, work, full_noise)
-            self._weighted.project(known, U, Y, work.transient, work.blocks, work.conjugate)
+            self._weighted.project(known, U, Y, work.transient, work.blocks, work.sums, work.conjugate)
         elif self._constant:
             self._multiply(U, Y, work, full_noise)
             self._constant.project(U, Y, work.transient, work.blocks)
@@ -177,38 +178,36 @@ class NormalKernel:
 
     def _remove_transient(self, work: _Work, full_noise: bool) -> None:
         """Take away what the orthonormal functions of the transient explain."""
-        n_k, size, H, found, n = self._n_k, self.basis.size, work.H, work.transient, len(work.H)
-        np.conjugate(found, out=work.conjugate)
-        for c in range(n):
-            stop = n if full_noise or c < n_k else c + 1
-            row, term = H[c, c:stop], work.term[c:stop]
-            for a in range(size):
-                np.subtract(row, np.multiply(work.conjugate[c, a], found[c:stop, a], out=term), out=row)
+        np.conjugate(work.transient, out=work.conjugate)
+        for a in range(self.basis.size):
+            self._take_away(work.transient[:, a], work.conjugate[:, a], 0, work, full_noise)
 
     def _eliminate(self, work: _Work, least: Array, full_noise: bool) -> Array:
-        """Eliminate the regressors from the upper triangle, in place; which bins are weak, with `least` before."""
-        n_u, n_k, H, degree, n = self.n_u, self._n_k, work.H, self.basis.degree, len(work.H)
-        conjugates = work.conjugate[:, 0]
+        """Cholesky factorization in place, as far as the regressors; which bins are weak, with `least` before."""
+        n_u, n_k, H, degree = self.n_u, self._n_k, work.H, self.basis.degree
+        scale, conjugates = 1.0 / work.energy[:n_u], work.conjugate[:, 0]
         for c in range(n_k):
             pivot, constant = H[c, c].real, c - n_u * degree
-            least = np.minimum(least, pivot / work.energy[constant if constant >= 0 else c // degree])
-            np.divide(1.0, pivot, out=work.inverse.real)
-            row = H[c, c + 1 :]
-            scaled = np.multiply(row, work.inverse, out=work.scaled[c + 1 :])
-            conjugate = np.conjugate(row, out=work.term[c + 1 :])
-            conjugates[c + 1 :] = conjugate
-            for d in range(c + 1, n):
-                stop = n if full_noise or d < n_k else d + 1
-                own = H[d, d:stop]
-                np.subtract(own, np.multiply(conjugates[d], scaled[d - c - 1 : stop - c - 1], out=work.term[d:stop]),
-                            out=own)
-            if constant >= 0:
-                np.multiply(H[c, c:], np.sqrt(work.inverse.real), out=work.triangle[constant, constant:])
+            np.minimum(least, pivot * scale[constant if constant >= 0 else c // degree], out=least)
+            root = np.sqrt(pivot)
+            np.divide(1.0, root, out=work.inverse.real)
+            H[c, c] = root
+            row = np.multiply(H[c, c + 1 :], work.inverse, out=H[c, c + 1 :])
+            np.conjugate(row, out=conjugates[c + 1 :])
+            self._take_away(H[c], conjugates, c + 1, work, full_noise)
         fine = least > _WEAK_PIVOT  # not where least is NaN
         for o in range(self.n_y):
             left = H[n_k + o, n_k + o].real / work.energy[n_u + o]
             fine &= (left > _WEAK_RESIDUAL) & (left * least > _WEAK_BOTH)
         return np.logical_not(fine)
+
+    def _take_away(self, row: Array, conjugate: Array, first: int, work: _Work, full_noise: bool) -> None:
+        """Subtract conj(row_d) row_e from entry (d, e) of the upper triangle, d from `first`."""
+        n, H, term = len(work.H), work.H, work.term
+        for d in range(first, n):
+            stop = n if full_noise or d < self._n_k else d + 1
+            own = H[d, d:stop]
+            np.subtract(own, np.multiply(conjugate[d], row[d:stop], out=term[d:stop]), out=own)
 
     def _column(self, i: int, s: int) -> int:
         """Place of the regressor phi_s U_i: the constants of G come last."""

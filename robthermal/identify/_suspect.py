@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy import special
 
 from .._arrays import Array
 from ._threads import run_all
@@ -27,17 +27,16 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     gap, reach = 2 * half_width + 1, _REACH * max(half_width, 1)
     if n_f < gap + reach:
         gap, reach = min(gap, n_f // 2), max(1, n_f // 4)
-    q = np.maximum(degrees_of_freedom, 1)
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
-    limits = np.empty(int(q.max()) + 1)
-    for v in np.flatnonzero(np.bincount(q)):
-        limits[v] = scipy.stats.f.isf(_LEVEL / n_y, 2 * v, 2 * v * independent)
-    limit = limits[q]
+    q = np.arange(1.0, max(1, int(degrees_of_freedom.max())) + 1.0)
+    place = np.maximum(degrees_of_freedom, 1) - 1
+    limit = special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place]
+    ratio = _median_ratio(q)[place]
     by_output = np.zeros((n_y, n_f), dtype=bool)
 
     def compare(o: int) -> None:
-        reference = _reference(variance[o] / _median_ratio(q), gap, reach)
+        reference = _reference(variance[o] / ratio, gap, reach)
         by_output[o] = variance[o] > limit * np.maximum(reference, rounding[o] ** 2)
 
     run_all(compare, range(n_y), worth=n_y > 1 and _SIDE_BY_SIDE[0] < n_f < _SIDE_BY_SIDE[1])
@@ -63,9 +62,12 @@ def _reference(row: Array, gap: int, reach: int) -> Array:
     n, stride = row.size, max(1, reach // 2)
     view = sliding_window_view(row, reach)[::stride]
     medians = np.concatenate([_medians(view[first : first + 2**13]) for first in range(0, len(view), 2**13)])
-    place = np.arange(n)
-    right, left = -(-(place + gap) // stride), (place - gap - reach + 1) // stride
-    on_right = np.where(right < len(view), medians[np.minimum(right, len(view) - 1)], np.inf)
-    on_left = np.where(left >= 0, medians[np.maximum(left, 0)], np.inf)
+    # Window i begins at bin i stride: on the right of bin k the first with i stride >= k + gap, on the left the last
+    # that ends at k - gap or before.
+    on_right, on_left, start = np.full(n, np.inf), np.full(n, np.inf), gap + reach - 1
+    following = np.repeat(medians[1:], stride)[gap - 1 :][:n]
+    preceding = np.repeat(medians, stride)[: max(0, n - start)]
+    on_right[: following.size], on_left[start : start + preceding.size] = following, preceding
     lower = np.minimum(on_right, on_left)
-    return np.where(np.isfinite(lower), lower, np.median(row))
+    known = np.isfinite(lower)
+    return lower if known.all() else np.where(known, lower, np.median(row))

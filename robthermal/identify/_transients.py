@@ -43,8 +43,7 @@ class Weights:
     """Of one chunk: the common factor of all functions, and the factors L D L' of the transient's normal equations."""
 
     sequence: Array  # w, complex, of all bins that the windows reach
-    lower: Array  # (R+1, R+1, 2B), real: L below the diagonal, for pairs of real numbers
-    scale: Array  # (R+1, 2B): D^(-1/2), likewise
+    factors: Array  # (R+1, R+1, B), real numbers stored as complex: D^(-1/2) on the diagonal, column s of L in row s
     least: Array  # (B,): least energy left of a function, relative to the first
 
 
@@ -55,29 +54,33 @@ class WeightedTransient:
         self._basis = basis
         self._products, self._functions = Moments(basis.real_products()), Moments(basis.real_functions())
 
-    def weights(self, start: int, width: int, blocks: Array) -> Weights:
-        """Of `width` windows centered at bin `start`, counted from 1, and the next."""
-        basis, size = self._basis, self._basis.size
+    def weights(self, start: int, blocks: Array, moments: Array, factors: Array) -> Weights:
+        """Of the windows centered at bin `start`, counted from 1, and the next; the arrays are used for the result.
+
+        `blocks` and `moments` (2R+1, B) are real; `factors` (R+1, R+1, B) is complex with imaginary part zero.
+        """
+        basis, size, width = self._basis, self._basis.size, moments.shape[-1]
         bins = np.arange(start - basis.half_width, start + width + basis.half_width, dtype=float)
         w = 1.0 / basis.rotated_denominator(bins)
-        moments = np.empty((2 * size - 1, width))
         self._products(in_blocks(w.real**2 + w.imag**2, blocks), moments)
-        left = np.array([[moments[s + t] for t in range(size)] for s in range(size)])
-        least, scale = np.ones(width), np.empty((size, width))
-        for s in range(size):
-            np.minimum(least, left[s, s] / moments[0], out=least)
-            scale[s] = 1.0 / left[s, s]
+        left = [moments[s : s + size].copy() for s in range(size)]
+        least = np.ones(width)
+        for s, row in enumerate(left):
+            np.minimum(least, row[s] / moments[0], out=least)
+            inverse = 1.0 / row[s]
+            factors[s, s].real = np.sqrt(inverse)
             for t in range(s + 1, size):
-                factor = left[s, t] * scale[s]
-                left[t, t:] -= factor * left[s, t:]
-                left[t, s] = factor
-        return Weights(w, np.repeat(left, 2, axis=-1), np.repeat(np.sqrt(scale), 2, axis=-1), least)
+                factor = row[t] * inverse
+                left[t][t:] -= factor * row[t:]
+                factors[s, t].real = factor
+        return Weights(w, factors, least)
 
-    def project(self, known: Weights, U: Array, Y: Array, found: Array, blocks: Array, scratch: Array) -> None:
-        """As `ConstantTransient.project`; U already multiplied by w, `scratch` like `found`."""
+    def project(
+        self, known: Weights, U: Array, Y: Array, found: Array, blocks: Array, moments: Array, scratch: Array
+    ) -> None:
+        """As `ConstantTransient.project`; U already multiplied by w, `moments` (2R+1, B), `scratch` like `found`."""
         n_u, size = len(U), self._basis.size
         degree, conjugate = size - 1, known.sequence.conj()
-        moments = np.empty((2 * size - 1, found.shape[-1]), dtype=complex)
         for i, sequence in enumerate(U):
             self._products(in_blocks(conjugate * sequence, blocks), moments)
             for s in range(size):
@@ -85,8 +88,8 @@ class WeightedTransient:
                 found[place] = moments[s : s + size]
         for o, sequence in enumerate(Y):
             self._functions(in_blocks(conjugate * sequence, blocks), found[n_u * size + o])
-        pairs, work = found.view(float), scratch.view(float)
-        for s in range(degree):
-            below = np.multiply(known.lower[s + 1 :, s], pairs[:, s, None], out=work[:, s + 1 :])
-            np.subtract(pairs[:, s + 1 :], below, out=pairs[:, s + 1 :])
-        pairs *= known.scale
+        for s in range(size):
+            if s < degree:
+                below = np.multiply(known.factors[s, s + 1 :], found[:, s, None], out=scratch[:, s + 1 :])
+                np.subtract(found[:, s + 1 :], below, out=found[:, s + 1 :])
+            found[:, s] *= known.factors[s, s]
