@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import special
 
 from .._arrays import Array
 from ._threads import run_all
@@ -31,7 +31,7 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     independent = max(2.0, 1.5 * reach / gap)
     q = np.arange(1.0, max(1, int(degrees_of_freedom.max())) + 1.0)
     place = np.maximum(degrees_of_freedom, 1) - 1
-    limit = special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place]
+    limit = scipy.special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place]
     ratio = _median_ratio(q)[place]
     by_output = np.zeros((n_y, n_f), dtype=bool)
 
