@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Complex, Floats
-from ..fitting import MeasuredResponse, as_complex, residual
+from .._residual import residual
+from ..fitting import MeasuredResponse, as_complex
 from ..identify import FrequencyResponse
 from ..thermal import System
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._arrays import Floats
-from ..fitting import MeasuredResponse, Ranges, as_complex, residual
+from .._residual import residual
+from ..fitting import MeasuredResponse, Ranges, as_complex
 from ..thermal import System
 from ._covariance import Share
 

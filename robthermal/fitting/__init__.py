@@ -31,7 +31,6 @@ from ._ranges import Choice as Choice
 from ._ranges import Ranges as Ranges
 from ._ranges import chosen_ranges as chosen_ranges
 from ._residual import counted as counted
-from ._residual import residual as residual
 from ._residual import rmse as rmse
 from ._residual import rmse_by_sensor as rmse_by_sensor
 from ._response_whitening import ResponseWhitener as ResponseWhitener

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._arrays import Floats
+from .._residual import residual
 from ..errors import Diverged
 from ..thermal import System, trajectory
 from ._data import Data
 from ._ranges import Ranges
-from ._residual import residual
 from ._start import REACH, Initial, start_values
 
 Weigh = Callable[[Floats], Floats]  # (n, n_sensors, ...) in kelvin to weighted, linear

@@ -1,37 +1,15 @@
-"""Residual = measured − modelled, and its root mean square: the one definition of both."""
+"""Root mean squares of residuals, and which sensors they count."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Complex, Floats
+from .._arrays import Floats
 from ..thermal import System
-
-
-@overload
-def residual(measured: NDArray[np.floating[Any]], modelled: NDArray[np.floating[Any]]) -> Floats: ...
-
-
-@overload
-def residual(measured: Complex, modelled: Complex) -> Complex: ...
-
-
-def residual(measured: NDArray[Any], modelled: NDArray[Any]) -> NDArray[Any]:
-    """Measured minus modelled readings: a machine 1 K warmer than its model has residual +1 K.
-
-    Parameters
-    ----------
-    measured : ndarray
-        Readings of the sensors [K], or a measured frequency response.
-    modelled : ndarray
-        The model's answer at the same times or frequencies, in the same unit.
-    """
-    return measured - modelled
 
 
 def rmse(residuals: Iterable[Floats]) -> float:

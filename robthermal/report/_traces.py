@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._celsius import ZERO_CELSIUS
+from .._residual import residual as residual_of
 from ..errors import InputError
-from ..fitting import residual as residual_of
 from ._style import canvas, house_style, legend_above, look, plain
 
 _BINS = 400  # per trace: finer than a printed page resolves, small enough for a page with many figures

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from ..._residual import residual
 from ...errors import Diverged, InputError
-from ...fitting import Data, residual
+from ...fitting import Data
 from ...thermal import System, trajectory
 
 Array = NDArray[np.float64]

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from ..._recursion import recursion
+from ..._residual import residual
 from ...errors import InputError
-from ...fitting import residual
 from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response

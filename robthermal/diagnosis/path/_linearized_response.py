@@ -11,8 +11,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..._residual import residual
 from ...errors import Diverged, InputError
-from ...fitting import ResponseWhitener, as_complex, as_real, residual
+from ...fitting import ResponseWhitener, as_complex, as_real
 from ...thermal import Input, System
 from ..data import Complex, ResponseData
 from ..effects import Candidate

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._residual import residual
 from ...calibration import Fit
-from ...fitting import residual, rmse
+from ...fitting import rmse
 from ...report import Reason, Verdict
 from ...signals import Record
 from ...thermal import System
