@@ -6,19 +6,21 @@ from typing import Any
 
 from .errors import InputError
 
-# Okabe and Ito (2008): told apart with every common color vision; without the yellow, too pale on white. The n-th
-# sensor of a machine has the n-th color in every figure.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# The n-th sensor of a machine has the n-th color in every figure. The first six are of Okabe and Ito (2008): told apart
+# with every common color vision; without the yellow, too pale on white. The others are told apart by dashes too.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
+          "#8B62C4", "#7F8C1A", "#96613D", "#C2274B", "#2A9D9D", "#6B7A90")
+_SOLID = 6  # curves
 _DASHES = ("-", "--", ":", "-.")
 
 
 def line_of(number: int) -> dict[str, str]:
-    """Color and dashes of the n-th curve, for `Axes.plot`: after the last color they begin again, dashed.
+    """Color and dashes of the n-th curve, for `Axes.plot`: the first six are solid, the next six dashed.
 
     Parameters
     ----------
     number : int
-        Place of the curve among all channels, from 0; -1, -2, … take the colors from the other end.
+        Place of the curve among all channels, from 0; -1, -2, … take the first six colors from the other end.
 
     Returns
     -------
@@ -27,10 +29,11 @@ def line_of(number: int) -> dict[str, str]:
     Examples
     --------
     >>> line_of(0), line_of(6), line_of(-1)["linestyle"]
-    ({'color': '#0072B2', 'linestyle': '-'}, {'color': '#0072B2', 'linestyle': '--'}, '-')
+    ({'color': '#0072B2', 'linestyle': '-'}, {'color': '#8B62C4', 'linestyle': '--'}, '-')
     """
-    rounds = max(number, -1 - number) // len(COLORS)
-    return {"color": COLORS[number % len(COLORS)], "linestyle": _DASHES[rounds % len(_DASHES)]}
+    rounds = max(number, -1 - number) // _SOLID
+    color = COLORS[number % (len(COLORS) if number >= 0 else _SOLID)]
+    return {"color": color, "linestyle": _DASHES[rounds % len(_DASHES)]}
 
 
 def axes_for(ax: Any, **figure: Any) -> Any:

@@ -232,6 +232,9 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            regulate: Annotated[list[str] | None, typer.Option(
                help="Sensor or lump that a module regulates, may repeat; default its cold face.",
                metavar="MODULE=NAME")] = None,
+           setpoint_ramp: Annotated[list[str] | None, typer.Option(
+               help="Largest rate of a set-point [K/s], one per module, may repeat; default a step.",
+               metavar="MODULE=RATE")] = None,
            current: Annotated[list[str] | None, typer.Option(
                help="Limits of one module [A]; default the largest that are certified.", metavar="NAME=LO:HI")] = None,
            ambient: AmbientRange = None, temperature: Box = None,
@@ -240,12 +243,13 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
            margin: Annotated[list[str] | None, typer.Option(
                help="Least gain [-], phase [deg], modulus [-] or delay [s] margin of every loop, may repeat.",
                metavar="NAME=VALUE")] = None,
-           sample_time: Annotated[float, typer.Option(help="[s].")] = 1.0,
+           sample_time: Annotated[float, typer.Option(help="Of controller and observer [s].")] = 1.0,
            sensors: Annotated[str | None, typer.Option(
                help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
                help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, mu, output-feedback, "
-               "frf-pid, polytope, lpv, tem: a synthesis for PLANT.toml (docs/command_line.md), no other options.")
+               "frf-pid, polytope, lpv, tem, anti-windup, mpc: a synthesis for PLANT.toml (docs/command_line.md); of "
+               "the other options only --out and --json count.")
            ] = "energy",
            parameters: Annotated[list[str] | None, typer.Option(
                help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
@@ -272,7 +276,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
     wanted = rt.jobs.design.design_from_text(
         found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
         bandwidth=bandwidth, sample_time=sample_time, sensors=sensors, method=method, regulate=regulate or [],
-        margins=margin or [], export=export,
+        margins=margin or [], export=export, ramp=setpoint_ramp or [],
         parameters=rt.jobs.request.ranges_from_text(found, parameters or [], confidence))
     free(out)
     with progress() as stage:

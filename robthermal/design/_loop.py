@@ -78,7 +78,7 @@ class ClosedLoop:
         """Plot what is regulated with its set-points [°C], other cold faces thin, and currents [A]; two axes."""
         from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
-        _, axes = plt.subplots(2, sharex=True, layout="constrained", figsize=(8.0, 4.8))
+        _, axes = plt.subplots(2, sharex=True, layout="constrained")
         for i, name in enumerate(base_law(self.law).names):
             line, = axes[0].plot(self.time, self.regulated[:, i] - ZERO_CELSIUS, label=f"{name}: {self.points[i]}")
             if (self.regulated[:, i] != self.cold[:, i]).any():
@@ -86,9 +86,10 @@ class ClosedLoop:
                              label=f"cold face of {name}")
             axes[0].plot(self.time, self.reference[:, i] - ZERO_CELSIUS, "--", color=line.get_color())
             axes[1].plot(self.time, self.current[:, i], color=line.get_color(), drawstyle="steps-post")
-        axes[0].set(ylabel="temperature [°C]", title=self.outcome.code)
+        axes[0].set_ylabel("temperature [°C]")
+        axes[0].set_title(self.outcome.code, loc="left")
         axes[0].plot([], [], "--", color="0.5", label="set-point")
-        axes[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)  # beside the curves
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False)  # above the curves
         axes[1].set(xlabel="time [s]", ylabel="current [A]")
         return axes
 

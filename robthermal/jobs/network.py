@@ -22,5 +22,5 @@ def network_section(system: System) -> Section:
     joined += [f"module {name} from {module.cold} to {module.hot}" for name, module in system.modules.items()]
     figure = Figure.draw(drawn, alt=f"Network of {parts}: {'; '.join(joined)}.",
                          caption="Lumps, heat paths, sensors, heaters and modules. A sensor has the same color in all "
-                                 "figures; from the seventh on they repeat.")
+                                 "figures; from the seventh on its curves are dashed too.")
     return Section("The machine as modeled", text, figures=(figure,), anchor=NETWORK)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from ..report import file_hash, versions
@@ -19,3 +19,20 @@ def subtitle(system: System) -> str:
     counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
               "sensor": len(system.sensors)}
     return f"{system.name}: " + ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
+
+
+def simulated_label(names: Iterable[str]) -> str:
+    """Banner of a report whose system, records or files are called simulated; empty for any other.
+
+    Parameters
+    ----------
+    names : iterable of str
+        What the system, its records and the files are called.
+
+    Examples
+    --------
+    >>> simulated_label(["plate", "simulated.csv"]), simulated_label(["plate", "friday.csv"])
+    ('SIMULATED DATA: simulated.csv', '')
+    """
+    said = [name for name in dict.fromkeys(names) if "simulated" in name.lower()]
+    return f"SIMULATED DATA: {', '.join(said)}" if said else ""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from .._drawing import COLORS
+from .._drawing import COLORS, line_of
 
 _LETTERS = 66  # of a legend's line across a figure
 WIDTH = 5.2  # inch: letters of 9 points are then as large as the text in the report's column, and read on a phone
@@ -50,8 +50,8 @@ def house_style() -> Iterator[None]:
 
 def look(name: str, drawn: Sequence[str], order: Sequence[str]) -> tuple[str, str]:
     """Color and dashes of a sensor: by its place in `order`, else by its place among those drawn."""
-    place = list(order if name in order else drawn).index(name)
-    return COLORS[place % len(COLORS)], ("-", "--", ":")[place // len(COLORS) % 3]
+    one = line_of(list(order if name in order else drawn).index(name))
+    return one["color"], one["linestyle"]
 
 
 def plain(text: str) -> str:

@@ -1,6 +1,7 @@
 """Stage identify on records of a closed loop: the plant by way of its reference, and what is left out."""
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from commands import Run
 from heated_bar import CAPACITY, CONDUCTANCE, POWER, ROOM, SYSTEM
 
 import robthermal as rt
+from robthermal.jobs.measured._reference import beside_reference
 
 pytestmark = pytest.mark.usefixtures("sketched")
 PROJECT = """
@@ -106,4 +108,14 @@ def test_the_command_takes_a_reference(tmp_path: Path, run: Run) -> None:
     done = run("frf", tmp_path / "loop.csv", "--system", tmp_path / "bar.toml", "--input", "Q", "--output", "T",
                "--reference", "dither", "--out", tmp_path / "loop.json")
     assert done.status == 0
+    assert "not read" not in done.err, "the column dither is read: as the reference"
     assert covered(rt.identify.read_response(tmp_path / "loop.json")) > 0.9
+
+
+def test_only_the_columns_of_the_reference_are_left_out_of_the_note() -> None:
+    with pytest.warns(UserWarning) as said, beside_reference(["dither"]):  # noqa: PT031  (all of it is the subject)
+        for text in ("a.csv: unknown columns, not read: 'dither [A]', 'fan'", "a.csv: unknown columns, not read: "
+                     "'dither'", "a.csv: 2 rows with the same time"):
+            warnings.warn(text, UserWarning, stacklevel=1)
+    assert [str(one.message) for one in said] == ["a.csv: unknown columns, not read: 'fan'",
+                                                  "a.csv: 2 rows with the same time"]

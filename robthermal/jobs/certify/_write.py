@@ -10,7 +10,7 @@ from ..evidence import write_certification
 from ..folder import output_folder
 from ..network import network_section
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import provenance, simulated_label, subtitle
 from ._reasons import CERTIFY_GATES, certification_reasons, stays_usable
 from ._sections import certification_sections
 from ._table import certify_table
@@ -55,7 +55,8 @@ def certification_report(result: Certification, files: tuple[Path, ...]) -> Repo
     files : tuple of Path
         Input files, for their hashes.
     """
-    return Report(title=result.system.name, subtitle=subtitle(result.system), label="",
+    return Report(title=result.system.name, subtitle=subtitle(result.system),
+                  label=simulated_label([result.system.name, *(file.name for file in files)]),
                   claims=required_claims(result.checked, stays_usable(result)),
                   sections=tuple(certification_sections(result)), first=(network_section(result.system),),
                   provenance=provenance(files), generated=now(),

@@ -74,6 +74,7 @@ def coupling_report(result: Coupling) -> Report:
     """
     job = result.job
     return Report(title=f"Coupling of {job.names[0]} and {job.names[1]}", subtitle=_subtitle(result), label="",
+                  kind="Coupling report",
                   claims=tuple(coupling_claims(result)), sections=tuple(_sections(result)),
                   first=tuple(_first(result)), numbers=tuple(_numbers(result)),
                   provenance=provenance(job.files), assumptions=tuple(coupling_assumptions(result)), generated=now(),
@@ -142,8 +143,15 @@ def _numbers(result: Coupling) -> Iterator[tuple[str, str, str]]:
     if result.found and result.filters.problem.samples:
         for what, before, after in (("moving average of e12 = y2 − y1, 3σ", p.ma_before, p.ma_after),
                                     ("moving standard deviation of e12, 3σ", p.msd_before, p.msd_after)):
-            yield (what, f"{in_table(before, 3)} → {in_table(after, 3)} m", "without → with coupling; computed for the "
-                   "model, not proven")
+            scale, unit = _prefix(max(before, after))
+            yield (what, f"{in_table(before / scale, 3)} → {in_table(after / scale, 3)} {unit}",
+                   "without → with coupling; computed for the model, not proven")
+
+
+def _prefix(size: float) -> tuple[float, str]:
+    """Meters, or the part of one in which a length is written without an exponent."""
+    return next(((scale, unit) for scale, unit in ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm")) if size >= scale),
+                (1e-9, "nm"))
 
 
 def _performance_section(result: Coupling) -> Section:

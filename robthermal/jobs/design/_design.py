@@ -174,8 +174,8 @@ def design_system(system: System, request: DesignRequest,
     progress("certifying contraction and the box that is never left")
     certification, robust = certified_design(system, request, pairs, watcher, seen, fold, certified)
     progress("simulating the step to the set-points")
-    target = [request.setpoint[name] for name in law.names]
-    loop = simulate_loop(system, loops.controller, target, law=law, duration=2 * _LONG / loops.bandwidth,
+    target, duration = _reference(law, request, 2 * _LONG / loops.bandwidth)
+    loop = simulate_loop(system, loops.controller, target, law=law, duration=duration,
                          observer=watcher, noise_seed=0 if watcher else None, regulate=request.regulate)
     progress("comparing steps with and without the feedback law")
     return ControllerDesign(request, certification, law, loops.controller, watcher, reach, loop,
@@ -217,6 +217,18 @@ def _law(system: System, request: DesignRequest, tried: Iterator[Pairs]) -> tupl
         if reach.outcome:
             return law, reach
     raise _refusal(reach, system, request)
+
+
+def _reference(law: FeedbackLinearization, request: DesignRequest, settling: float) -> tuple[np.ndarray, float]:
+    """Set-points of the simulation, at once or along the ramp from the temperatures at rest, and its duration [s]."""
+    target, ramp = np.array([request.setpoint[name] for name in law.names]), request.ramp(law.names)
+    if ramp is None:
+        return target, settling
+    passive = reachable(law, request.setpoint, regulate=request.regulate).passive
+    start = np.array([passive[name] for name in law.names])
+    duration = settling + float(np.max(np.abs(target - start) / np.where(target > start, ramp.up, ramp.down)))
+    samples = max(round(duration / request.sample_time), 1)
+    return ramp.sequence(start, target, samples=samples, sample_time=request.sample_time), duration
 
 
 def _kalman(system: System, request: DesignRequest) -> GainObserver | None:

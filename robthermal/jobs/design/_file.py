@@ -20,6 +20,8 @@ _PI = ("v = proportional (r - y) + z, then the law gives I and v_achieved, then 
        "z <- z + sample_time integral (r - y) + (1 - exp(-sample_time/tracking_time)) (v_achieved - v). "
        "Start with z = v_achieved of the current that flows. y is what the module regulates: the reading of a sensor "
        "at this sample as it is, or the temperature of a lump, measured or the observer's estimate.")
+_RAMP = ("once per sample, before the controller: r <- r + min(max(target - r, -down sample_time), up sample_time). "
+         "Start with r = y, the measured value of what the module regulates.")
 _MARGIN_UNITS = {"gain": "-", "phase": "deg", "modulus": "-", "delay": "s", "crossover": "rad/s"}
 _OBSERVER = ("x <- A_d x + Gamma f + L (y - C x); y = reference + (reading - offset - reference)/gain; C x is x at the "
              "sensors' lumps; f = B w + modules + nonlinear links, w: heaters, then ambients. A module adds S x_hot I "
@@ -51,6 +53,7 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
                 "modules": {name: _module(result, i, name) for i, name in enumerate(result.law.names)}},
         "controller": {"equation": _PI, "bandwidth": {"value": result.bandwidth, "unit": "rad/s"},
                        "modules": gains, "sha256": gains_digest(gains, result.controller.sample_time)},
+        "setpoint_ramp": _ramp(result),
         "margins": result.margins.to_dict(), "margin_units": _MARGIN_UNITS, "margins_missed": list(result.missed),
         "observer": None if result.observer is None else _observer(system, result.observer),
         "linearity": None if result.collapse is None else {
@@ -59,6 +62,13 @@ def design_numbers(result: ControllerDesign) -> dict[str, Any]:
             "with_law": result.collapse.after, "limit_active": not result.collapse.outcome.ok},
         "made_by": dict(versions()),
     }
+
+
+def _ramp(result: ControllerDesign) -> dict[str, Any] | None:
+    ramp = result.request.ramp(result.law.names)
+    return None if ramp is None else {"equation": _RAMP, "modules": {
+        name: {"up": {"value": up, "unit": "K/s"}, "down": {"value": down, "unit": "K/s"}}
+        for name, up, down in zip(ramp.names, ramp.up, ramp.down, strict=True)}}
 
 
 def _module(result: ControllerDesign, i: int, name: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from ..claims import GateCode, machine_assumptions, required_claims
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import provenance, simulated_label, subtitle
 from ._claims import OBSERVER_RANGES
 from ._design import ControllerDesign
 from ._file import write_design_file
@@ -86,7 +86,9 @@ def design_report(result: ControllerDesign, files: tuple[Path, ...]) -> Report:
         Input files, for their hashes.
     """
     system = result.certification.system
-    return Report(title=f"Controller for {system.name}", subtitle=subtitle(system), label="",
+    return Report(title=f"Controller for {system.name}", subtitle=subtitle(system),
+                  label=simulated_label([system.name, *(file.name for file in files)]),
+                  kind="Controller design report",
                   claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),
                   first=(_step_section(result),), numbers=tuple(_numbers(result)),
                   provenance=provenance(files), generated=now(), gate=tuple(_reasons(result)), gates=_GATES,
@@ -111,8 +113,9 @@ def _summary(result: ControllerDesign) -> dict[str, Any]:
 def save_design(result: ControllerDesign, folder: Path) -> None:
     """Write design.json, with every number of the controller, and the exports that were asked for.
 
-    Law, controller and observer become law.c, controller.c, observer.c with functions law_step, controller_init, _heat
-    and _advance, observer_step, and the same as .h to include; .mat and .json hold their numbers. All have a test
+    Law, controller, observer and, where there is one, the ramp of the set-points become law.c, controller.c, observer.c
+    and ramp.c with functions law_step, controller_init, _heat and _advance, observer_step, ramp_step, and the same as
+    .h to include; .mat and .json hold their numbers. All have a test
     vector.
 
     Parameters
@@ -123,7 +126,8 @@ def save_design(result: ControllerDesign, folder: Path) -> None:
         Existing folder to write into.
     """
     write_design_file(result, folder / "design.json")
-    parts: dict[str, Any] = {"law": result.law, "controller": result.controller, "observer": result.observer}
+    parts: dict[str, Any] = {"law": result.law, "controller": result.controller, "observer": result.observer,
+                             "ramp": result.request.ramp(result.law.names)}
     endings = [ending for one in result.request.export for ending in _ENDINGS[one]]
     for name, part in parts.items():
         for ending in endings if part is not None else ():
@@ -215,18 +219,21 @@ def _controller_section(result: ControllerDesign) -> Section:
 
 
 def _step_section(result: ControllerDesign) -> Section:
+    rates = ", ".join(f"{name} {rate:.4g} K/s" for name, rate in (result.request.setpoint_ramp or {}).items())
+    way = "along a ramp" if rates else "after a step"
     with house_style():
         axes = result.loop.plot()
-        axes[0].set_title("")
+        axes[0].set_title("", loc="left")
         for limit in {*result.law.current_low, *result.law.current_high}:
             axes[1].axhline(limit, color="#888888", linestyle=":", linewidth=0.8)
-        figure = Figure.draw(axes[0].figure, alt="Temperatures and currents over time after a step to the set-points.",
+        figure = Figure.draw(axes[0].figure, alt=f"Temperatures and currents over time, {way} to the set-points.",
                              caption="Above: what is regulated (lines), set-points (dashed), and cold faces where "
                              "something else is regulated (dotted). Below: currents and their limits (dotted).")
     seen = "estimated from noisy readings" if result.observer else "taken as measured: the file has no sensors"
     text = (f"Simulated from rest at ambient temperature on the nonlinear model; the temperatures are {seen}. "
-            f"{result.loop.outcome.text}")
-    return Section("Step to the set-points", text, figures=(figure,), anchor="step")
+            f"{f'The set-points move no faster than {rates}. ' if rates else ''}{result.loop.outcome.text}")
+    title = "Ramp to the set-points" if rates else "Step to the set-points"
+    return Section(title, text, figures=(figure,), anchor="step")
 
 
 def _linearity_section(result: ControllerDesign) -> Section:

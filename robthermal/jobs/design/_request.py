@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..._celsius import ZERO_CELSIUS
-from ...design import RegulatedPoint, checked_margins, feedback_linearization, regulated_points
+from ...design import (
+    RegulatedPoint,
+    SetpointRamp,
+    checked_margins,
+    feedback_linearization,
+    regulated_points,
+    setpoint_ramp,
+)
 from ...errors import InputError
 from ...thermal import System, drivable_range
 from ..request import Method
@@ -46,6 +54,9 @@ class DesignRequest:
         Formats in which law, controller and observer are written too: "c", "mat", "json".
     parameters : dict
         {parameter name: (lower, upper)}: limits, claims and margins are for all of these too.
+    setpoint_ramp : dict
+        Module to the largest rate of its set-point, up and down [K/s], every module; default steps. Nothing that is
+        certified depends on it.
 
     Examples
     --------
@@ -67,6 +78,18 @@ class DesignRequest:
     margins: dict[str, float] | None = None
     export: tuple[str, ...] = ()
     parameters: dict[str, tuple[float, float]] | None = None
+    setpoint_ramp: dict[str, float] | None = None
+
+    def ramp(self, modules: Sequence[str]) -> SetpointRamp | None:
+        """Rates at which the set-points move; None where they step.
+
+        Parameters
+        ----------
+        modules : sequence of str
+            Modules, in the order of the controller.
+        """
+        given = self.setpoint_ramp
+        return None if given is None else setpoint_ramp({name: given[name] for name in modules})
 
     def points(self, system: System) -> dict[str, RegulatedPoint]:
         """What every module regulates.
@@ -98,7 +121,7 @@ class DesignRequest:
                              remedy="Add a [modules.NAME] table, or control its heaters directly.")
         self._refuse_cascade(system)
         for option, given in (("--setpoint", self.setpoint), ("--current", self.current or {}),
-                              ("--regulate", self.regulate or {})):
+                              ("--regulate", self.regulate or {}), ("--setpoint-ramp", self.setpoint_ramp or {})):
             unknown = [name for name in given if name not in system.modules]
             if unknown:
                 raise InputError(f"there is no module {unknown[0]!r}", where=option,
@@ -107,6 +130,11 @@ class DesignRequest:
         if missing:
             raise InputError(f"module {missing[0]!r} has no set-point", where="--setpoint",
                              expected="one for every module: " + ", ".join(system.modules))
+        unramped = [name for name in system.modules if name not in (self.setpoint_ramp or system.modules)]
+        if unramped:
+            raise InputError(f"module {unramped[0]!r} has no rate", where="--setpoint-ramp",
+                             expected="one for every module [K/s]: " + ", ".join(system.modules))
+        self.ramp(system.module_names)  # refuses rates that are not positive
         self._check_currents(system)
         low, high = self.temperature
         points = self.points(system)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..._checks import finite_number
 from ...design import checked_margins
 from ...errors import InputError
@@ -14,14 +16,16 @@ from ._request import FORMATS, DesignRequest
 
 Ranges = Mapping[str, tuple[float, float]]
 _SYNONYMS = {"matlab": "mat"}
-_KEYS = ("regulate", "setpoint", "bandwidth", "current", "sample_time", "sensors", "method", "margins", "export")
+_KEYS = ("regulate", "setpoint", "bandwidth", "current", "sample_time", "sensors", "method", "margins", "export",
+         "setpoint_ramp")
 
 
 def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: Sequence[str] = (),
                      ambient: Sequence[str] = (), temperature: tuple[float, float] | None = None,
                      bandwidth: float | None = None, sample_time: float = 1.0, sensors: str | None = None,
                      method: str = "energy", regulate: Sequence[str] = (), margins: Sequence[str] = (),
-                     export: str | None = None, parameters: Ranges | None = None) -> DesignRequest:
+                     export: str | None = None, parameters: Ranges | None = None,
+                     ramp: Sequence[str] = ()) -> DesignRequest:
     """Request from command-line values.
 
     Parameters
@@ -50,6 +54,8 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
         Formats, separated by commas: c, mat (or matlab), json.
     parameters : mapping, optional
         Ranges of uncertain parameters, as from `ranges_from_text`.
+    ramp : sequence of str
+        ``MODULE=RATE`` of its set-point [K/s]; default steps.
 
     Returns
     -------
@@ -75,7 +81,7 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
     request = DesignRequest(targets, limits, boxes.ambient, boxes.temperature, bandwidth, sample_time,
                             _sensors(system, sensors, sample_time), boxes.method, _regulate(regulate),
                             _margins(margins), formats((export or "").split(",") if export else ()),
-                            dict(parameters) if parameters else None)
+                            dict(parameters) if parameters else None, _rates(ramp))
     request.check(system)
     return request
 
@@ -89,8 +95,8 @@ def design_from_table(system: System, table: Mapping[str, Any], boxes: Boxes,
     system : System
         Whose names and temperature unit apply.
     table : mapping
-        Its keys: regulate, setpoint, bandwidth, current, sample_time, sensors, method, margins, export; set-points in
-        the unit of the system file.
+        Its keys: regulate, setpoint, bandwidth, current, sample_time, sensors, method, margins, export,
+        setpoint_ramp; set-points in the unit of the system file.
     boxes : Boxes
         Box of temperatures, ambients and set-points of [certify], which count where the table has none [K].
     parameters : mapping, optional
@@ -130,7 +136,9 @@ def design_from_table(system: System, table: Mapping[str, Any], boxes: Boxes,
         method=boxes_from_text(system, method=str(table.get("method", boxes.method))).method,
         regulate={name: str(point) for name, point in _table(table, "regulate").items()} or None,
         margins=margins or None, export=formats(_texts(table.get("export", ()), "export")),
-        parameters=dict(parameters) if parameters else None)
+        parameters=dict(parameters) if parameters else None,
+        setpoint_ramp={name: _number(value, f"setpoint_ramp.{name}")
+                       for name, value in _table(table, "setpoint_ramp").items()} or None)
     request.check(system)
     return request
 
@@ -169,6 +177,21 @@ def _regulate(texts: Sequence[str]) -> dict[str, str] | None:
             raise InputError(f"{text!r}", where="--regulate", expected="MODULE=NAME, every module at most once, for "
                              "example m1=T_stage")
         found[module] = name
+    return found or None
+
+
+def _rates(texts: Sequence[str]) -> dict[str, float] | None:
+    found: dict[str, float] = {}
+    for text in texts:
+        module, _, value = text.partition("=")
+        try:
+            rate = float(value)
+        except ValueError:
+            rate = float("nan")
+        if module in found or not (module and np.isfinite(rate)):
+            raise InputError(f"{text!r}", where="--setpoint-ramp", expected="MODULE=RATE in K/s, every module at most "
+                             "once, for example m1=0.02")
+        found[module] = rate
     return found or None
 
 

@@ -3,18 +3,8 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found, Gap
-from ...thermal import parameter_in_words
 from ._change_words import change_in_words, nothing_changed
-
-_PATHS = {"missing_link": "a heat path between {0} and {1}", "missing_ambient_link": "a heat path from {0} to {1}",
-          "radiation": "radiation from {0} to {1}", "natural_convection": "natural convection from {0} to {1}",
-          "hidden_mass": "a mass that hangs on {0}", "sensor_lag": "the lag of sensor {0}",
-          "heat_source": "a constant heat into {0}", "sensor_offset": "an offset of sensor {0}",
-          "sensor_gain": "a gain error of sensor {0}", "input_lag": "the lag of input {0}",
-          "input_delay": "the delay of input {0}", "periodic_load": "a periodic heat into {0}",
-          "input_feedthrough": "a share of the heat of {0} that goes to {1}",
-          "heater_power_slope": "that the power of {0} depends on its temperature",
-          "conductance_step": "a change of the conductance {0} during the record"}
+from ._effect_words import in_words, labels_in_words
 
 
 def answer_sentence(found: Diagnosis) -> str:
@@ -30,7 +20,7 @@ def answer_sentence(found: Diagnosis) -> str:
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
             f"The model lacks {accepted_in_words(found)}")
         falls = f"With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
-        return " ".join([f"{said}. {falls}", *found.caveats])
+        return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])
     if found.verdict == "consistent":
         if found.reference:
             return nothing_changed(found)
@@ -80,20 +70,3 @@ def _accepted(effect: Found, changed: bool) -> str:
     if changed and effect.effect == "parameter_change":
         return change_in_words(effect)
     return in_words(effect.effect, effect.where)
-
-
-def in_words(name: str, where: tuple[str, ...]) -> str:
-    """An effect at its place.
-
-    Parameters
-    ----------
-    name : str
-        Of the catalog, or your own.
-    where : tuple of str
-        Parts of the system it acts on.
-    """
-    if name == "parameter_change":
-        return f"a change of {' and '.join(map(parameter_in_words, where))}"
-    if name in _PATHS:
-        return _PATHS[name].format(*where)
-    return f"{name.replace('_', ' ')} at {', '.join(where)}"

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from ..._digits import probability
 from ...diagnosis import Diagnosis
 from ...report import Claim
-from ._answer import accepted_in_words, in_words
+from ._answer import accepted_in_words
 from ._diagnose import Diagnosed
+from ._effect_words import in_words
 
 _SENTENCE = {
     "named": "One set of effects explains the records: {names}.",
@@ -44,7 +45,8 @@ def diagnosis_claims(result: Diagnosed) -> Iterator[Claim]:
     names = accepted_in_words(found)
     ruled_out = ", ".join(in_words(one.effect.name, one.where) for one in found.ruled_out)
     said = _SENTENCE if found.reference is None else _CHANGED
-    yield _claim(f"Verdict: {found.verdict}", said[found.verdict].format(names=names), found.outcome.ok,
+    title = f"Verdict: {found.verdict.replace('_', ' ')}"
+    yield _claim(title, said[found.verdict].format(names=names), found.outcome.ok,
                  _WHY_NOT.get(found.verdict, found.outcome.text), _records(result, "train"), _margin(found),
                  _HOW_CHANGED if found.reference else
                  "An effect is accepted with p < 0.01 for all candidates together (F test) and ΔBIC > 10; effects "

@@ -19,7 +19,7 @@ from ..evidence import write_report
 from ..folder import output_folder
 from ..network import network_section
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import provenance, simulated_label, subtitle
 from ._answer import answer_sentence, number_that_matters
 from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims
@@ -27,7 +27,7 @@ from ._diagnose import Diagnosed, Residuals, ResponseResiduals
 from ._ranking import NOT_NEEDED, ranking
 from ._refinement_section import refinement_section
 
-_DRAWN = 6  # sensors: as many as there are colors
+_DRAWN = 6  # sensors: more curves are not told apart
 
 
 def write_diagnosis(result: Diagnosed, out: str | Path) -> Report:
@@ -80,7 +80,9 @@ def diagnosis_report(result: Diagnosed) -> Report:
     """
     found = result.diagnosis
     remarks = tuple(_remarks(found))
-    return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system), label="",
+    return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system),
+                  label=simulated_label([found.system.name, *(one.name for one in result.residuals),
+                                         *(file.name for file in result.files)]),
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
                   generated=now(), answer=found.verdict.upper(), headline=answer_sentence(found),

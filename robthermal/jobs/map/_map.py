@@ -20,7 +20,7 @@ from ..claims import Checked, machine_assumptions, required_claims
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import provenance, simulated_label, subtitle
 from ..request import Method, boxes_from_text, in_kelvin
 
 _MOST = 2000  # conditions: hours beyond
@@ -183,7 +183,8 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
         for key, title, certificate in (("never_left", f"Box with {box.current:.4g} A is never left", box.invariance),
                                         ("contraction", f"Contraction with {box.current:.4g} A", box.contraction)))
     data = in_unit(result.data, system.temperature_unit)
-    report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system), label="",
+    report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system),
+                    label=simulated_label([system.name, *(file.name for file in files)]),
                     claims=required_claims(checked), sections=(), first=(_section(result, data),),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
                     generated=now())

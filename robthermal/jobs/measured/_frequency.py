@@ -26,7 +26,7 @@ from ...identify import (
 from ...signals import Excitation, Record, multisines
 from ...thermal import System
 from ._import import ReadTable, read_files
-from ._reference import closed_loop_response, noisy_input_response, with_reference
+from ._reference import beside_reference, closed_loop_response, noisy_input_response, with_reference
 
 Array = NDArray[np.float64]
 
@@ -142,7 +142,8 @@ def _read(paths: Sequence[Path], system: System | None, inputs: Sequence[str], o
     references: list[Array] = []
     for path in paths:
         how = (*tables, *reading.get(path, ()))
-        found = _parts(path, system, inputs, outputs, how)
+        with beside_reference(reference):
+            found = _parts(path, system, inputs, outputs, how)
         if reference:
             pairs = list(with_reference(path, found, reference, how))
             found = [record for record, _ in pairs]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,33 @@ from ._import import ReadTable
 
 Array = NDArray[np.float64]
 _SHORTEST = 2  # samples of a part
+
+
+@contextmanager
+def beside_reference(names: Sequence[str]) -> Iterator[None]:
+    """Notes of reading the plant, without the columns that are read as reference: only to the plant they are unknown.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Columns of the reference.
+    """
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        yield
+    for one in said:
+        text = _without(str(one.message), names)
+        if text:
+            warnings.warn(text, one.category, stacklevel=3)
+
+
+def _without(note: str, names: Sequence[str]) -> str:
+    """A note on unknown columns without some of them; empty where none is left, any other note as it is."""
+    file, unknown, columns = note.partition("unknown columns, not read: ")
+    if not unknown:
+        return note
+    left = [one for one in columns.split(", ") if re.sub(r"\s*[\[(].*", "", one.strip("'\"")) not in names]
+    return f"{file}{unknown}{', '.join(left)}" if left else ""
 
 
 def with_reference(path: Path, records: Sequence[Record], names: Sequence[str],

@@ -62,6 +62,7 @@ class DesignTable(Table):
     method: Literal["energy", "sum", "max", "lyapunov"] = "energy"
     margins: dict[str, Number] = {}
     export: list[Literal["c", "mat", "json"]] = []
+    setpoint_ramp: dict[str, Positive] = {}
 
 
 class CoupleTable(Table):

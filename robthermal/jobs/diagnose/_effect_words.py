@@ -1,0 +1,71 @@
+"""Effects of the catalog at their places, in words that follow "the model lacks …"."""
+
+from __future__ import annotations
+
+import re
+
+from ...thermal import parameter_in_words
+
+WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
+    "ambient_gradient": "an ambient at {0} that is warmer or colder than the measured one",
+    "condensation": "condensation on {0}",
+    "conductance_slope": "the slope of the conductance of {0} over temperature",
+    "conductance_step": "a change of the conductance {0} during the record",
+    "heat_source": "a constant heat into {0}",
+    "heater_power_slope": "that the power of {0} depends on its temperature",
+    "hidden_mass": "a mass that hangs on {0}",
+    "hysteresis": "a late extra heat of {0}, of the sign of its current",
+    "input_delay": "the delay of input {0}",
+    "input_feedthrough": "a share of the heat of {0} that goes to {1}",
+    "input_gain": "a gain error of input {0}",
+    "input_lag": "the lag of input {0}",
+    "input_offset": "an offset of input {0}",
+    "input_saturation": "the saturation of input {0}",
+    "joule_split": "an uneven split of the Joule heat of {0}",
+    "lead_heating": "heat of the leads of {1} into {0}",
+    "missing_ambient_link": "a heat path from {0} to {1}",
+    "missing_link": "a heat path between {0} and {1}",
+    "natural_convection": "natural convection from {0} to {1}",
+    "periodic_load": "a periodic heat into {0}",
+    "radiation": "radiation from {0} to {1}",
+    "resistance_slope": "the slope of the resistance of {0} over temperature",
+    "seebeck_slope": "the slope of the Seebeck coefficient of {0} over temperature",
+    "sensor_gain": "a gain error of sensor {0}",
+    "sensor_lag": "the lag of sensor {0}",
+    "sensor_offset": "an offset of sensor {0}",
+    "sensor_self_heating": "self-heating of sensor {0}",
+    "thomson": "the Thomson heat of {0}",
+}
+
+
+def in_words(name: str, where: tuple[str, ...]) -> str:
+    """An effect at its place.
+
+    Parameters
+    ----------
+    name : str
+        Of the catalog, or your own.
+    where : tuple of str
+        Parts of the system it acts on.
+    """
+    if name == "parameter_change":
+        return f"a change of {' and '.join(map(parameter_in_words, where))}"
+    if name in WORDS:
+        return WORDS[name].format(*where)
+    return f"{name.replace('_', ' ')} at {', '.join(where)}"
+
+
+def labels_in_words(text: str) -> str:
+    """A sentence with the labels of tables in it, for example sensor_lag(T6), written out.
+
+    Parameters
+    ----------
+    text : str
+        Sentence of a diagnosis.
+    """
+    return re.sub(r"\b([a-z]+(?:_[a-z]+)*)\(([^()]+)\)", _written_out, text)
+
+
+def _written_out(label: re.Match[str]) -> str:
+    name, where = label.group(1), tuple(label.group(2).split(", "))
+    return in_words(name, where) if name in WORDS else label.group()
