@@ -21,6 +21,7 @@ import robthermal as rt
 EXAMPLES = """calibration.calibrate calibration.convection_law calibration.join_models calibration.module_batch
 certify.gains certify.hinf certify.largest_current certify.limit_map certify.runaway certify.runaway_free
 certify.thesis_bounds certify.usable_current coupling.CoprimeFactors coupling.FixedPoint coupling.Joint
+coupling.MatrixFilters
 coupling.MuBound coupling.Simulation coupling.Spectra coupling.destabilizing coupling.normalized coupling.worst_case
 design.constant_gain design.disturbance_observer design.feed_forward design.linear_controller design.load_controller
 design.place_sensors design.reachable design.simulate_loop design.state_feedback design.step_response_linearity

@@ -31,10 +31,11 @@ SURFACE = {
         observer peak regulated runaway runaway_free scheduled stability thesis_bounds usable_current
     """,
     "coupling": """
-        NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MuBound Norm NormalizedFactors
-        Performance
+        NORMS CoprimeFactors CouplingCode Destabilizing Filters FixedPoint Joint MatrixFilters MuBound Norm
+        NormalizedFactors Performance
         ScaledPath Simulation Spectra Uncertainty WorstCase coprime destabilizing discretize dual_youla evaluate
-        inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize worst_case
+        evaluate_matrix inner_factor joint mu mu_bound normalized overbound simulate spectra synthesize
+        synthesize_matrix worst_case
     """,
     "design": """
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DESIGN_FORMAT

@@ -24,6 +24,9 @@ from .factors import normalized as normalized
 from .factors import overbound as overbound
 from .implementation import FixedPoint as FixedPoint
 from .implementation import ScaledPath as ScaledPath
+from .matrix import MatrixFilters as MatrixFilters
+from .matrix import evaluate_matrix as evaluate_matrix
+from .matrix import synthesize_matrix as synthesize_matrix
 from .mu_bounds import MuBound as MuBound
 from .mu_bounds import mu as mu
 from .mu_bounds import mu_bound as mu_bound
@@ -32,7 +35,8 @@ from .problem import Norm as Norm
 from .problem import Performance as Performance
 from .synthesis import synthesize as synthesize
 
-__all__ = ["NORMS", "CoprimeFactors", "CouplingCode", "Destabilizing", "Filters", "FixedPoint", "Joint", "MuBound",
-           "Norm", "NormalizedFactors", "Performance", "ScaledPath", "Simulation", "Spectra", "Uncertainty",
-           "WorstCase", "coprime", "destabilizing", "discretize", "dual_youla", "evaluate", "inner_factor", "joint",
-           "mu", "mu_bound", "normalized", "overbound", "simulate", "spectra", "synthesize", "worst_case"]
+__all__ = ["NORMS", "CoprimeFactors", "CouplingCode", "Destabilizing", "Filters", "FixedPoint", "Joint",
+           "MatrixFilters", "MuBound", "Norm", "NormalizedFactors", "Performance", "ScaledPath", "Simulation",
+           "Spectra", "Uncertainty", "WorstCase", "coprime", "destabilizing", "discretize", "dual_youla", "evaluate",
+           "evaluate_matrix", "inner_factor", "joint", "mu", "mu_bound", "normalized", "overbound", "simulate",
+           "spectra", "synthesize", "synthesize_matrix", "worst_case"]

@@ -3,11 +3,14 @@
 from ._evaluate import evaluate as evaluate
 from ._evaluate import finish as finish
 from ._evaluate import refused as refused
+from ._evaluate import verdict as verdict
 from ._filters import Filters as Filters
 from ._joint import Joint as Joint
 from ._joint import joint as joint
 from ._sampled import discretize as discretize
 from ._spectra import Spectra as Spectra
+from ._spectra import cumulative as cumulative
 from ._spectra import spectra as spectra
 
-__all__ = ["Filters", "Joint", "Spectra", "discretize", "evaluate", "finish", "joint", "refused", "spectra"]
+__all__ = ["Filters", "Joint", "Spectra", "cumulative", "discretize", "evaluate", "finish", "joint", "refused",
+           "spectra", "verdict"]

@@ -103,8 +103,8 @@ def finish(problem: Problem, X_hat: control.StateSpace, Y_hat: control.StateSpac
     controller_stable = steady.stable(parts.coupling_matrix, problem.dt, "stability of the controller") and prove
     proofs.certificates |= steady.certificates
     robustly = nominal and norms["robust"] < 1.0
-    broken = _broken(asked or {}, {**norms, "msd": performance.msd_growth})
-    outcome = _outcome(problem, nominal, robustly, broken, proofs)
+    outcome = verdict(problem.uncertainty is not None, nominal, robustly, asked or {},
+                      {**norms, "msd": performance.msd_growth}, proofs)
     row = coupled(problem, parts.X, parts.Y, "S")
     return Filters(
         X=parts.X, Y=parts.Y, X_hat=X_hat, Y_hat=Y_hat, Z1=realize(problem.one.Z), Z2=realize(problem.two.Z),
@@ -169,15 +169,30 @@ def _broken(asked: Mapping[str, float], reached: Mapping[str, float]) -> list[st
             if not reached[name] <= bound]
 
 
-def _outcome(problem: Problem, nominal: bool, robustly: bool, broken: list[str], proofs: Proofs) -> Outcome:
+def verdict(measured: bool, nominal: bool, robustly: bool, asked: Mapping[str, float], reached: Mapping[str, float],
+            proofs: Proofs) -> Outcome:
+    """What holds of a coupling, or why not.
+
+    Parameters
+    ----------
+    measured : bool
+        Whether there is an uncertainty.
+    nominal, robustly : bool
+        Whether stability is proven for the model, and for every plant under the envelope.
+    asked, reached : mapping
+        Upper bounds that were asked for, and what was proven.
+    proofs : Proofs
+        With what could not be proven.
+    """
+    broken = _broken(asked, reached)
     if not proofs.prove:
         return CouplingCode.NOT_PROVEN.outcome("Numbers only: nothing was proven.", remedy="")
     if not nominal:
         return CouplingCode.NOT_STABLE.outcome(f"Internal stability is not proven: {'; '.join(proofs.failed)}.")
-    if problem.uncertainty is not None and not robustly:
+    if measured and not robustly:
         return CouplingCode.NOT_ROBUST.outcome()
     if broken:
         return CouplingCode.LIMIT.outcome(f"Proven stable, but not within what was asked: {'; '.join(broken)}.",
                                           remedy="")
-    code = CouplingCode.ROBUST if problem.uncertainty is not None else CouplingCode.NOMINAL
+    code = CouplingCode.ROBUST if measured else CouplingCode.NOMINAL
     return code.outcome(remedy=f"Not proven: {'; '.join(proofs.failed)}." if proofs.failed else None)

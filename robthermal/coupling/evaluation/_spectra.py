@@ -110,12 +110,20 @@ def spectra(filters: Filters, points: int = 1000) -> Spectra:
     density = np.sqrt(2 * (problem.dt or 1.0))  # one-sided; discrete noise of variance 1 has the two-sided density dt
     before, after = (density * np.linalg.norm(part, axis=0) for part in (noise, factor * noise))
     hertz = omega / (2 * np.pi)
-    return Spectra(hertz, loops, factor * loops, factor, before, after, _cumulative(hertz, before),
-                   _cumulative(hertz, after), *_robust(problem, filters, omega), filters.norms["robust"])
+    return Spectra(hertz, loops, factor * loops, factor, before, after, cumulative(hertz, before),
+                   cumulative(hertz, after), *_robust(problem, filters, omega), filters.norms["robust"])
 
 
-def _cumulative(hertz: Array, density: Array) -> Array:
-    """Integral of density² from zero; flat below the first frequency, trapezoids above it."""
+def cumulative(hertz: Array, density: Array) -> Array:
+    """Integral of density² from zero; flat below the first frequency, trapezoids above it.
+
+    Parameters
+    ----------
+    hertz : ndarray, shape (n_f,)
+        Frequencies of the density [Hz].
+    density : ndarray, shape (n_f,)
+        Amplitude spectral density [m/√Hz].
+    """
     power = density**2
     steps = 0.5 * (power[1:] + power[:-1]) * np.diff(hertz)
     return np.cumsum(np.concatenate([[power[0] * hertz[0]], steps]))

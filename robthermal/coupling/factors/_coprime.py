@@ -42,6 +42,11 @@ class CoprimeFactors:
     loops: tuple[Loop, ...]
 
     @property
+    def dt(self) -> float:
+        """Sample time [s]; 0 in continuous time."""
+        return self.loops[0].P.dt
+
+    @property
     def Np(self) -> control.StateSpace:
         """Numerator Z of the plant."""
         return self.Z

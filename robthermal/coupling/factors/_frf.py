@@ -24,9 +24,9 @@ class MeasuredPlants:
     ----------
     omega : ndarray, shape (n_f,)
         Frequencies of all plants [rad/s].
-    response : ndarray, shape (n_plants, n, n, n_f)
+    response : ndarray, shape (n_plants, p, m, n_f)
         Measured values; 0 where the data do not determine them, and the circle is infinite.
-    radius : ndarray, shape (n_plants, n, n, n_f)
+    radius : ndarray, shape (n_plants, p, m, n_f)
         Radii of circles that hold the true values of all entries, frequencies and plants at once; 0 without covariance.
     covered : ndarray of bool, shape (n_plants,)
         Whether the plant has a covariance.
@@ -38,7 +38,8 @@ class MeasuredPlants:
     covered: Array
 
 
-def read_plants(plants: Measured, dt: float, where: str, size: int = 2, confidence: float = 0.95) -> MeasuredPlants:
+def read_plants(plants: Measured, dt: float, where: str, size: int | tuple[int, int] = 2, confidence: float = 0.95
+                ) -> MeasuredPlants:
     """Check measured plants, and draw the circles around them.
 
     Parameters
@@ -49,19 +50,21 @@ def read_plants(plants: Measured, dt: float, where: str, size: int = 2, confiden
         Sample time of the loop [s].
     where : str
         Name of the argument.
-    size : int
-        Inputs and outputs n that they must have.
+    size : int or tuple of int
+        Inputs and outputs n that they must have; or outputs and inputs.
     confidence : float
         Probability that all circles hold the true values at once: every finite one of N circles has 1 - (1 - p)/N
         (Bonferroni's inequality, whatever their correlation).
     """
     listed = list(plants) if isinstance(plants, Sequence) else [plants]
+    shape = (size, size) if isinstance(size, int) else size
     if not listed:
-        raise InputError("no measured plant", where=where, expected=f"at least one {size}x{size} frequency response")
+        raise InputError("no measured plant", where=where,
+                         expected=f"at least one {shape[0]}x{shape[1]} frequency response")
     if isinstance(confidence, bool) or not isinstance(confidence, int | float) or not 0.0 < confidence < 1.0:
         raise InputError(f"confidence is {confidence!r}", where="confidence", expected="a number between 0 and 1")
     covered = [isinstance(plant, FrequencyResponse) and plant.has_covariance for plant in listed]
-    read = [_one(plant, dt, label(where, k, len(listed)), size, known)
+    read = [_one(plant, dt, label(where, k, len(listed)), shape, known)
             for k, (plant, known) in enumerate(zip(listed, covered, strict=True))]
     omega = read[0][0]
     for k, (other, _, _) in enumerate(read):
@@ -97,7 +100,7 @@ def label(where: str, index: int, count: int) -> str:
     return where if count == 1 else f"{where}[{index}]"
 
 
-def _one(plant: Measured, dt: float, where: str, size: int, covered: bool) -> tuple[Array, Array, Array]:
+def _one(plant: Measured, dt: float, where: str, shape: tuple[int, int], covered: bool) -> tuple[Array, Array, Array]:
     """Frequencies [rad/s] in increasing order, values there, and the order."""
     if isinstance(plant, FrequencyResponse):
         omega, response = 2 * np.pi * plant.frequencies, plant.response
@@ -109,8 +112,9 @@ def _one(plant: Measured, dt: float, where: str, size: int, covered: bool) -> tu
     else:
         raise InputError(f"{type(plant).__name__} is not a frequency response", where=where,
                          expected="a control.FrequencyResponseData or an rt.identify frequency response")
-    if response.shape[:2] != (size, size):
-        raise InputError(f"{response.shape[0]}x{response.shape[1]} response", where=where, expected=f"{size}x{size}")
+    if response.shape[:2] != shape:
+        raise InputError(f"{response.shape[0]}x{response.shape[1]} response", where=where,
+                         expected=f"{shape[0]}x{shape[1]}")
     order = np.argsort(omega)
     omega, response = omega[order], response[:, :, order]
     _check_grid(omega, np.where(np.isnan(response), 0.0, response) if covered else response, dt, where)

@@ -8,7 +8,8 @@ import scipy
 from ..._arrays import Array
 from ..._control import control
 from ...errors import InputError
-from ..systems import LTI, Zpk, on_boundary, realize, sample_time_of, stable, zpk_of
+from ..systems import LTI, Zpk, matrix_of, on_boundary, realize, sample_time_of, stable, zpk_of
+from ._inner_matrix import inner_pair
 
 _FASTER = 10.0  # default cut-off over the fastest pole or zero
 _SAME_ZERO = 1e-6  # how well a given Z must hold a wrong-side zero of P
@@ -22,7 +23,7 @@ def inner_factor(P: LTI, cutoff: float | None = None) -> tuple[control.StateSpac
     Parameters
     ----------
     P : StateSpace or TransferFunction
-        Plant, one input and one output.
+        Plant: one input and one output, or a state space of several (then by a Riccati equation).
     cutoff : float, optional
         Continuous time: corner of the Butterworth low-pass of order "relative degree" in Z [rad/s].
         Default: ten times the fastest pole or zero of P.
@@ -32,7 +33,7 @@ def inner_factor(P: LTI, cutoff: float | None = None) -> tuple[control.StateSpac
     Z : StateSpace
         Stable; \\|Z\\| = 1 at every frequency (continuous time with a relative degree: below the cut-off).
     Q : StateSpace
-        Z / P, stable and proper.
+        Z / P, stable and proper; of several channels P Q = Z, with Z inner from the left.
 
     Raises
     ------
@@ -49,6 +50,8 @@ def inner_factor(P: LTI, cutoff: float | None = None) -> tuple[control.StateSpac
     >>> bool(abs(abs(Z(0.7j)) - 1) < 1e-12), bool(abs(Q(0.7j) - (0.7j + 3) / (0.7j + 2)) < 1e-12)
     (True, True)
     """
+    if isinstance(P, control.StateSpace) and (P.ninputs, P.noutputs) != (1, 1):
+        return inner_pair(matrix_of(P, "P", sample_time_of({"P": P})), "P", cutoff)
     plant = zpk_of(P, "P", sample_time_of({"P": P}))
     Z = inner_zpk(plant, "P", cutoff)
     return realize(Z), realize(inverse_times(plant, Z, "Z", "P"))

@@ -53,7 +53,7 @@ def overbound(uncertainty: Uncertainty, row: int, column: int, order: int = 8) -
         raise InputError(f"entry ({row}, {column})", where="row, column", expected="0 or 1 each")
     if not isinstance(order, int) or order < 1:
         raise InputError(f"{order!r}", where="order", expected="a positive whole number")
-    dt, envelope = uncertainty.factors.loops[0].P.dt, uncertainty.envelope[row, column]
+    dt, envelope = uncertainty.factors.dt, uncertainty.envelope[row, column]
     if not np.any(envelope > 0):
         raise InputError(f"entry ({row}, {column}) of the envelope is zero", where="uncertainty",
                          expected="an entry with uncertainty")

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array
 from ...errors import InputError
 from ..systems import natural
-from ._coprime import CoprimeFactors, coprime
+from ._coprime import CoprimeFactors
 from ._frf import Measured, MeasuredPlants, label, read_plants
-from ._loop import Loop
+from ._matrix_factors import MatrixFactors
 from ._winding import MeasuredLoop, expect_beyond_crossover, expect_joined, undecided
 
 _RESONANT = 1 / np.sqrt(2)  # damping ratio below which a mode has a peak
@@ -34,7 +34,7 @@ class Uncertainty:
         Delta_p of each measured plant (complex).
     envelope : ndarray, shape (2, 2, n_f)
         Largest magnitude over the plants.
-    factors : CoprimeFactors
+    factors : CoprimeFactors or MatrixFactors
         Of the model and the controllers.
     radius : ndarray, shape (n_plants, 2, 2, n_f), optional
         What Delta_p can move by when the measured plant moves within its circles, which hold the true values of all
@@ -62,7 +62,7 @@ class Uncertainty:
     omega: Array
     samples: Array
     envelope: Array
-    factors: CoprimeFactors
+    factors: CoprimeFactors | MatrixFactors
     radius: Array | None = None
     confidence: float | None = None
     left_out: Array = field(default_factory=lambda: np.zeros(0))
@@ -114,12 +114,13 @@ class Uncertainty:
 
         Returns
         -------
-        ndarray of matplotlib axes, shape (2, 2)
+        ndarray of matplotlib axes, shape (2, 2); of matrices, one for every entry
         """
         import matplotlib.pyplot as plt
 
-        axes: Any = plt.subplots(2, 2, sharex=True, squeeze=False, layout="constrained")[1]
-        for row, column in np.ndindex(2, 2):
+        rows, columns = self.envelope.shape[:2]
+        axes: Any = plt.subplots(rows, columns, sharex=True, squeeze=False, layout="constrained")[1]
+        for row, column in np.ndindex(rows, columns):
             ax = axes[row, column]
             if np.any(self.envelope[row, column]):
                 ax.loglog(self.omega / (2 * np.pi), np.abs(self.samples[:, row, column]).T, color="0.7", linewidth=0.8)
@@ -130,44 +131,6 @@ class Uncertainty:
             ax.set_ylabel("magnitude [-]")
             ax.set_xlabel("frequency [Hz]")
         return axes
-
-
-def dual_youla(P_frf: Measured, P0: Any, K0: Any, *, confidence: float = 0.95,
-               measured_in_closed_loop: bool = False) -> Uncertainty:
-    """Delta_p = (Dk + P_frf Nk)⁻¹ (P_frf - P0) Dp of measured plants, Evers (6.21) corrected.
-
-    Parameters
-    ----------
-    P_frf : 2x2 frequency response, or list of them
-        Measured plants: python-control FRD [rad/s] or the result of rt.identify [Hz], on one frequency grid.
-    P0, K0 : 2x2 StateSpace or TransferFunction, or pairs
-        Model and controllers, diagonal.
-    confidence : float
-        Probability that all true values are in the confidence circles at once, for responses with covariance.
-    measured_in_closed_loop : bool
-        Whether the plants were measured while K0 controlled them and stayed bounded: then K0 stabilizes them, and no
-        encirclement is counted.
-
-    Returns
-    -------
-    Uncertainty
-        Samples and envelope at the frequencies that are decided; see the documentation, "Coupling".
-
-    Raises
-    ------
-    InputError
-        For an unstable nominal loop, a grid too coarse for a resonance of P0 or not covering it, a measured plant
-        that K0 does not stabilize, or of which its confidence set does not tell, NaN or wrong shapes.
-
-    Examples
-    --------
-    See :class:`Uncertainty`.
-
-    >>> import robthermal as rt
-    >>> rt.coupling.dual_youla.__name__
-    'dual_youla'
-    """
-    return from_factors(P_frf, coprime(P0, K0), "P_frf", confidence, measured_in_closed_loop)
 
 
 def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confidence: float = 0.95,
@@ -193,11 +156,11 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confiden
     P, radius = (np.moveaxis(part, -1, 1) for part in (measured.response, measured.radius))  # (n_plants, n_f, 2, 2)
     left = np.linalg.inv(diag["Dk"] + P @ diag["Nk"])
     samples = left @ (P - diag["P0"]) @ diag["Dp"]
-    loop = _loop_change(left, radius, diag)
-    first = _first_decided(np.any(np.isnan(loop), axis=(0, 2, 3)), measured, where)
+    loop = loop_change(left, radius, diag)
+    first = first_decided(np.any(np.isnan(loop), axis=(0, 2, 3)), measured, where)
     omega, out = measured.omega[first:], measured.omega[:first]
     for number, one in enumerate(loops, 1):
-        _expect_resolved(omega, one, number, where)
+        expect_grid(omega, one.P.poles, one.P.dt, number, where)
     if not measured_in_closed_loop:
         if first:
             expect_joined(loops, out, omega[0], where)
@@ -209,7 +172,8 @@ def from_factors(plants: Measured, factors: CoprimeFactors, where: str, confiden
     samples, radius, loop = samples[:, first:], radius[:, first:], loop[:, first:]
     circles = None
     if measured.covered.any():
-        bound = _circles(left[:, first:], radius, loop, {name: part[first:] for name, part in diag.items()}, samples)
+        kept = {name: part[first:] for name, part in diag.items()}
+        bound = circle_bound(left[:, first:], radius, loop, kept, samples)
         circles = np.moveaxis(bound, 1, -1)
     samples = np.moveaxis(samples, 1, -1)
     return Uncertainty(omega, samples, np.max(np.abs(samples), axis=0), factors, circles,
@@ -227,7 +191,7 @@ def _diagonals(factors: CoprimeFactors, omega: Array, where: str) -> dict[str, A
     return {name: np.moveaxis(value[:, None, :] * unit, -1, 0) for name, value in f.items()}
 
 
-def _loop_change(left: Array, radius: Array, diag: dict[str, Array]) -> Array:
+def loop_change(left: Array, radius: Array, diag: dict[str, Array]) -> Array:
     """Bound |L| r |Nk| of L dP Nk, L = (Dk + P Nk)⁻¹, for every plant in the circles; NaN where a bin is undecided.
 
     det(I + (P + dP) K0) = det(I + P K0) det(I + L dP Nk), which is not zero if the bound's spectral radius is below 1.
@@ -238,7 +202,7 @@ def _loop_change(left: Array, radius: Array, diag: dict[str, Array]) -> Array:
     return np.where(known[:, :, None, None], bound, np.nan)
 
 
-def _first_decided(undecided_bins: Array, measured: MeasuredPlants, where: str) -> int:
+def first_decided(undecided_bins: Array, measured: MeasuredPlants, where: str) -> int:
     """Place of the first decided bin; undecided ones above it are refused, above the last decided one too.
 
     Below, the relative error of a model is the smaller the lower the frequency, up to drift; above, it grows with every
@@ -277,7 +241,7 @@ def _ratios(P: Array, loop: Array, diag: dict[str, Array]) -> tuple[Array, Array
     return (np.linalg.det(measured) / np.linalg.det(model))[None], swing[None]
 
 
-def _circles(left: Array, radius: Array, loop: Array, diag: dict[str, Array], samples: Array) -> Array:
+def circle_bound(left: Array, radius: Array, loop: Array, diag: dict[str, Array], samples: Array) -> Array:
     """Bound of the change of Delta_p for every |dP| <= radius, not to first order only.
 
     The change is (I + L dP Nk)⁻¹ L dP (Dp - Nk Delta) with L = (Dk + P Nk)⁻¹, exactly; entry by entry the inverse is
@@ -287,10 +251,24 @@ def _circles(left: Array, radius: Array, loop: Array, diag: dict[str, Array], sa
     return np.linalg.solve(np.eye(len(loop[0, 0])) - loop, size @ np.abs(diag["Dp"] - diag["Nk"] @ samples))
 
 
-def _expect_resolved(omega: Array, loop: Loop, number: int, where: str) -> None:
-    """Refuse a grid that steps over a resonance of the model."""
-    modes = natural(loop.P.poles, loop.P.dt)
-    nyquist = np.pi / loop.P.dt if loop.P.dt else np.inf
+def expect_grid(omega: Array, poles: Array, dt: float, number: int, where: str) -> None:
+    """Refuse a grid that steps over a resonance of the model.
+
+    Parameters
+    ----------
+    omega : ndarray
+        Frequencies of the measurement [rad/s].
+    poles : ndarray of complex
+        Poles of the plant.
+    dt : float
+        Sample time [s]; 0 in continuous time.
+    number : int
+        Of the plant, for messages.
+    where : str
+        Name of the argument, for messages.
+    """
+    modes = natural(poles, dt)
+    nyquist = np.pi / dt if dt else np.inf
     for mode in modes[(modes.imag > 0) & (modes.imag < 0.999 * nyquist)]:
         size, damping = abs(mode), -mode.real / abs(mode)
         if damping >= _RESONANT or size >= nyquist:

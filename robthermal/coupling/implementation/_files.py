@@ -16,18 +16,19 @@ from ._sections import sections
 
 if TYPE_CHECKING:
     from ..evaluation import Filters
+    from ..matrix import MatrixFilters
 
 FORMAT = "robthermal-coupling/1"
 _SYSTEMS = ("X", "Y", "X_hat", "Y_hat", "Z1", "Z2", "X_input", "Y_input", "controller")
 _PERFORMANCE = ("ma_before", "ma_after", "msd_before", "msd_after")
 
 
-def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> dict[str, Any]:
+def document(filters: Filters | MatrixFilters, name: str, remarks: Sequence[Outcome] = ()) -> dict[str, Any]:
     """Content of coupling.json; numbers that are not finite become null.
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         What is written.
     name : str
         Name of the design.
@@ -45,12 +46,13 @@ def document(filters: Filters, name: str, remarks: Sequence[Outcome] = ()) -> di
             "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
 
 
-def save_filters(filters: Filters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()) -> None:
+def save_filters(filters: Filters | MatrixFilters, path: str | Path, name: str, remarks: Sequence[Outcome] = ()
+                 ) -> None:
     """Write the file whole, or not at all.
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         What is written.
     path : str or path
         File to write.
@@ -62,16 +64,18 @@ def save_filters(filters: Filters, path: str | Path, name: str, remarks: Sequenc
     write(path, json_bytes(document(filters, name, remarks)))
 
 
-def _left_out(filters: Filters) -> list[float]:
+def _left_out(filters: Filters | MatrixFilters) -> list[float]:
     """Measured frequencies that are not in the envelope [Hz]."""
     uncertainty = filters.problem.uncertainty
     return [] if uncertainty is None else (uncertainty.left_out / (2 * np.pi)).tolist()
 
 
-def _sections(filters: Filters) -> dict[str, Any]:
-    """Empty in continuous time, and for filters that have to be reduced first."""
+def _sections(filters: Filters | MatrixFilters) -> dict[str, Any]:
+    """Empty in continuous time, for filters of several channels, and for those that have to be reduced first."""
+    if filters.X.D.size > 1:
+        return {}
     try:
-        return {key: rows.tolist() for key, rows in sections(filters).items()}
+        return {key: rows.tolist() for key, rows in sections(filters).items()}  # type: ignore[arg-type]  # one channel
     except InputError:
         return {}
 

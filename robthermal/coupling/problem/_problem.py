@@ -187,8 +187,11 @@ def _matched(uncertainty: Any, factors: CoprimeFactors) -> Uncertainty | None:
         return None
     if not isinstance(uncertainty, Uncertainty):
         return from_factors(uncertainty, factors, "uncertainty")
+    if not isinstance(uncertainty.factors, CoprimeFactors):
+        raise InputError("made for subsystems of several inputs and outputs", where="uncertainty",
+                         expected="the same plants and controllers", remedy="Call dual_youla with them.")
     old, new = uncertainty.factors.at(uncertainty.omega), factors.at(uncertainty.omega)
-    if uncertainty.factors.loops[0].P.dt != factors.loops[0].P.dt:
+    if uncertainty.factors.dt != factors.dt:
         raise InputError("made for another sample time", where="uncertainty",
                          expected="the same plants and controllers", remedy="Call dual_youla with them.")
     for name, was, now in (("plants", old["P0"], new["P0"]),

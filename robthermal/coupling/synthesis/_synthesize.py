@@ -129,7 +129,7 @@ def synthesize(
                     robust=None if problem.uncertainty is None else 1 - margin,
                     product=1.0 if stable_controller else None)
     designs = [Design(problem, make_basis(basis, order, each, problem.dt), "hinf" if objective == "hinf" else "h2",
-                      _read_couple(couple)) for each in _poles(problem, basis, pole, flat)]
+                      read_couple(couple)) for each in _poles(problem, basis, pole, flat)]
     return _prove_or_back_off(*_most_effective(designs, limits), limits, started)
 
 
@@ -257,7 +257,14 @@ def _check_choice(argument: str, value: Any, choices: tuple[str, ...]) -> None:
         raise InputError(f"{argument} = {value!r}", where="synthesize", expected=" or ".join(f'"{c}"' for c in choices))
 
 
-def _read_couple(couple: Sequence[str]) -> tuple[bool, bool]:
+def read_couple(couple: Sequence[str]) -> tuple[bool, bool]:
+    """Which filters may act, from the names.
+
+    Parameters
+    ----------
+    couple : sequence of str
+        "X", "Y" or both.
+    """
     names = [couple] if isinstance(couple, str) else list(couple)
     if not names or not all(name in ("X", "Y") for name in names):
         raise InputError(f"couple = {couple!r}", where="synthesize", expected='("X", "Y"), ("X",) or ("Y",)')

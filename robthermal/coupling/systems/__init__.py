@@ -6,6 +6,7 @@ from ._exact import closed_loop_poles as closed_loop_poles
 from ._joined import apart as apart
 from ._joined import beside as beside
 from ._joined import minus_identity as minus_identity
+from ._matrix import matrix_of as matrix_of
 from ._read import LTI as LTI
 from ._read import connected as connected
 from ._read import diagonal as diagonal
@@ -26,5 +27,5 @@ from ._zpk import on_boundary as on_boundary
 from ._zpk import stable as stable
 
 __all__ = ["LTI", "Response", "Zpk", "apart", "beside", "closed_loop_poles", "connected", "constant", "diagonal",
-           "expect_stable", "grouped", "minus_identity", "natural", "negative", "on_boundary", "paired", "plus_one",
-           "realize", "sample_time_of", "series", "siso", "stable", "state_space_of", "zpk_of"]
+           "expect_stable", "grouped", "matrix_of", "minus_identity", "natural", "negative", "on_boundary", "paired",
+           "plus_one", "realize", "sample_time_of", "series", "siso", "stable", "state_space_of", "zpk_of"]

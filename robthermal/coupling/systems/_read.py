@@ -213,7 +213,8 @@ def _expect_siso(system: LTI, where: str, dt: float) -> None:
                          expected="a python-control StateSpace or TransferFunction, or a number")
     if (system.ninputs, system.noutputs) != (1, 1):
         raise InputError(f"{system.noutputs} outputs and {system.ninputs} inputs", where=where,
-                         expected="one input and one output")
+                         expected="one input and one output",
+                         remedy="Subsystems of several channels: evaluate_matrix and synthesize_matrix take them.")
     own = _dt(system, where)
     if own is not None and own != dt:
         raise InputError(f"sample time {own:g} s, the others have {dt:g} s", where=where,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import coupling
-from ...coupling import NORMS, Filters, Simulation, Spectra, Uncertainty, WorstCase
+from ...coupling import NORMS, Filters, MatrixFilters, Simulation, Spectra, Uncertainty, WorstCase
 from ...errors import InputError, Outcome
 from ...verification import verify
 from .._outcomes import JobsCode
@@ -31,20 +31,20 @@ class Coupling:
     ----------
     job : CouplingJob
         What was asked.
-    filters : Filters
-        What came out.
+    filters : Filters or MatrixFilters
+        What came out; matrices of subsystems with several inputs and outputs.
     checked : tuple of Checked
         Certificates with their independent check; the required ones first.
     spectra : Spectra
         Curves over frequency.
     worst_case : WorstCase or None
-        On every measured plant; None without uncertainty.
+        On every measured plant; None without uncertainty, and for several inputs and outputs.
     simulation : Simulation or None
-        e12 over time; None in continuous time, and where stability is not proven.
+        e12 over time; None in continuous time, for several inputs and outputs, and where stability is not proven.
     """
 
     job: CouplingJob
-    filters: Filters
+    filters: Filters | MatrixFilters
     checked: tuple[Checked, ...]
     spectra: Spectra
     worst_case: WorstCase | None
@@ -109,14 +109,18 @@ def couple_subsystems(job: CouplingJob, progress: Callable[[str], None] = lambda
     progress("verifying every certificate")
     checked = tuple(_checked(filters))
     progress("computing spectra")
+    if isinstance(filters, MatrixFilters):
+        return Coupling(job, filters, checked, filters.spectra(), None, None)
     curves = coupling.spectra(filters)
     worst = coupling.worst_case(filters) if filters.problem.uncertainty is not None else None
     progress("simulating")
     return Coupling(job, filters, checked, curves, worst, _simulation(filters))
 
 
-def _filters(job: CouplingJob) -> Filters:
-    find = coupling.evaluate if job.manual else coupling.synthesize
+def _filters(job: CouplingJob) -> Filters | MatrixFilters:
+    find: Callable[..., Filters | MatrixFilters] = coupling.evaluate if job.manual else coupling.synthesize
+    if job.matrices:
+        find = coupling.evaluate_matrix if job.manual else coupling.synthesize_matrix
     try:
         return find(*job.plants, *job.controllers, uncertainty=_uncertainty(job), disturbances=job.disturbances,
                     **job.options)
@@ -140,7 +144,7 @@ def _uncertainty(job: CouplingJob) -> Uncertainty | None:
 
 def _place(where: str, job: CouplingJob) -> str:
     """Arguments of the python functions as keys of the file."""
-    if where == "synthesize" or where.startswith("synthesize,"):
+    if where in ("synthesize", "synthesize_matrix") or where.startswith("synthesize,"):
         return "[design]"
     if where.startswith("uncertainty"):
         index = re.sub(r"\D", "", where) or ("0" if len(job.measured) == 1 else "")
@@ -151,7 +155,7 @@ def _place(where: str, job: CouplingJob) -> str:
     return named if "[" in named else f"[design] {named}"
 
 
-def _checked(filters: Filters) -> Iterator[Checked]:
+def _checked(filters: Filters | MatrixFilters) -> Iterator[Checked]:
     """Required: stability, robust stability where plants were measured, and the limits a certificate proves.
 
     A bound that is proven but too large is a certificate, not a claim: then `filters.holds` is False and says why.

@@ -22,6 +22,9 @@ _PANELS = (
 )
 
 
+_MOST = 4  # entries of Delta_p that are drawn: the largest
+
+
 def spectrum_figures(found: Spectra) -> Iterator[Figure]:
     """Sensitivities, improvement factors and e12.
 
@@ -48,7 +51,7 @@ def robust_figure(found: Spectra) -> Figure:
 
 
 def envelope_figure(uncertainty: Uncertainty) -> Figure:
-    """Dual-Youla samples of the measured plants and their envelope; entries that are zero are left out.
+    """Dual-Youla samples of the measured plants and their envelope; the four largest entries.
 
     Parameters
     ----------
@@ -57,7 +60,9 @@ def envelope_figure(uncertainty: Uncertainty) -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    entries = [entry for entry in np.ndindex(2, 2) if np.any(uncertainty.envelope[entry])] or [(0, 0)]
+    entries = [entry for entry in np.ndindex(*uncertainty.envelope.shape[:2]) if np.any(uncertainty.envelope[entry])]
+    entries = sorted(entries, key=lambda entry: -float(uncertainty.envelope[entry].max()))[:_MOST] or [(0, 0)]
+    entries.sort()
     hertz = uncertainty.omega / (2 * np.pi)
     with house_style():
         axes: Any = plt.subplots(len(entries), 1, sharex=True, squeeze=False, figsize=(7, 2.2 * len(entries)))[1][:, 0]

@@ -20,6 +20,7 @@ from ._systems import LTI, System, SystemTable, files_of, linear_system
 _REMEDY = 'See the documentation, "Command line", robthermal couple, or the example examples/scanner.'
 _MANUAL = ("X_hat", "Y_hat")
 _SYSTEMS = ("X_hat", "Y_hat", "Z1", "Z2", "weight")
+_OF_MATRICES = {"weight", "margin", "basis", "order", "pole", "couple", "cutoff", "X_hat", "Y_hat"}
 _OF_EVALUATE = {"X_hat", "Y_hat", "Z1", "Z2", "weight", "window", "cutoff"}  # what a manual design may say
 Files = Annotated[list[str], Field(min_length=1, max_length=1000)]
 
@@ -107,7 +108,8 @@ class CouplingJob:
     manual : bool
         Whether the filters are given.
     options : dict
-        Keyword arguments of `rt.coupling.synthesize`, or of `evaluate` for given filters; frequencies in rad/s.
+        Keyword arguments of `rt.coupling.synthesize`, or of `evaluate` for given filters; frequencies in rad/s. Of
+        several inputs and outputs, of `synthesize_matrix` and `evaluate_matrix`.
     files : tuple of Path
         The coupling file and every file it names.
     exports : tuple of str
@@ -134,6 +136,11 @@ class CouplingJob:
     circles: bool = True
     confidence: float = 0.95
     measured_in_closed_loop: bool = False
+
+    @property
+    def matrices(self) -> bool:
+        """Whether a subsystem has more than one input or output."""
+        return any((plant.ninputs, plant.noutputs) != (1, 1) for plant in self.plants)
 
     @property
     def remarks(self) -> tuple[Outcome, ...]:
@@ -203,7 +210,8 @@ def _job(data: _File, path: Path) -> CouplingJob:
     manual = any(getattr(data.design, key) is not None for key in _MANUAL)
     plants, controllers = (tuple(linear_system(getattr(half, key), dt, f"[subsystems.{k}] {key}", path)
                                  for k, half in enumerate(halves, 1)) for key in ("plant", "controller"))
-    measured, groups = _measured(data.uncertainty, dt, path)
+    shape = (sum(plant.noutputs for plant in plants), sum(plant.ninputs for plant in plants))
+    measured, groups = _measured(data.uncertainty, dt, path, shape)
     tables = [*(getattr(half, key) for half in halves for key in ("plant", "controller", "disturbance")),
               *(getattr(data.design, key) for key in _SYSTEMS)]
     files = (path, *(file for table in tables for file in files_of(table, path)), *(f for pair in groups for f in pair))
@@ -211,7 +219,8 @@ def _job(data: _File, path: Path) -> CouplingJob:
         data.coupling.name, (halves[0].name or "subsystem 1", halves[1].name or "subsystem 2"),
         (plants[0], plants[1]), (controllers[0], controllers[1]), _disturbances(halves, dt, path), measured,
         tuple(", ".join(file.name for file in group) for group in groups), manual,
-        dict(_options(data.design, manual, dt, path)), files, _exports(data.coupling.export, dt, path),
+        dict(_options(data.design, manual, dt, path, shape != (2, 2))), files,
+        _exports(data.coupling.export, dt, path, shape != (2, 2)),
         **_options_of(data.uncertainty))
 
 
@@ -220,7 +229,10 @@ def _options_of(table: UncertaintyTable | None) -> dict[str, Any]:
     return {} if table is None else {key: getattr(table, key) for key in keys}
 
 
-def _exports(endings: Sequence[str], dt: float, path: Path) -> tuple[str, ...]:
+def _exports(endings: Sequence[str], dt: float, path: Path, matrices: bool) -> tuple[str, ...]:
+    if matrices and endings:
+        raise InputError("filters of several inputs and outputs are written as coupling.json only",
+                         where=f"{path} [coupling] export", expected="no export", remedy="Leave export out.")
     if not dt and {"c", "h"} & set(endings):
         raise InputError("a continuous-time coupling has no C source", where=f"{path} [coupling] export",
                          expected='["mat"]', remedy="Give a sample_time.")
@@ -238,7 +250,7 @@ def _disturbances(halves: tuple[SubsystemTable, SubsystemTable], dt: float, path
                  for k, table in enumerate(tables, 1))  # type: ignore[return-value]  # two of them
 
 
-def _measured(table: UncertaintyTable | None, dt: float, path: Path
+def _measured(table: UncertaintyTable | None, dt: float, path: Path, shape: tuple[int, int]
               ) -> tuple[tuple[FrequencyResponse, ...], list[list[Path]]]:
     """Plants, and the files of each."""
     if table is None:
@@ -249,7 +261,10 @@ def _measured(table: UncertaintyTable | None, dt: float, path: Path
                          expected="frf_1 and frf_2, or frf", remedy="Leave [uncertainty] out for a nominal design.")
     if table.frf is not None:
         whole = [folder / name for name in table.frf]
-        return plants_from_whole(whole, dt), [[file] for file in whole]
+        return plants_from_whole(whole, dt, shape), [[file] for file in whole]
+    if shape != (2, 2):
+        raise InputError("frf_1 and frf_2 beside subsystems of several inputs and outputs", where=where,
+                         expected=f"frf: files of all {shape[0]} outputs and {shape[1]} inputs")
     first, second = ([folder / name for name in names or []] for names in (table.frf_1, table.frf_2))
     if len(first) != len(second):
         raise InputError(f"{len(first)} files in frf_1, {len(second)} in frf_2", where=where,
@@ -257,10 +272,15 @@ def _measured(table: UncertaintyTable | None, dt: float, path: Path
     return plants_from_pairs(first, second, dt), [list(pair) for pair in zip(first, second, strict=True)]
 
 
-def _options(table: DesignTable, manual: bool, dt: float, path: Path) -> Iterator[tuple[str, Any]]:
+def _options(table: DesignTable, manual: bool, dt: float, path: Path, matrices: bool) -> Iterator[tuple[str, Any]]:
     """What the file says, in the units of the python functions."""
     where = f"{path} [design]"
     given = [key for key in DesignTable.model_fields if getattr(table, key) is not None]
+    single = [key for key in given if matrices and key not in _OF_MATRICES]
+    if single:
+        raise InputError(f"{single[0]} beside subsystems of several inputs and outputs", where=where,
+                         expected=f"only {', '.join(sorted(_OF_MATRICES))}",
+                         remedy="It is for subsystems of one input and one output each: leave it out.")
     factors = [key for key in ("Z1", "Z2") if key in given]
     if not manual and factors:
         raise InputError(f"{factors[0]} without X_hat and Y_hat", where=where,

@@ -24,21 +24,23 @@ def plants_from_pairs(first: list[Path], second: list[Path], dt: float) -> tuple
     dt : float
         Sample time of the loops [s]; CSV files do not say theirs.
     """
-    return tuple(_diagonal(_read(one, dt, 1), _read(two, dt, 1), one, two)
+    return tuple(_diagonal(_read(one, dt, (1, 1)), _read(two, dt, (1, 1)), one, two)
                  for one, two in zip(first, second, strict=True))
 
 
-def plants_from_whole(files: list[Path], dt: float) -> tuple[FrequencyResponse, ...]:
-    """2x2 plants, one file each.
+def plants_from_whole(files: list[Path], dt: float, shape: tuple[int, int]) -> tuple[FrequencyResponse, ...]:
+    """Plants of both subsystems, one file each.
 
     Parameters
     ----------
     files : list of Path
-        Files with two inputs and two outputs.
+        Files with the inputs and outputs of both.
     dt : float
         Sample time of the loops [s]; CSV files do not say theirs.
+    shape : tuple of int
+        Outputs and inputs of both subsystems together.
     """
-    return tuple(_read(file, dt, 2) for file in files)
+    return tuple(_read(file, dt, shape) for file in files)
 
 
 def plant_remarks(measured: Sequence[FrequencyResponse], names: Sequence[str], circles: bool) -> Iterator[Outcome]:
@@ -63,12 +65,13 @@ def plant_remarks(measured: Sequence[FrequencyResponse], names: Sequence[str], c
         yield CIRCLES_LEFT_OUT
 
 
-def _read(path: Path, dt: float, size: int) -> FrequencyResponse:
+def _read(path: Path, dt: float, wanted: tuple[int, int]) -> FrequencyResponse:
     found = read_response(path, sample_time=dt or None)
     shape = len(found.output_names), len(found.input_names)
-    if shape != (size, size):
+    if shape != wanted:
         raise InputError(f"is a response with {shape[0]} outputs and {shape[1]} inputs", where=str(path),
-                         expected=f"{size} of each",
+                         expected=f"{wanted[0]} of each" if wanted[0] == wanted[1] else
+                         f"{wanted[0]} outputs and {wanted[1]} inputs",
                          remedy="Files of frf hold both subsystems, those of frf_1 and frf_2 one each; robthermal frf "
                                 "--input --output chooses the columns.")
     return found

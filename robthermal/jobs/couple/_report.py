@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._digits import in_table
 from ..._pandas import pd
-from ...coupling import NORMS, Filters, Norm
+from ...coupling import NORMS, Filters, MatrixFilters, Norm
 from ...export import plain
 from ...report import Reason, Report, Section, Table
 from ..evidence import write_certification
@@ -106,6 +106,7 @@ def save_coupling(result: Coupling, folder: Path) -> None:
     job = result.job
     result.filters.save(folder / "coupling.json", job.name, remarks=result.remarks)
     for ending in job.exports:
+        assert isinstance(result.filters, Filters)  # a job of matrices has no exports
         result.filters.export(folder / f"coupling.{ending}", job.name)
 
 
@@ -124,7 +125,7 @@ def _sections(result: Coupling) -> Iterator[Section]:
     yield _norm_section(result)
     yield Section("Over frequency", "Computed at frequencies; corners, resonances and the measured frequencies are "
                   "among them.", figures=tuple(spectrum_figures(result.spectra)), anchor="spectra")
-    if result.worst_case is not None:
+    if result.filters.problem.uncertainty is not None:
         yield _robustness_section(result)
     yield _filter_section(result.filters)
 
@@ -183,7 +184,8 @@ def _norm_section(result: Coupling) -> Section:
     filters, good = result.filters, {c.key for c in result.checked if c.good}
     rows = [{"number": norm.symbol, "value": filters.norms[key], "proven": _proven(filters, norm, good),
              "solver's own": filters.requested.get(key, float("nan")),
-             "asked at most": filters.asked.get(key, float("nan"))} for key, norm in NORMS.items()]
+             "asked at most": filters.asked.get(key, float("nan"))}
+            for key, norm in NORMS.items() if key in filters.norms]
     if "msd" in filters.asked:
         rows.append({"number": "MSD, after over before", "value": filters.performance.msd_growth, "proven": "computed",
                      "solver's own": float("nan"), "asked at most": filters.asked["msd"]})
@@ -192,7 +194,7 @@ def _norm_section(result: Coupling) -> Section:
     return Section("Norms", text, tables=(Table(pd.DataFrame(rows), "Norms, proven and asked for."),), anchor="norms")
 
 
-def _proven(filters: Filters, norm: Norm, good: set[str]) -> str:
+def _proven(filters: Filters | MatrixFilters, norm: Norm, good: set[str]) -> str:
     if not norm.proof:
         return "computed"
     if norm.file in good:
@@ -204,7 +206,13 @@ def _proven(filters: Filters, norm: Norm, good: set[str]) -> str:
 
 def _robustness_section(result: Coupling) -> Section:
     worst, filters = result.worst_case, result.filters
-    assert worst is not None and filters.problem.uncertainty is not None
+    assert filters.problem.uncertainty is not None
+    if worst is None:
+        text = (f"The robust number is largest near {filters.worst_frequency / (2 * np.pi):.4g} Hz. Stable for every "
+                "plant under the envelope does not mean good for every one. For several inputs and outputs the number "
+                "is sufficient, not necessary.")
+        return Section("Robustness", text, anchor="robustness",
+                       figures=(robust_figure(result.spectra), envelope_figure(filters.problem.uncertainty)))
     text = (f"The robust number is largest near {filters.worst_frequency / (2 * np.pi):.4g} Hz. Stable for every plant "
             "under the envelope does not mean good for every one: the table says what the measured plants do, and the "
             "most that any plant under the envelope could do. A wider margin in [design] narrows the spread.")
@@ -219,10 +227,14 @@ def _robustness_section(result: Coupling) -> Section:
     return Section("Robustness", text, figures=figures, tables=(Table(frame, caption),), anchor="robustness")
 
 
-def _filter_section(filters: Filters) -> Section:
+def _filter_section(filters: Filters | MatrixFilters) -> Section:
     frame = pd.DataFrame([{"filter": name, "states": getattr(filters, name).nstates} for name in _SYSTEMS])
     text = ("coupling.json holds the state space of every filter, and in discrete time second-order sections of X, Y "
             "and their inputs where those are accurate to 0.1 %. e1⁺ = e1 + X e2⁺, e2⁺ = e2 + Y e1⁺; X_input and "
             "Y_input add P1⁻¹X e2⁺ to u1 and P2⁻¹Y e1⁺ to u2. controller is the same as one 2x2 system, from (e1, e2) "
             "to (u1, u2). Shorter filters: rt.coupling, Filters.reduce.")
+    if isinstance(filters, MatrixFilters):
+        text = ("coupling.json holds the state space of every filter. e1⁺ = e1 + X e2⁺, e2⁺ = e2 + Y e1⁺ with vectors; "
+                "X_input and Y_input go from e2⁺ to u1 and from e1⁺ to u2, with P1 X_input = X and P2 Y_input = Y. "
+                "controller is the same as one system, from (e1, e2) to (u1, u2).")
     return Section("Filters", text, tables=(Table(frame, "Sizes."),), anchor="filters")

@@ -22,7 +22,7 @@ Polynomial = Annotated[list[Number], Field(min_length=1, max_length=_MOST_STATES
 
 
 class SystemTable(Table):
-    """A system with one input and one output."""
+    """A system: one input and one output, or matrices of any size."""
 
     A: Matrix | None = None
     B: Matrix | None = None
@@ -103,7 +103,11 @@ def _state_space(table: SystemTable, dt: float, place: str) -> control.StateSpac
     n = len(table.A or [])
     if n > _MOST_STATES:
         raise InputError(f"{n} states", where=place, expected=f"at most {_MOST_STATES}", remedy="Reduce the model.")
-    shapes = {"A": (n, n), "B": (n, 1), "C": (1, n), "D": (1, 1)}
+    outputs, inputs = len(table.D or []), len((table.D or [[]])[0])
+    if not outputs or not inputs:
+        raise InputError("D is empty", where=place, expected="as many rows as outputs, as many columns as inputs",
+                         remedy="A row is a list: [[0.0]] for one input and one output.")
+    shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs)}
     parts = [_matrix(getattr(table, name), name, shape, place) for name, shape in shapes.items()]
     return control.StateSpace(*parts, dt, remove_useless_states=False)
 
@@ -113,7 +117,7 @@ def _matrix(rows: list[list[float]], name: str, shape: tuple[int, int], place: s
     found = (len(rows), widths[0] if widths else 0)
     if found != shape and not (0 in shape and 0 in found) or len(widths) > 1:
         text = f"{len(rows)} rows of {' or '.join(map(str, widths))} numbers" if rows else "no rows"
-        raise InputError(f"{name} has {text}", where=place, expected=f"{shape[0]}x{shape[1]}: one input, one output",
+        raise InputError(f"{name} has {text}", where=place, expected=f"{shape[0]}x{shape[1]}, for A and D as given",
                          remedy="A row is a list: [[1.0, 0.0], [0.0, 1.0]].")
     return np.array(rows, dtype=float).reshape(shape)
 

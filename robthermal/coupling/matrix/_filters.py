@@ -1,0 +1,183 @@
+"""The result of a coupling of several channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._control import control
+from ...errors import Outcome
+from ...verification import Certificate
+from ..evaluation import Spectra
+from ..implementation import save_filters
+from ..problem import NORMS, Performance
+from ._problem import MatrixProblem
+from ._spectra import matrix_spectra
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MatrixFilters:
+    """Coupling filters X, Y between two subsystems of several inputs and outputs, with verdict and certificates.
+
+    e1+ = e1 + X e2+, e2+ = e2 + Y e1+, u1 = C1 e1+ + X_input e2+, u2 = C2 e2+ + Y_input e1+, with P1 X_input = X and
+    P2 Y_input = Y.
+
+    Parameters
+    ----------
+    X, Y : StateSpace
+        X = Z1 X_hat, Y = Z2 Y_hat, (p, p).
+    X_hat, Y_hat : StateSpace
+        The free stable filters, (m1, p) and (m2, p).
+    Z1, Z2 : StateSpace
+        Inner factors of the plants, (p, m1) and (p, m2).
+    X_input, Y_input : StateSpace
+        Q1 X_hat to u1 and Q2 Y_hat to u2.
+    controller : StateSpace
+        K_Delta, errors to inputs, Evers (6.12).
+    norms : dict of float
+        Upper bounds at every frequency, keys and meanings as in `Filters`: largest singular values. "h2" is computed,
+        the others proven; infinite where the proof failed.
+    nominally_stable, robustly_stable, controller_stable : bool
+        Proven internal stability for the model; for every plant under the envelope; of K_Delta itself.
+    holds : bool
+        All that was asked for.
+    worst_frequency : float
+        Where "robust" is attained [rad/s].
+    proofs : dict of Certificate
+        Stability, norms, and the robust number between grid points, by what they prove.
+    outcome : Outcome
+        What holds, or why not.
+    basis : str
+        Basis of the filters.
+    order : int
+        Order of the basis.
+    solve_time : float
+        Time of the search [s].
+    problem : MatrixProblem
+        What was designed for.
+    asked, requested : dict of float
+        Bounds the design had to keep, and the values of the search.
+
+    Examples
+    --------
+    >>> import control, numpy as np
+    >>> import robthermal as rt
+    >>> P = control.ss([[0.9, 0.1], [0.0, 0.8]], np.eye(2), np.eye(2), np.zeros((2, 2)), 0.01)
+    >>> C = control.ss([], [], [], 0.3 * np.eye(2), 0.01)
+    >>> filters = rt.coupling.evaluate_matrix(P, P, C, C, X_hat=-0.5)
+    >>> filters.holds, filters.verdict, round(filters.norms["X"], 2)
+    (True, 'nominal', 0.5)
+    """
+
+    X: control.StateSpace
+    Y: control.StateSpace
+    X_hat: control.StateSpace
+    Y_hat: control.StateSpace
+    Z1: control.StateSpace
+    Z2: control.StateSpace
+    X_input: control.StateSpace
+    Y_input: control.StateSpace
+    controller: control.StateSpace
+    norms: dict[str, float]
+    nominally_stable: bool
+    robustly_stable: bool
+    controller_stable: bool
+    holds: bool
+    worst_frequency: float
+    proofs: dict[str, Certificate]
+    outcome: Outcome
+    basis: str
+    order: int
+    solve_time: float
+    problem: MatrixProblem
+    asked: dict[str, float]
+    requested: dict[str, float]
+
+    @property
+    def certificates(self) -> tuple[Certificate, ...]:
+        """Everything that is proven."""
+        return tuple(self.proofs.values())
+
+    @property
+    def performance(self) -> Performance:
+        """Moving average and moving standard deviation: nan, a window is for one channel each."""
+        return Performance(*[float("nan")] * 4)
+
+    @property
+    def verdict(self) -> str:
+        """ "robust", "nominal" or "none"; robust only where an uncertainty was given, none for a refused design."""
+        if not self.holds and self.norms["X"] == self.norms["Y"] == 0.0:  # refused: there is no coupling
+            return "none"
+        if self.problem.uncertainty is not None and self.robustly_stable:
+            return "robust"
+        return "nominal" if self.nominally_stable else "none"
+
+    def with_outcome(self, outcome: Outcome) -> MatrixFilters:
+        """The same filters with another outcome.
+
+        Parameters
+        ----------
+        outcome : Outcome
+            What is said of them.
+
+        Returns
+        -------
+        MatrixFilters
+        """
+        return replace(self, outcome=outcome, holds=outcome.ok)
+
+    def spectra(self, points: int = 400) -> Spectra:
+        """Largest singular values of sensitivities and improvement, density of e12, robust number over frequency.
+
+        Parameters
+        ----------
+        points : int
+            Logarithmic frequencies; corners, resonances and the measured frequencies come on top.
+
+        Returns
+        -------
+        Spectra
+        """
+        return matrix_spectra(self, points)
+
+    def save(self, path: str | Path, name: str = "", remarks: Sequence[Outcome] = ()) -> None:
+        """Write coupling.json: filters, norms, verdict and remarks; no sections.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step.
+        name : str
+            Name of the design.
+        remarks : sequence of Outcome
+            What the verdict leaves out.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        save_filters(self, path, name, remarks)
+
+    def plot(self) -> NDArray[Any]:
+        """Improvement factors, e12 before and after, and the robust number over frequency [Hz].
+
+        Returns
+        -------
+        ndarray of matplotlib axes, shape (3,)
+        """
+        return self.spectra().plot(("improvement", "e12", "robust"))
+
+    def __str__(self) -> str:
+        rows = [f"coupling ({self.basis}, order {self.order}): {self.outcome.text}"]
+        rows += [f"  {key:<18}{self.norms[key]:.5g}" for key in NORMS if key in self.norms]
+        return "\n".join(rows)
+
+    def __repr__(self) -> str:
+        size = np.shape(self.X.D)
+        return f"<MatrixFilters {size[0]}x{size[1]} {self.basis} {self.order}, {self.verdict}>"
