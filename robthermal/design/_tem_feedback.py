@@ -190,7 +190,8 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     rate : float
         Rate that is asked for: V falls at least as exp(-2 rate t) [1/s].
     method : {"quadratic"}
-        One quadratic form for the whole box.
+        One quadratic form for the whole box. A form that varies with the temperatures would give nothing more (docs,
+        "State feedback of modules").
     covariance : Estimates or mapping, optional
         Result of a calibration, whose joint ranges at `probability` are covered, or {parameter: (lower, upper)}; links
         and modules only.
@@ -234,6 +235,11 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     (True, True, True)
     """
     start = time.perf_counter()
+    if method == "parameter_dependent":
+        raise InputError('method = "parameter_dependent"', where="argument method",
+                         expected='"quadratic": one quadratic form for the whole box',
+                         remedy="A form that varies with the temperatures cannot give more: one corner of the box alone "
+                         "already limits the starts to those of one form, see the documentation, Synthesis.")
     if method != "quadratic":
         raise InputError(f"method = {quoted(method)}", where="argument method",
                          expected='"quadratic": the certificate knows one quadratic form for the whole box')

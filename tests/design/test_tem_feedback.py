@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 import certificate_truth as truth
+import cvxpy as cp
 import numpy as np
 import pytest
 
@@ -66,6 +67,23 @@ def run(d, x, disturbance, seconds, steps):
         x = x + h / 6 * (a + 2 * b + 2 * c + slope(t + h, x + h * c))
         found.append(x)
     return np.array(found)
+
+
+def test_a_form_that_varies_with_the_temperatures_cannot_give_more(designed):
+    """The corner of 1.8 A alone, written in cvxpy as one linear plant, allows no larger ball: why it is refused."""
+    system, rate = stage(), 0.012
+    x0 = np.array(list(designed.operating_temperatures.values()))
+    room = np.minimum(x0 - 265.0, 335.0 - x0)
+    balls = []
+    for corner in rt.design.tem_polytope(system, **BOX):
+        W, Y, ball = cp.Variable((3, 3), symmetric=True), cp.Variable((1, 3)), cp.Variable()
+        moved = corner.A @ W + corner.B @ Y
+        kept = [W >> ball * np.eye(3), cp.diag(W) <= room**2, moved + moved.T + 2 * rate * W << 0,
+                cp.bmat([[0.64 * np.eye(1), Y], [Y.T, W]]) >> 0]
+        cp.Problem(cp.Maximize(ball), kept).solve(solver="CLARABEL")
+        balls.append(float(np.sqrt(ball.value)))
+    assert designed.semi_axes[0] <= min(balls) <= 1.001 * designed.semi_axes[0]
+    assert max(balls) > 1.1 * min(balls)  # it is one corner, not all of them
 
 
 def test_numbers_of_the_contract(designed):
@@ -219,6 +237,7 @@ def test_the_law_is_limited_and_takes_names(designed):
 @pytest.mark.parametrize(("arguments", "words"), [
     ({"temperature": (0.0, 60.0)}, "Celsius"), ({"operating": 2.0}, "not inside of its range"),
     ({"operating": {"n": 1.0}}, "operating"), ({"rate": 0.0}, "rate"), ({"method": "magic"}, "quadratic"),
+    ({"method": "parameter_dependent"}, "one corner of the box alone"),
     ({"temperature": (290.0, 335.0)}, "outside of the box"), ({"current": {"x": (0, 1)}}, "there is no module 'x'"),
     ({"covariance": {"lumps.sink.capacity": (80.0, 100.0)}}, "lumps.sink.capacity"),
     ({"covariance": 3.0}, "covariance is a float"), ({"ambient": {"hall": (290, 300)}}, "hall")])

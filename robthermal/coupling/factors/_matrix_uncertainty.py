@@ -70,7 +70,7 @@ def matched_matrix(uncertainty: Uncertainty, factors: MatrixFactors) -> Uncertai
     Parameters
     ----------
     uncertainty : Uncertainty
-        From `dual_youla`.
+        Result of `dual_youla` for these subsystems.
     factors : MatrixFactors
         Of the design.
     """

@@ -72,7 +72,7 @@ def youla_matrix(problem: MatrixProblem, X_hat: control.StateSpace, Y_hat: contr
     problem : MatrixProblem
         The two controlled subsystems.
     X_hat, Y_hat : StateSpace
-        Stable filters.
+        Stable filters of the right sizes.
     """
     both = apart(series(X_hat, problem.two.Dk), series(Y_hat, problem.one.Dk))
     p = problem.one.P.noutputs

@@ -21,7 +21,7 @@ def matrix_spectra(filters: MatrixFilters, points: int) -> Spectra:
     Parameters
     ----------
     filters : MatrixFilters
-        The coupling.
+        Coupling that is looked at.
     points : int
         Logarithmic frequencies; corners, resonances and the measured frequencies come on top.
     """
