@@ -238,8 +238,8 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     if method == "parameter_dependent":
         raise InputError('method = "parameter_dependent"', where="argument method",
                          expected='"quadratic": one quadratic form for the whole box',
-                         remedy="A form that varies with the temperatures cannot give more: one corner of the box alone "
-                         "already limits the starts to those of one form, see the documentation, Synthesis.")
+                         remedy="A form that varies with the temperatures cannot give more: one corner of the box "
+                         "alone already limits the starts to those of one form (docs, Synthesis).")
     if method != "quadratic":
         raise InputError(f"method = {quoted(method)}", where="argument method",
                          expected='"quadratic": the certificate knows one quadratic form for the whole box')

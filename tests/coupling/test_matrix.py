@@ -262,6 +262,7 @@ def test_bad_input_is_named(pair: tuple[control.StateSpace, ...], uncertain: tup
         ("2x2 response", lambda: rt.coupling.dual_youla(control.FRD(np.ones((2, 2, 3)), [1.0, 2, 3]), (P1, P2),
                                                        (C1, C2))),
     ]
+    assert len(cases) == 12
     for message, call in cases:
         with pytest.raises(rt.errors.InputError, match=message.replace("(", r"\(")):
             call()
