@@ -24,8 +24,8 @@ QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py t
 
 help:
 	@echo "make demo    (simulated) records -> calibrated model -> certificates -> build/demo/report.html"
-	@echo "make test    lint, types, then the tests (import contract, doctests, notebooks, docs build included)"
-	@echo "make exhaustive   the tests that make test leaves to CI: many random draws, brute force"
+	@echo "make test    lint, types, then the tests (import contract, doctests, notebooks included)"
+	@echo "make exhaustive   the tests that make test leaves to CI: many random draws, brute force, the site built and read"
 	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"

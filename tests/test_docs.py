@@ -36,6 +36,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target / "html"
 
 
+@pytest.mark.exhaustive
 def test_every_public_name_is_on_a_page(built: Path) -> None:
     inventory = InventoryFile.loads((built / "objects.inv").read_bytes(), uri="")
     on_a_page = {name for kind, entries in inventory.data.items() if kind.startswith("py:") for name in entries}
@@ -47,6 +48,7 @@ def test_every_public_name_is_on_a_page(built: Path) -> None:
     assert not public - on_a_page
 
 
+@pytest.mark.exhaustive
 def test_pages_fetch_nothing(built: Path) -> None:
     fetched = re.compile(r"<(?:script|img|iframe|link|source)\b[^>]*\s(?:src|href)=\"((?:https?:)?//[^\"]+)")
     styled = re.compile(r"(?:url\(|@import)\s*[\"']?((?:https?:)?//[^\"')]+)")
@@ -56,11 +58,13 @@ def test_pages_fetch_nothing(built: Path) -> None:
     assert {address for sheet in sheets for address in styled.findall(sheet.read_text(encoding="utf-8"))} == set()
 
 
+@pytest.mark.exhaustive
 def test_formulas_are_in_the_pages(built: Path) -> None:
     page = (built / "explanations" / "calibration.html").read_text(encoding="utf-8")
     assert page.count("<math ") > 50 and "\\frac" not in page and "MathJax" not in page
 
 
+@pytest.mark.exhaustive
 def test_the_gallery_shows_twelve_pictures_with_their_lines(built: Path) -> None:
     page = (built / "tutorials" / f"{SHOWN}.html").read_text(encoding="utf-8")
     pictures = re.findall(r'<img alt="([^"]{40,})"[^>]*src="../_images/([^"]+\.png)"', page)
@@ -69,6 +73,7 @@ def test_the_gallery_shows_twelve_pictures_with_their_lines(built: Path) -> None
     assert page.count("Show code cell source") >= 12 and "law = " in re.sub("<[^>]+>", "", page)
 
 
+@pytest.mark.exhaustive
 def test_every_picture_has_an_alternative_text(built: Path) -> None:
     pictures = [(page.name, tag) for page in built.rglob("*.html")
                 for tag in re.findall(r"<img\b[^>]*>", page.read_text(encoding="utf-8")) if "_static/" not in tag]
@@ -76,6 +81,7 @@ def test_every_picture_has_an_alternative_text(built: Path) -> None:
     assert [one for one in pictures if not re.search(r'alt="(?![^"]*_images/)[^"]{15,}"', one[1])] == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("words", "page"), [
     (["timestamp"], "measured_files"), (["peltier"], "from_tec_tool"), (["peltier"], "api/index"),
     (["thermistor"], "measured_files"), (["safe", "current"], "explanations/limits"),

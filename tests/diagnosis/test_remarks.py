@@ -154,6 +154,7 @@ def test_readings_that_never_change_are_refused(run: Run, tmp_path: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.usefixtures("few")
 def test_a_room_that_is_not_recorded_may_be_the_heat_that_is_found(run: Run, tmp_path: Path) -> None:
     _, found, _ = diagnosed(run, tmp_path, *oven(stepped(), room=22.0 + 3.0 * np.sin(TIME / 400.0)))

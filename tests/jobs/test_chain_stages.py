@@ -218,6 +218,7 @@ def designed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.exhaustive
 def test_a_design_is_of_the_certified_system(designed: Path) -> None:
     summary = json.loads((designed / "out" / "summary.json").read_text())
     numbers = json.loads((designed / "out" / "design" / "design.json").read_text())
@@ -235,6 +236,7 @@ def test_a_design_is_of_the_certified_system(designed: Path) -> None:
     assert certified["system"] == json.loads((designed / "out" / "certificates" / "box.json").read_text())["system"]
 
 
+@pytest.mark.exhaustive
 def test_a_changed_design_computes_the_design_alone(designed: Path) -> None:
     project = designed / "bench" / "project.toml"
     project.write_text(project.read_text().replace("setpoint = { m1 = 12.0 }", "setpoint = { m1 = 13.0 }"))
