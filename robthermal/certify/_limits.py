@@ -28,6 +28,7 @@ _HIGHEST = 1e4  # A
 _LOWEST = 1e-6
 _PRECISION = 1e-5
 _PRECISION_MATRIX = 4e-3  # every step may cost seconds
+_GIVEN_UP = (0.0, 1e-4, 1e-3, 1e-2, 0.05, 0.15, 0.3, 0.5, 0.75, 1.0)  # the proof may know less than the search
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
         low, _ = bisect(lambda c: energy_rate(box(c)) > 0)
     else:
         low, _ = bisect(lambda c: has_weights(box(c), method))
-    for back_off in (0.0, 1e-4, 1e-3, 1e-2, 0.05, 1.0):
+    for back_off in _GIVEN_UP:
         c = low * (1 - back_off)
         certificate = contraction(system, current=current_range(system, direction, c), temperature=temperature,
                                   method=method, parameters=parameters, structure=structure, large=large)

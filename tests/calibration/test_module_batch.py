@@ -148,6 +148,18 @@ def test_the_result_flows_into_the_two_module_setup(batch: rt.calibration.Module
     assert ranges["modules.m1.resistance.value"][0] < alone[0]  # ten at once are wider than five
 
 
+def test_a_box_contracts_with_any_modules_of_the_type(batch: rt.calibration.ModuleBatch) -> None:
+    """Ten uncertain parameters: the common bound of all vertices proves less than the vertices say, not nothing."""
+    setup = batch.applied(rt.systems.two_module())
+    limit = rt.certify.largest_current(setup, temperature=(278.15, 358.15), direction="cooling",
+                                       parameters=batch.ranges("m1", "m2"))
+    assert limit.certificate.holds and rt.verify(limit.certificate).valid
+    assert 2.0 < limit.current < 4.75
+    region = {name: (0.0, 4.75) for name in ("m1", "m2")}
+    assert not rt.certify.contraction(setup, current=region, temperature=(278.15, 358.15),
+                                      parameters=batch.ranges("m1", "m2")).holds
+
+
 def test_what_is_no_batch_is_refused(batch: rt.calibration.ModuleBatch) -> None:
     one, other = batch.modules[:2]
     with pytest.raises(rt.InputError, match="fewer than two modules.*Calibrate another"):
