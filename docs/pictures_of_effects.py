@@ -44,6 +44,7 @@ PICTURES = {
     "radiation": Picture(("sample", "room"), {"coefficient": 1.5e-9}, "sample"),
     "ambient_gradient": Picture(("sink",), {"difference": 1.5}, "sink"),
     "conductance_step": Picture(("sample-plate",), {"relative": -0.4, "time": 1500.0}, "sample"),
+    "driven_conductance": Picture(("sample-plate", "m1"), {"relative": 0.8}, "sample"),
     "condensation": Picture(("plate",), {"conductance": 0.6, "dew_point": 293.15}),
     "heat_source": Picture(("plate",), {"heat": 1.0}),
     "hidden_mass": Picture(("plate",), {"capacity": 60.0, "time_constant": 200.0}),
@@ -51,6 +52,7 @@ PICTURES = {
     "input_gain": Picture(("heater",), {"gain": 0.2}, "sample"),
     "input_offset": Picture(("m1",), {"offset": 0.15}),
     "input_saturation": Picture(("m1",), {"cubic": 0.05}),
+    "input_gain_slope": Picture(("heater",), {"slope": 0.06}, "sample"),
     "input_delay": Picture(("heater",), {"delay": 60.0}, "sample"),
     "input_lag": Picture(("heater",), {"time_constant": 60.0}, "sample"),
     "heater_power_slope": Picture(("heater",), {"slope": 0.02}, "sample"),
@@ -94,8 +96,8 @@ def readings(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def title(name: str) -> str:
     """Place and size in words."""
-    drive = "A" if PICTURES[name].where[0] == "m1" else "W"
-    known = {"-": "", "unit": drive, "1/unit²": f"1/{drive}²", "W/K^(1+exponent)": "W/K^1.25"}
+    drive = "A" if "m1" in PICTURES[name].where else "W"
+    known = {"-": "", "unit": drive, "1/unit": f"1/{drive}", "1/unit²": f"1/{drive}²", "W/K^(1+exponent)": "W/K^1.25"}
     sizes = []
     for key, value in PICTURES[name].values.items():
         unit = rt.thermal.effects()[name].parameters[key]

@@ -16,8 +16,8 @@ SECTIONS = ("system", "region", "evidence", "margin", "made_by")
 _LARGEST = 20_000_000  # bytes
 _DEEPEST = 100  # nested objects and lists
 # effects of a system file that no claim takes into account
-_EFFECTS = frozenset(("leads", "heat", "gradient", "periodic", "condensation", "step", "thomson", "joule_split",
-                      "hysteresis", "drive", "power_slope", "feedthrough", "self_heating"))
+_EFFECTS = frozenset(("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson",
+                      "joule_split", "hysteresis", "drive", "power_slope", "feedthrough", "self_heating"))
 
 
 class Unreadable(Exception):

@@ -26,8 +26,8 @@ _HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to t
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
-            "inputs": ("drive.gain", "drive.offset", "drive.cubic", "drive.clip", "drive.delay", "drive.time_constant",
-                       "feedthrough.share")}
+            "inputs": ("drive.gain", "drive.offset", "drive.gain_slope", "drive.cubic", "drive.clip", "drive.delay",
+                       "drive.time_constant", "feedthrough.share")}
 
 
 def system_section(system: System, *, forcing: bool = False) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def named(heat: Heat, row: Row) -> SimpleNamespace:
 
 def _drive(p: Any, N: Row, w: Row, q: Row) -> None:
     linear = (1.0 + p.gain) * w[p.drive] + p.offset
-    value = linear - p.cubic * linear * linear * linear
+    value = (1.0 + p.gain_slope * abs(linear)) * linear - p.cubic * linear * linear * linear
     w[p.drive] = p.clip if value > p.clip else -p.clip if value < -p.clip else value
 
 
@@ -98,13 +98,19 @@ def _lead(p: Any, N: Row, w: Row, q: Row) -> None:
     q[p.a] += p.resistance * w[p.drive] * w[p.drive]
 
 
+def _follow(p: Any, N: Row, w: Row, q: Row) -> None:
+    flow = p.conductance * p.relative * abs(w[p.drive]) * (N[p.b] - N[p.a] + p.warmer)
+    q[p.a] += flow
+    q[p.b] -= flow
+
+
 def _condensation(p: Any, N: Row, w: Row, q: Row) -> None:
     q[p.a] += p.conductance * (p.dew_point - N[p.a]) if N[p.a] < p.dew_point else 0.0
 
 
-DRIVE = Heat(("drive", "gain", "offset", "cubic", "clip"), (
+DRIVE = Heat(("drive", "gain", "offset", "gain_slope", "cubic", "clip"), (
     "double linear = (1.0 + p->gain) * w[p->drive] + p->offset;",
-    "double value = linear - p->cubic * linear * linear * linear;",
+    "double value = (1.0 + p->gain_slope * fabs(linear)) * linear - p->cubic * linear * linear * linear;",
     "w[p->drive] = value > p->clip ? p->clip : value < -p->clip ? -p->clip : value;"), _drive)
 # by the names of the terms of `Equations.terms`
 HEATS = {
@@ -133,6 +139,9 @@ HEATS = {
         "q[p->a] += (1.0 - p->share) * power;", "q[p->b] += p->share * power;"), _heater),
     "LeadTerm": Heat(("a", "drive", "resistance"), (
         "q[p->a] += p->resistance * w[p->drive] * w[p->drive];",), _lead),
+    "FollowTerm": Heat(("a", "b", "drive", "conductance", "relative", "warmer"), (
+        "double flow = p->conductance * p->relative * fabs(w[p->drive]) * (N[p->b] - N[p->a] + p->warmer);",
+        "q[p->a] += flow;", "q[p->b] -= flow;"), _follow),
     "CondensationTerm": Heat(("a", "conductance", "dew_point"), (
         "q[p->a] += N[p->a] < p->dew_point ? p->conductance * (p->dew_point - N[p->a]) : 0.0;",), _condensation),
 }
@@ -167,5 +176,5 @@ def drives(eq: Equations) -> list[Row]:
     eq : Equations
         Equations of the exported system.
     """
-    return [[float(column), d.gain, d.offset, d.cubic, np.inf if d.clip is None else d.clip]
-            for column, d in eq.drives.of.items() if d.gain or d.offset or d.cubic or d.clip]
+    return [[float(column), d.gain, d.offset, d.gain_slope, d.cubic, np.inf if d.clip is None else d.clip]
+            for column, d in eq.drives.of.items() if d.gain or d.offset or d.gain_slope or d.cubic or d.clip]

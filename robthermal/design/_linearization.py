@@ -357,10 +357,13 @@ def feedback_linearization(system: System, modules: Iterable[str] | str | None =
 
 def _refuse_effects(modules: ModuleSet) -> None:
     """The feedback law inverts S, R and K; it knows no other heat of a module, no current but its own."""
+    following = tuple(f"links.{link.name}.follow." for link in modules.system.links
+                      if link.follow is not None and link.follow.column in modules.names)
     for name in modules.system.effects:
-        if name.startswith(tuple(f"modules.{module}." for module in modules.names)):
+        if name.startswith((*(f"modules.{module}." for module in modules.names), *following)):
             raise InputError(f"{name} = {modules.system.parameter(name):g} is not part of the feedback law",
-                             where="argument system", expected="modules with Seebeck, Joule and conducted heat only",
+                             where="argument system",
+                             expected="modules with Seebeck, Joule and conducted heat only, links that follow none",
                              remedy="Set it to 0 for the feedback law; what it adds is then a disturbance of v.")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._drives import Drives
-from ._effect_terms import CondensationTerm, HeaterTerm, LeadTerm, StepTerm
+from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm
 from ._parts import Link
 from ._terms import Array, Indices, NaturalTerm, RadiationTerm, Term
@@ -59,6 +59,14 @@ def _links(system: System, index: Index, drives: Drives) -> list[Term]:
                               _indices(drives.steps[link.name] for link in stepping),
                               np.array([link.conductance for link in stepping]),
                               np.array([link.step.relative for link in stepping if link.step]), warmer_b - warmer_a))
+    following = [link for link in system.links if link.follow is not None]
+    if following:
+        warmer_a, warmer_b = _warmer(system, following)
+        found.append(FollowTerm(_names(following), *_ends(following, index),
+                                _indices(drives.column[link.follow.column] for link in following if link.follow),
+                                np.array([link.conductance for link in following]),
+                                np.array([link.follow.relative for link in following if link.follow]),
+                                warmer_b - warmer_a))
     return found
 
 

@@ -18,7 +18,7 @@ from ._terms import Array
 if TYPE_CHECKING:
     from ._system import System
 
-_STATIC = ("drive.gain", "drive.offset", "drive.cubic", "drive.clip")
+_STATIC = ("drive.gain", "drive.offset", "drive.gain_slope", "drive.cubic", "drive.clip")
 
 
 class Drives:
@@ -61,7 +61,7 @@ class Drives:
         out = np.ones(u.shape)
         for column, drive in self._shaped.items():
             linear = (1 + drive.gain) * u[..., column] + drive.offset
-            out[..., column] = (1 + drive.gain) * (1 - 3 * drive.cubic * linear**2) * ~_clipped(drive, linear)
+            out[..., column] = (1 + drive.gain) * _bend(drive, linear) * ~_clipped(drive, linear)
         return out
 
     def parameter(self, name: str, u: Array) -> Array | None:
@@ -71,27 +71,39 @@ class Drives:
             return None
         column = self.column[part]
         drive, linear = self.of[column], (1 + self.of[column].gain) * u[..., column] + self.of[column].offset
-        clipped, bend = _clipped(drive, linear), 1 - 3 * drive.cubic * linear**2
+        clipped, bend = _clipped(drive, linear), _bend(drive, linear)
         out = np.zeros((*u.shape[:-1], self.width))
         out[..., column] = {"drive.gain": bend * u[..., column] * ~clipped, "drive.offset": bend * ~clipped,
+                            "drive.gain_slope": np.abs(linear) * linear * ~clipped,
                             "drive.cubic": -linear**3 * ~clipped,
-                            "drive.clip": np.sign(linear - drive.cubic * linear**3) * clipped}[field]
+                            "drive.clip": np.sign(_unclipped(drive, linear)) * clipped}[field]
         return out
 
 
 def _is_shaped(drive: Drive) -> bool:
-    return bool(drive.gain or drive.offset or drive.cubic or drive.clip)
+    return bool(drive.gain or drive.offset or drive.gain_slope or drive.cubic or drive.clip)
 
 
 def _shape(drive: Drive, u: Array) -> Array:
     linear = (1 + drive.gain) * u + drive.offset
-    value = linear - drive.cubic * linear**3
+    value = _unclipped(drive, linear)
     return value if drive.clip is None else np.where(np.abs(value.real) > drive.clip, np.sign(value.real) * drive.clip,
                                                      value)
 
 
+def _unclipped(drive: Drive, linear: Array) -> Array:
+    """Value before it is held within ±clip; analytic, as a complex step needs it."""
+    modulus = np.where(linear.real < 0, -linear, linear)
+    return (1 + drive.gain_slope * modulus) * linear - drive.cubic * linear**3
+
+
+def _bend(drive: Drive, linear: Array) -> Array:
+    """Derivative of `_unclipped` with respect to its argument."""
+    return 1 + 2 * drive.gain_slope * np.abs(linear) - 3 * drive.cubic * linear**2
+
+
 def _clipped(drive: Drive, linear: Array) -> NDArray[np.bool_]:
     """Where the value is held at ±clip."""
-    value = (linear - drive.cubic * linear**3).real
+    value = _unclipped(drive, linear).real
     outside: NDArray[np.bool_] = np.abs(value) > (np.inf if drive.clip is None else drive.clip)
     return outside

@@ -10,8 +10,8 @@ from ._part import Finite, Kelvin, Name, NonNegative, Part, Positive, Share
 class Drive(Part):
     """What a heater or an amplifier makes of the value u in its record column.
 
-    v = (1 + gain) u + offset, then v - cubic v³, then held within ±clip, then delayed, then lagged. Before the record
-    the column had its first value.
+    v = (1 + gain) u + offset, then (1 + gain_slope |v|) v - cubic v³, then held within ±clip, then delayed, then
+    lagged. Before the record the column had its first value.
 
     Parameters
     ----------
@@ -19,6 +19,8 @@ class Drive(Part):
         Relative gain error [-].
     offset : float
         Value added to the scaled column [unit of the column].
+    gain_slope : float
+        Relative change of the gain with the modulus of the value [1/unit].
     cubic : float
         Coefficient of the cubic saturation [1/unit²].
     clip : float, optional
@@ -31,6 +33,7 @@ class Drive(Part):
 
     gain: Finite = 0.0
     offset: Finite = 0.0
+    gain_slope: Finite = 0.0
     cubic: Finite = 0.0
     clip: Positive | None = None
     delay: NonNegative = 0.0
@@ -115,6 +118,21 @@ class Step(Part):
 
     relative: Finite = 0.0
     time: Finite
+
+
+class Follow(Part):
+    """A link that follows a column: its linear conductance is multiplied by 1 + relative times the column's modulus.
+
+    Parameters
+    ----------
+    column : str
+        Module or heater whose value, after its drive, is followed; a heater of gain 0 brings any recorded column.
+    relative : float
+        Growth of the conductance with the modulus of that value [1/unit].
+    """
+
+    column: Name
+    relative: NonNegative = 0.0
 
 
 class Lead(Part):

@@ -170,3 +170,47 @@ class StepTerm:
         """Derivatives with respect to ``conductance`` and ``step.relative``."""
         flow = (self.relative if field == "conductance" else self.conductance) * drive * (Tb - Ta + self.warmer)
         return flow, -flow
+
+
+@dataclass(frozen=True)
+class FollowTerm:
+    """A link that follows a column: conductance relative |v| (T_b - T_a), v what the column's drive makes of it."""
+
+    table: ClassVar[str] = "links"
+    supply: ClassVar[str] = ""
+    fields: ClassVar[tuple[str, ...]] = ("conductance", "follow.relative")
+
+    components: tuple[str, ...]
+    a: Indices
+    b: Indices
+    drive: Indices
+    conductance: Array
+    relative: Array
+    warmer: Array  # by how much the gradient makes end b warmer than end a [K]
+
+    @property
+    def supply_index(self) -> Indices:
+        """Nobody: heat of a link is the ambients'."""
+        return np.zeros(0, np.intp)
+
+    def heat(self, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
+        """Heat into a and b [W]."""
+        flow = self.conductance * self.relative * _modulus(drive) * (Tb - Ta + self.warmer)
+        return flow, -flow
+
+    def slopes(self, Ta: Array, Tb: Array, drive: Array) -> Slopes:
+        """The added conductance; at v = 0, where |v| has no slope, that of the mean of both sides, 0."""
+        added = self.conductance * self.relative
+        g, by_drive = added * _modulus(drive), added * np.sign(drive.real) * (Tb - Ta + self.warmer)
+        return Slopes(aa=-g, ab=g, ba=g, bb=-g, a_drive=by_drive, b_drive=-by_drive)
+
+    def parameter_slopes(self, field: str, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
+        """Derivatives with respect to ``conductance`` and ``follow.relative``."""
+        factor = self.relative if field == "conductance" else self.conductance
+        flow = factor * _modulus(drive) * (Tb - Ta + self.warmer)
+        return flow, -flow
+
+
+def _modulus(value: Array) -> Array:
+    """|value|, analytic but at 0: a complex step goes through it."""
+    return np.where(value.real < 0, -value, value)

@@ -111,9 +111,10 @@ def _drive(text: Text, column: str, drive: Drive) -> None:
         return
     u = text[column]
     gain, offset = text.parameter(f"{column}_gain", drive.gain, "1"), text.parameter(f"{column}_offset", drive.offset)
+    slope = text.parameter(f"{column}_gain_slope", drive.gain_slope)
     cubic = text.parameter(f"{column}_cubic", drive.cubic)
     linear = text.variable(f"{column}_linear", "", f"(1 + {gain}) * {u} + {offset}")
-    shaped = f"{linear} - {cubic} * {linear}^3"
+    shaped = f"(1 + {slope} * abs({linear})) * {linear} - {cubic} * {linear}^3"
     if drive.clip is not None:
         clip = text.parameter(f"{column}_clip", drive.clip)
         shaped = f"max(-{clip}, min({clip}, {shaped}))"
@@ -133,11 +134,16 @@ def _link(system: System, text: Text, link: Link, heats: dict[str, list[str]]) -
     a, b = (_seen(system, text, end, other) for end, other in (link.between, link.between[::-1]))
     flows = []
     if link.conductance:
-        conductance = text.parameter(f"G_{link.name}", link.conductance, "W/K")
+        conductance, changes = text.parameter(f"G_{link.name}", link.conductance, "W/K"), list[str]()
         if link.step:
             relative = text.parameter(f"step_{link.name}", link.step.relative, "1")
             time = text.parameter(f"step_time_{link.name}", link.step.time, "s")
-            conductance += f" * (1 + (if time >= {time} then {relative} else 0))"
+            changes.append(f"(if time >= {time} then {relative} else 0)")
+        if link.follow:
+            growth = text.parameter(f"follow_{link.name}", link.follow.relative)
+            changes.append(f"{growth} * abs({_driven(text, link.follow.column)})")
+        if changes:
+            conductance += f" * (1 + {' + '.join(changes)})"
         flows.append(f"{conductance} * ({a} - {b})")
     if link.natural:
         gain = text.parameter(f"natural_{link.name}", link.natural.gain)

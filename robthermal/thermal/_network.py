@@ -94,6 +94,10 @@ def _modules_exist(system: System) -> None:
 
 
 def _effects_exist(system: System) -> None:
+    for number, link in enumerate(system.links, start=1):
+        if link.follow is not None:
+            _known(link.follow.column, (*system.inputs, *system.modules), f"[[links]] number {number} follow.column",
+                   "a heater or a module")
     names: set[str] = set()
     for number, lead in enumerate(system.leads, start=1):
         where = f"[[leads]] number {number}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 _OF = {"gain": ("gain of the drive of {0}", "-"), "offset": ("offset of the drive of {0}", "unit of the input"),
+       "gain_slope": ("slope of the gain of the drive of {0}", "1/unit"),
        "cubic": ("cubic term of the drive of {0}", "1/unit²"),
        "clip": ("limit of the drive of {0}", "unit of the input"),
        "delay": ("delay of the drive of {0}", "s"), "time_constant": ("lag of the drive of {0}", "s")}
@@ -23,7 +24,8 @@ WORDS: dict[str, dict[str, tuple[str, str]]] = {  # by table and key: words and 
         "natural.exponent": ("exponent of the natural convection along link {0}", "-"),
         "radiation": ("radiation along link {0}", "W/K⁴"),
         "step.relative": ("relative step of the conductance of link {0}", "-"),
-        "step.time": ("time of the step of link {0}", "s")},
+        "step.time": ("time of the step of link {0}", "s"),
+        "follow.relative": ("growth of the conductance of link {0} with the column it follows", "1/unit")},
     "inputs": {"gain": ("gain of {0}", "W per unit"), **_DRIVE, "power_slope": ("slope of the power of {0}", "1/K"),
                "feedthrough.share": ("share of {0} in another lump", "-")},
     "modules": {

@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from ._system import System
 
 _LINEAR = tuple(f"{p}.{k}" for p in ("seebeck", "resistance", "conductance") for k in ("value", "slope"))
-_DRIVE = tuple(f"drive.{key}" for key in ("gain", "offset", "cubic", "clip", "delay", "time_constant"))
+_DRIVE = tuple(f"drive.{key}" for key in ("gain", "offset", "gain_slope", "cubic", "clip", "delay",
+                                           "time_constant"))
 FIELDS: dict[str, tuple[str, ...]] = {
     "ambients": ("temperature",),
     "lumps": ("capacity", "disturbance", "initial", "heat", "gradient", "periodic.heat", "periodic.period",
               "periodic.phase", "condensation.conductance", "condensation.dew_point"),
-    "links": ("conductance", "natural.gain", "natural.exponent", "radiation", "step.relative", "step.time"),
+    "links": ("conductance", "natural.gain", "natural.exponent", "radiation", "step.relative", "step.time",
+              "follow.relative"),
     "inputs": ("gain", *_DRIVE, "power_slope", "feedthrough.share"),
     "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
                 "hysteresis.time_constant", *_DRIVE),
@@ -46,7 +48,8 @@ def parameters(system: System) -> Iterator[tuple[str, float]]:
 
 
 EFFECT_SIZES = {  # zero or absent: the effect is not there
-    "lumps": ("heat", "gradient", "periodic.heat", "condensation.conductance"), "links": ("step.relative",),
+    "lumps": ("heat", "gradient", "periodic.heat", "condensation.conductance"),
+    "links": ("step.relative", "follow.relative"),
     "inputs": (*_DRIVE, "power_slope", "feedthrough.share"), "leads": ("resistance",), "sensors": ("self_heating",),
     "modules": ("thomson", "joule_split", "hysteresis.heat", *_DRIVE)}
 

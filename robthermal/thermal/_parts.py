@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from ._effect_parts import Condensation as Condensation
 from ._effect_parts import Drive as Drive
 from ._effect_parts import Feedthrough as Feedthrough
+from ._effect_parts import Follow as Follow
 from ._effect_parts import Hysteresis as Hysteresis
 from ._effect_parts import Lead as Lead
 from ._effect_parts import Periodic as Periodic
@@ -91,6 +92,8 @@ class Link(Part):
         Coefficient of Ta⁴ - Tb⁴ [W/K⁴].
     step : Step, optional
         Sudden change of the linear part.
+    follow : Follow, optional
+        Dependence of the linear part on a current, or on a recorded force or fan speed.
     name : str
         Name of the link; default "a-b".
     """
@@ -100,6 +103,7 @@ class Link(Part):
     natural: Natural | None = None
     radiation: NonNegative | None = None
     step: Step | None = None
+    follow: Follow | None = None
     name: str = ""
 
     @model_validator(mode="after")

@@ -15,6 +15,7 @@ from ._parts import (
     Drive,
     Feedthrough,
     FitRange,
+    Follow,
     Hysteresis,
     Input,
     Lead,
@@ -33,7 +34,7 @@ _PARTS: dict[str, type[Part]] = {"ambients": Ambient, "lumps": Lump, "links": Li
                                  "modules": Module, "leads": Lead, "sensors": Sensor, "fit": FitRange}
 _INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resistance": Linear, "conductance": Linear,
                                  "drive": Drive, "hysteresis": Hysteresis, "periodic": Periodic, "step": Step,
-                                 "condensation": Condensation, "feedthrough": Feedthrough}
+                                 "condensation": Condensation, "feedthrough": Feedthrough, "follow": Follow}
 _TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "sensors", "fit")
 
 _EXPECTED = {

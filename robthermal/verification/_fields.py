@@ -14,8 +14,8 @@ from ._numbers import exact, name_of, show
 
 Interval = tuple[fmpq, fmpq]
 # effects of a system file beyond the plain network: no claim knows them, whatever stands under these names
-_EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "thomson", "joule_split", "hysteresis",
-            "drive", "power_slope", "feedthrough", "self_heating")
+_EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson", "joule_split",
+            "hysteresis", "drive", "power_slope", "feedthrough", "self_heating")
 
 
 def get(table: Mapping[str, Any], key: str, where: str) -> Any:

@@ -48,12 +48,14 @@ CASES = [
     ("input_offset", ["q"], {"offset": 0.5}), ("input_offset", ["m"], {"offset": 0.2}),
     ("input_saturation", ["q"], {"cubic": 0.03}), ("input_saturation", ["m"], {"cubic": 0.1}),
     ("input_saturation", ["m"], {"clip": 0.8}),
+    ("input_saturation", ["q"], {"gain_slope": -0.12}), ("input_gain_slope", ["q"], {"slope": 0.3}),
     ("input_delay", ["q"], {"delay": 5.3}), ("input_delay", ["m"], {"delay": 1.7}),
     ("input_lag", ["q"], {"time_constant": 6.0}), ("input_lag", ["m"], {"time_constant": 5.0}),
     ("heater_power_slope", ["q"], {"slope": 0.02}), ("input_feedthrough", ["q", "hot"], {"share": 0.4}),
     ("ambient_gradient", ["plate"], {"difference": 2.5}),
     ("periodic_load", ["cold"], {"heat": 0.9, "period": 37.0, "phase": 0.7}),
     ("conductance_step", ["plate-cold"], {"relative": -0.4, "time": 130.0}),
+    ("driven_conductance", ["plate-cold", "m"], {"relative": 0.4}),
     ("condensation", ["cold"], {"conductance": 0.5, "dew_point": 296.2}),
 ]
 IDS = [f"{effect} {where[0]}" for effect, where, _ in CASES]
@@ -65,6 +67,8 @@ def shaped(effect: str, p: dict, u: float) -> float:
         return (1 + p["gain"]) * u
     if effect == "input_offset":
         return u + p["offset"]
+    if effect == "input_gain_slope" or "gain_slope" in p:
+        return u * (1 + p.get("slope", p.get("gain_slope")) * abs(u))
     if effect == "input_saturation":
         return np.clip(u, -p["clip"], p["clip"]) if "clip" in p else u - p["cubic"] * u**3
     return u
@@ -127,6 +131,7 @@ def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
         heat = 0.7 * power * (1 + (p["slope"] * (plate - T0) if is_("heater_power_slope") else 0.0))
         through = p["share"] * heat if is_("input_feedthrough") else 0.0
         g = 1.5 * (1 + p["relative"] * (wall >= p["time"]) if is_("conductance_step") else 1.0)
+        g *= 1 + p["relative"] * abs(current) if is_("driven_conductance") else 1.0
         taken = 0.5 * p["coefficient"] * current * (hot - cold) if is_("thomson") else 0.0
         moved = p["split"] * R * current**2 if is_("joule_split") else 0.0
         into = {"plate": g * (cold - plate) + 0.06 * (warm - plate) + heat - through,
@@ -212,7 +217,7 @@ def test_sensitivities_at_zero_are_one_sided_derivatives(effect, where, values):
     if size == "clip" or effect == "hidden_mass":
         pytest.skip("has no zero")
     shape = {name: value for name, value in values.items() if name not in kind.sizes}
-    added = rt.thermal.add_effect(without_slope(effect), effect, where, shape)
+    added = rt.thermal.add_effect(without_slope(effect), effect, where, {**shape, size: 0.0})
     name = added.parameters[size]
     exact = rt.thermal.trajectory(added.system, run, sensitivities=[name], tolerance=FINE).sensitivity[..., 0]
     step = (2e-2 if effect == "input_lag" else 1e-3) * abs(values[size])  # a lag far below a sample is stiff
@@ -277,7 +282,8 @@ def test_all_effects_together_have_exact_sensitivities():
 
 
 @pytest.mark.parametrize("effect", ["heat_source", "ambient_gradient", "heater_power_slope", "lead_heating",
-                                    "condensation", "thomson", "input_feedthrough", "input_gain"])
+                                    "condensation", "thomson", "input_feedthrough", "input_gain",
+                                    "driven_conductance"])
 def test_large_networks_simulate_the_same(effect, monkeypatch):
     where, values = next((where, values) for name, where, values in CASES if name == effect)
     system = rt.thermal.add_effect(bench(), effect, where, values).system
@@ -364,6 +370,10 @@ def test_bad_effects_are_refused(arguments, message):
     ("[inputs.q]\nlump = 'a'\ndrive = { gian = 0.1 }", "Did you mean 'gain'"),
     ("[inputs.q]\nlump = 'a'\nfeedthrough = { lump = 'b', share = 0.1 }", "feedthrough"),
     ("[inputs.q]\nlump = 'a'\nfeedthrough = { lump = 'b', share = 2.0 }", "at most 1"),
+    ("[[links]]\nbetween = ['a', 'room']\nname = 'l'\nconductance = 1.0\nfollow = { column = 'b', relative = 0.1 }",
+     r"\[\[links\]\] number 2 follow.column: 'b' does not exist"),
+    ("[inputs.F]\nlump = 'a'\ngain = 0.0\n[[links]]\nbetween = ['a', 'room']\nname = 'l'\nconductance = 1.0\n"
+     "follow = { column = 'F', relative = -0.1 }", "at least 0"),
     ("[lumps.b]\ncapacity = 1.0\ncondensation = { dew_point = 10.0 }", "150 K")])
 def test_bad_keys_are_refused(table, message):
     text = ("[system]\ntemperature_unit = 'K'\n[ambients.room]\ntemperature = 300.0\n[lumps.a]\ncapacity = 1.0\n"

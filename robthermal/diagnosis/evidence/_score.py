@@ -93,6 +93,21 @@ class Scores:
         alike = 1.0 - self.confusion[i] ** 2 < ALIAS**2
         return [int(j) for j in np.flatnonzero(alike) if j != i]
 
+    def possible_aliases(self, i: int) -> list[int]:
+        """Aliases of a possible candidate whose own size would be possible: a conductance below zero is no answer.
+
+        Parameters
+        ----------
+        i : int
+            Place in `candidates`. Of one that is impossible by itself all aliases count: beside another effect the sign
+            of its size may be the other one, and theirs with it.
+
+        Returns
+        -------
+        list of int
+        """
+        return [j for j in self.aliases(i) if self.possible[j] or not self.possible[i]]
+
     @property
     def not_testable(self) -> dict[tuple[str, tuple[str, ...]], str]:
         """What these records cannot show, by (effect, where), with the reason."""

@@ -101,7 +101,7 @@ def _entry(found: EffectSet, candidate: Candidate, scores: Scores, delta_bic: fl
     keys = [one.key for one in scores.candidates]
     i = keys.index(candidate.key)
     return Entry(candidate, found.fit, delta_bic, float(scores.p_value[i]),
-                 tuple(scores.candidates[j] for j in scores.aliases(i)))
+                 tuple(scores.candidates[j] for j in scores.possible_aliases(i)))
 
 
 def _representative(key: Key, scores: Scores) -> Key:

@@ -150,7 +150,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
         best = max((entry.delta_bic for entry in entries), default=0.0)
         if fit.n_readings * math.log(fit.rss / promised(fit, scores, i)) < _PROMISED * best - BEHIND:
             continue
-        aliases = tuple(scores.candidates[j] for j in scores.aliases(i))
+        aliases = tuple(scores.candidates[j] for j in scores.possible_aliases(i))
         try:
             entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
                                     aliases, best))

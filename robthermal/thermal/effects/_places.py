@@ -34,6 +34,11 @@ def driven(system: System) -> list[Where]:
     return [(name,) for name in (*system.inputs, *system.modules)]
 
 
+def level(system: System) -> list[Where]:
+    """Heaters whose gain does not depend on their value."""
+    return [(name,) for name, part in system.inputs.items() if not part.drive.gain_slope]
+
+
 def prompt(key: str) -> Callable[[System], list[Where]]:
     """Inputs and modules that are not late already."""
     return lambda system: [*((name,) for name, part in system.inputs.items() if not getattr(part.drive, key)),

@@ -7,12 +7,13 @@ import numpy as np
 from .._system import System
 from ._builders import Builder, numbers
 from ._effect import Effect, Quantity
-from ._places import driven
+from ._places import driven, level
 from ._response import RecordContext, Response, Values, Where
 from ._signatures import altered, by_heat, column_of, driven_by
 
 _add = numbers("", cubic="drive.cubic")
 _level = numbers("", clip="drive.clip")
+_falling = numbers("inputs", gain_slope="drive.gain_slope")
 
 
 def _unclipped(system: System) -> list[Where]:
@@ -50,6 +51,17 @@ _CLIP = Effect(
     separated_by="a sweep of the amplitude",
 )
 
+_SLOPE = Effect(
+    name="input_saturation",
+    places=level,
+    quantities=(Quantity("gain_slope", "1/unit", -10.0, 0.0, typical=1e-6),),
+    add=_falling,
+    signature=by_heat(_falling, "gain_slope", -1e-6),
+    hidden=altered,
+    confused_with=("input_gain", "heater_power_slope"),
+    separated_by="a sweep of the amplitude",
+)
+
 EFFECT = Effect(
     name="input_saturation",
     rank=200,
@@ -60,7 +72,7 @@ EFFECT = Effect(
     nonnegative=("clip",),
     add=_add,
     signature=by_heat(_add, "cubic", 1e-6),
-    forms=(_CLIP,),
+    forms=(_CLIP, _SLOPE),
     confused_with=("joule_split", "lead_heating"),
     separated_by="a sweep of the amplitude",
 )
