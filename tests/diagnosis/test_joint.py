@@ -126,7 +126,8 @@ def as_rounds(fit: rt.diagnosis.Refit, found: EffectSet) -> tuple[Accepted, ...]
 
 
 def taken(fit: rt.diagnosis.Refit, scores: Scores, names: dict[str, float]) -> EffectSet:
-    chosen = {candidate.label: candidate for candidate in scores.candidates if candidate.effect.size.name != "clip"}
+    chosen = {candidate.label: candidate for candidate in scores.candidates
+              if candidate.effect.size.name not in ("clip", "gain_slope")}
     return refit_set(fit, tuple(chosen[name] for name in names), list(names.values()))
 
 
