@@ -235,7 +235,7 @@ def everything() -> rt.System:
     for effect, where, values in CASES:
         if effect in ("hysteresis", "hidden_mass", "input_delay", "input_lag", "periodic_load", "conductance_step"):
             continue
-        if "clip" in values or effect.endswith("_slope") and where == ["m"]:
+        if values.keys() & {"clip", "gain_slope"} or effect.endswith("_slope") and where == ["m"]:
             continue
         system = rt.thermal.add_effect(system, effect, where, values).system
     return system
