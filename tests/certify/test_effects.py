@@ -10,7 +10,8 @@ PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sen
           "input or module": "m1"}
 OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "sensor_lag",
        "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope"}  # plain system content
-FORCING = {"heat_source", "sensor_self_heating", "ambient_gradient", "periodic_load", "input_feedthrough"}
+FORCING = {"heat_source", "sensor_self_heating", "ambient_gradient", "periodic_load", "input_feedthrough",
+           "input_gain_slope"}
 
 
 def machine() -> rt.System:
