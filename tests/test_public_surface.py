@@ -40,16 +40,16 @@ SURFACE = {
     "design": """
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DESIGN_FORMAT
         DesignCode DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
-        LinearController LoopMargins Margins Matrices MatrixController ObserverModel PID Placement PlantMargins
+        LinearController LoopMargins Margins Matrices MatrixController ModalFeedback ModalReconstruction ObserverModel PID Placement PlantMargins
         Polarity Protection ProtectionRules Reach Reachable RegulatedPoint Seen SetpointRamp StateFeedback
-        StepResponseLinearity Tuning certify_loop protection setpoint_ramp
+        StepResponseLinearity ThermalModes Tuning certify_loop modal_feedback protection reconstruct setpoint_ramp thermal_modes
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_law simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst Terminal
-        anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
+        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
+        Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,
     "diagnosis": """
@@ -98,8 +98,8 @@ SURFACE = {
     """,
     "synthesis": """
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
-        SynthesisCode Terminal anti_windup frf_pid h2 hinf invariant_ellipsoid lpv mixed mpc
+        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
+        SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
         mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,

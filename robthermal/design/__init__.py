@@ -4,6 +4,7 @@ from ..synthesis import AntiWindupDesign as AntiWindupDesign
 from ..synthesis import Design as Design
 from ..synthesis import FeedbackDesign as FeedbackDesign
 from ..synthesis import FrfDesign as FrfDesign
+from ..synthesis import HybridIntegratorGain as HybridIntegratorGain
 from ..synthesis import InvariantEllipsoid as InvariantEllipsoid
 from ..synthesis import LpvDesign as LpvDesign
 from ..synthesis import MpcDesign as MpcDesign
@@ -14,6 +15,7 @@ from ..synthesis import anti_windup as anti_windup
 from ..synthesis import frf_pid as frf_pid
 from ..synthesis import h2 as h2
 from ..synthesis import hinf as hinf
+from ..synthesis import hybrid_integrator_gain as hybrid_integrator_gain
 from ..synthesis import invariant_ellipsoid as invariant_ellipsoid
 from ..synthesis import lpv as lpv
 from ..synthesis import mixed as mixed
@@ -51,6 +53,8 @@ from ._matrix_controller import DESIGN_FORMAT as DESIGN_FORMAT
 from ._matrix_controller import MatrixController as MatrixController
 from ._matrix_controller import gains_digest as gains_digest
 from ._matrix_controller import load_controller as load_controller
+from ._modal_feedback import ModalFeedback as ModalFeedback
+from ._modal_feedback import modal_feedback as modal_feedback
 from ._observer import GainObserver as GainObserver
 from ._observer import observer as observer
 from ._observer_model import ObserverModel as ObserverModel
@@ -84,6 +88,10 @@ from ._step_response_linearity import step_response_linearity as step_response_l
 from ._tem_feedback import TemFeedback as TemFeedback
 from ._tem_feedback import tem_feedback as tem_feedback
 from ._tem_hull import tem_polytope as tem_polytope
+from ._thermal_modes import ModalReconstruction as ModalReconstruction
+from ._thermal_modes import ThermalModes as ThermalModes
+from ._thermal_modes import reconstruct as reconstruct
+from ._thermal_modes import thermal_modes as thermal_modes
 from ._tuning import Tuning as Tuning
 from ._tuning import checked_margins as checked_margins
 from ._tuning import tune_pi as tune_pi
@@ -96,16 +104,16 @@ collapse = step_response_linearity
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
            "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
            "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
-           "Matrices", "MatrixController", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity",
+           "Matrices", "MatrixController", "ModalFeedback", "ModalReconstruction", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity",
            "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint", "Seen", "SetpointRamp",
-           "StateFeedback", "StepResponseLinearity", "TemFeedback", "Tuning", "certify_loop", "check_polarity",
+           "StateFeedback", "StepResponseLinearity", "TemFeedback", "ThermalModes", "Tuning", "certify_loop", "check_polarity",
            "checked_margins", "cold_side", "collapse", "constant_gain", "corner_plants", "disturbance_observer",
            "face_ranges", "feed_forward", "feedback_linearization", "gains_digest", "linear_controller",
-           "load_controller", "loop_margins", "loop_poles", "observer", "pid", "place_sensors", "protection",
-           "reachable", "regulated_points", "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback",
-           "step_response_linearity", "tem_feedback", "tem_polytope", "tune_pi", "unobservable"]
+           "load_controller", "loop_margins", "loop_poles", "modal_feedback", "observer", "pid", "place_sensors", "protection",
+           "reachable", "reconstruct", "regulated_points", "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback",
+           "step_response_linearity", "tem_feedback", "tem_polytope", "thermal_modes", "tune_pi", "unobservable"]
 # of synthesis
-__all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign",
-            "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
-            "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
-            "uncertainty_weight"]
+__all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "HybridIntegratorGain", "InvariantEllipsoid",
+            "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
+            "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback",
+            "polytopic_feedback", "uncertainty_weight"]

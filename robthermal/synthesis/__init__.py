@@ -15,6 +15,8 @@ from ._frf_pid import FrfDesign as FrfDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
+from ._hybrid_integrator_gain import HybridIntegratorGain as HybridIntegratorGain
+from ._hybrid_integrator_gain import hybrid_integrator_gain as hybrid_integrator_gain
 from ._lpv import lpv as lpv
 from ._lpv_design import LpvDesign as LpvDesign
 from ._mixed import mixed as mixed
@@ -27,7 +29,7 @@ from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 from ._uncertainty_weight import uncertainty_weight as uncertainty_weight
 
-__all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "InvariantEllipsoid", "LpvDesign", "MpcDesign",
-           "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
-           "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback",
-           "uncertainty_weight"]
+__all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "HybridIntegratorGain", "InvariantEllipsoid",
+           "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid",
+           "h2", "hinf", "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis",
+           "output_feedback", "polytopic_feedback", "uncertainty_weight"]

@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from .._checks import positive_number, quoted
 from .._control import control
 from ..errors import InputError
+from ..linear import Plant
 from ._plant import GeneralizedPlant
 
 
@@ -44,16 +45,30 @@ def sampled(plant: GeneralizedPlant, sample_time: object) -> GeneralizedPlant:
     """Plant with all inputs held between samples, exactly."""
     if sample_time is None:
         return plant
-    T = positive_number(sample_time, "sample_time", "s")
     if plant.dt:
         raise InputError(f"the plant is already sampled, at {plant.dt:g} s", where="argument sample_time",
                          expected="a continuous plant", remedy="Leave sample_time out.")
-    n, m = len(plant.A), plant.joined.B.shape[1]
-    if not np.isfinite(grown := expm(np.block([[plant.A, plant.joined.B], [np.zeros((m, n + m))]]) * T)).all():
+    grown, w = held(plant.joined, sample_time), plant.B1.shape[1]
+    return replace(plant, A=grown.A, B1=grown.B[:, :w], B2=grown.B[:, w:], dt=grown.dt)
+
+
+def held(plant: Plant, sample_time: object) -> Plant:
+    """Plant with its inputs held between samples, exactly; one that is sampled already as it is."""
+    T = plant.dt if sample_time is None else positive_number(sample_time, "sample_time", "s")
+    if not T:
+        raise InputError("sample_time is missing", where="argument sample_time", expected="a time in seconds",
+                         remedy="The controller is sampled.")
+    if plant.dt and plant.dt != T:
+        raise InputError(f"the plant is sampled at {plant.dt:g} s", where="argument sample_time",
+                         expected="the same, or a continuous plant")
+    if plant.dt:
+        return plant
+    n, m = plant.B.shape
+    grown = expm(np.block([[plant.A, plant.B], [np.zeros((m, n + m))]]) * T)
+    if not np.isfinite(grown).all():
         raise InputError(f"sample_time = {T:g} s is too long for the modes of the plant", where="argument sample_time",
                          expected="a shorter time")
-    w = plant.B1.shape[1]
-    return replace(plant, A=grown[:n, :n], B1=grown[:n, n:n + w], B2=grown[:n, n + w:], dt=T)
+    return Plant(grown[:n, :n], grown[:n, n:], plant.C, plant.D, T)
 
 
 def state_space(P: Any) -> control.StateSpace:

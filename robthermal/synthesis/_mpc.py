@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
 
 from .._arrays import Array
-from .._checks import positive_number, quoted, whole_number
+from .._checks import quoted, whole_number
 from .._control import control
 from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..linear import Plant, read_plant
+from ._arguments import held
 from ._design import Design, RobustAgainst, as_system
 from ._ellipsoid import shadow
 from ._mpc_limits import Limits, read_limits
@@ -291,21 +291,7 @@ def _sampled(plant: Any, sample_time: object) -> Plant:
     if not isinstance(plant, control.StateSpace) or not len(found.A) or not found.B.shape[1]:
         raise InputError("no state space with states and controls", where="argument plant",
                          expected="a control.StateSpace whose states are measured")
-    T = found.dt if sample_time is None else positive_number(sample_time, "sample_time", "s")
-    if not T:
-        raise InputError("sample_time is missing", where="argument sample_time", expected="a time in seconds",
-                         remedy="A predictive controller is sampled.")
-    if found.dt and found.dt != T:
-        raise InputError(f"the plant is sampled at {found.dt:g} s", where="argument sample_time",
-                         expected="the same, or a continuous plant")
-    if found.dt:
-        return found
-    n, m = found.B.shape
-    grown = expm(np.block([[found.A, found.B], [np.zeros((m, n + m))]]) * T)
-    if not np.isfinite(grown).all():
-        raise InputError(f"sample_time = {T:g} s is too long for the modes of the plant", where="argument sample_time",
-                         expected="a shorter time")
-    return Plant(grown[:n, :n], grown[:n, n:], found.C, found.D, T)
+    return held(found, sample_time)
 
 
 def _measured(plant: Plant) -> Any:
