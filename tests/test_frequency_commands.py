@@ -123,3 +123,19 @@ def test_a_noisy_room_takes_a_second_sensor_or_its_noise(bar):
                    "--input-noise", "room=0.5", folder=folder)
     bad = command("frf", "noisy.csv", "--input", "room", "--output", "T", "--instrument", "room", folder=folder)
     assert both.status == bad.status == 2 and "given together" in both.err and "INPUT=COLUMN" in bad.err
+
+
+def test_uncertain_poles_widen_the_bands(bar):
+    """The pole of the bar is off by 20 %, and known to be."""
+    system, folder = bar
+    found = {}
+    for key, more in (("sure", ()), ("unsure", ("--pole-deviation", 0.2))):
+        done = command("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", "--pole", -0.06, *more,
+                       "--out", f"{key}.json", "--json", folder=folder)
+        assert done.status == 0, done.err
+        found[key] = rt.identify.FrequencyResponse.load(folder / f"{key}.json")
+    radii = {key: G.confidence_radius(0.95)[0, 0] for key, G in found.items()}
+    assert (radii["unsure"] >= radii["sure"]).all() and (radii["unsure"] > 1.5 * radii["sure"]).any()
+    assert "poles within 20 %" in found["unsure"].method
+    refused = command("frf", "run.csv", "--system", "bar.toml", "--pole-deviation", 0.2, folder=folder)
+    assert refused.status == 2 and "lrmp" in refused.err

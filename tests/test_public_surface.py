@@ -40,16 +40,19 @@ SURFACE = {
     "design": """
         Bounds CertifiedLoop ClosedLoop ColdSide Collapse Command ConstantGain ControllerInput DESIGN_FORMAT
         DesignCode DisturbanceObserver Estimate ExtendedKalmanFilter FeedForward FeedbackLinearization GainObserver
-        LinearController LoopMargins Margins Matrices MatrixController ModalFeedback ModalReconstruction ObserverModel PID Placement PlantMargins
+        LinearController LoopMargins Margins Matrices MatrixController ModalFeedback ModalReconstruction
+        ObserverModel PID Placement PlantMargins
         Polarity Protection ProtectionRules Reach Reachable RegulatedPoint Seen SetpointRamp StateFeedback
-        StepResponseLinearity ThermalModes Tuning certify_loop modal_feedback protection reconstruct setpoint_ramp thermal_modes
+        StepResponseLinearity ThermalModes Tuning certify_loop modal_feedback protection reconstruct
+        setpoint_ramp thermal_modes
         check_polarity checked_margins cold_side collapse constant_gain corner_plants disturbance_observer
         face_ranges feed_forward feedback_linearization gains_digest linear_controller load_controller loop_margins
         loop_poles observer pid place_sensors reachable regulated_points simulate_law simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
-        Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
+        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep
+        RobustAgainst Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
+        mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,
     "diagnosis": """
@@ -64,8 +67,8 @@ SURFACE = {
         Diverged InputError Outcome OutcomeCode RobthermalError
     """,
     "identify": """
-        FrequencyResponse IdentifyCode bla closed_loop errors_in_variables etfe is_response lpm lrm lrmp mean_inputs
-        read_response spectral
+        FrequencyResponse IdentifyCode PoleSensitivity bla closed_loop errors_in_variables etfe is_response lpm lrm
+        lrmp mean_inputs pole_sensitivity read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system compare_modules couple_subsystems demo_project design_system
@@ -98,8 +101,9 @@ SURFACE = {
     """,
     "synthesis": """
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep RobustAgainst
-        SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
+        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep
+        RobustAgainst SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv
+        mixed mpc
         mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,

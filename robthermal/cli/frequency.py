@@ -20,6 +20,9 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         half_width: Annotated[int, typer.Option(help="Bins on each side of a local window.")] = 8,
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
         poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
+        pole_deviation: Annotated[float | None, typer.Option(
+            "--pole-deviation", help="Of lrmp: how uncertain its poles are, relative to their size; widens the bands.",
+            metavar="SHARE")] = None,
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
         reference: Annotated[list[str] | None, typer.Option(
             "--reference", help="Of a closed loop: column of a set-point or added excitation, one per input, may "
@@ -46,7 +49,8 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
                                                method=method, half_width=half_width, degree=degree, poles=poles or [],
                                                band=band, tables=reading(record, column), reference=reference or [],
                                                instruments=rt.jobs.measured.instruments_from_text(instrument or []),
-                                               input_noise=rt.jobs.measured.noise_from_text(input_noise or []))
+                                               input_noise=rt.jobs.measured.noise_from_text(input_noise or []),
+                                               pole_deviation=pole_deviation)
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)

@@ -104,14 +104,15 @@ collapse = step_response_linearity
 __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Command", "ConstantGain",
            "ControllerInput", "DESIGN_FORMAT", "DesignCode", "DisturbanceObserver", "Estimate", "ExtendedKalmanFilter",
            "FeedForward", "FeedbackLinearization", "GainObserver", "LinearController", "LoopMargins", "Margins",
-           "Matrices", "MatrixController", "ModalFeedback", "ModalReconstruction", "ObserverModel", "PID", "Placement", "PlantMargins", "Polarity",
-           "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint", "Seen", "SetpointRamp",
-           "StateFeedback", "StepResponseLinearity", "TemFeedback", "ThermalModes", "Tuning", "certify_loop", "check_polarity",
-           "checked_margins", "cold_side", "collapse", "constant_gain", "corner_plants", "disturbance_observer",
-           "face_ranges", "feed_forward", "feedback_linearization", "gains_digest", "linear_controller",
-           "load_controller", "loop_margins", "loop_poles", "modal_feedback", "observer", "pid", "place_sensors", "protection",
-           "reachable", "reconstruct", "regulated_points", "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback",
-           "step_response_linearity", "tem_feedback", "tem_polytope", "thermal_modes", "tune_pi", "unobservable"]
+           "Matrices", "MatrixController", "ModalFeedback", "ModalReconstruction", "ObserverModel", "PID", "Placement",
+           "PlantMargins", "Polarity", "Protection", "ProtectionRules", "Reach", "Reachable", "RegulatedPoint", "Seen",
+           "SetpointRamp", "StateFeedback", "StepResponseLinearity", "TemFeedback", "ThermalModes", "Tuning",
+           "certify_loop", "check_polarity", "checked_margins", "cold_side", "collapse", "constant_gain",
+           "corner_plants", "disturbance_observer", "face_ranges", "feed_forward", "feedback_linearization",
+           "gains_digest", "linear_controller", "load_controller", "loop_margins", "loop_poles", "modal_feedback",
+           "observer", "pid", "place_sensors", "protection", "reachable", "reconstruct", "regulated_points",
+           "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback", "step_response_linearity",
+           "tem_feedback", "tem_polytope", "thermal_modes", "tune_pi", "unobservable"]
 # of synthesis
 __all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "HybridIntegratorGain", "InvariantEllipsoid",
             "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",

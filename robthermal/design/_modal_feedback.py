@@ -1,4 +1,4 @@
-"""Feedback and feed-forward on the thermal modes that the tool point feels, with a proof of what the tool point does."""
+"""Feedback and feed-forward on the thermal modes that the tool point feels, and a proof of what it does."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def modal_feedback(modes: ThermalModes, *, sensors: Sequence[str], heaters: Sequ
     Parameters
     ----------
     modes : ThermalModes
-        From `thermal_modes`.
+        Modes of the machine, from `thermal_modes`.
     sensors : sequence of str
         Thermometers that are read, at least `count`.
     heaters : sequence of str
@@ -105,8 +105,8 @@ def modal_feedback(modes: ThermalModes, *, sensors: Sequence[str], heaters: Sequ
     Raises
     ------
     InputError
-        Unknown names, a heater that is a disturbance too, fewer thermometers or heaters than modes, thermometers that do
-        not tell the modes apart, heaters that do not reach them.
+        Unknown names, a heater that is a disturbance too, fewer thermometers or heaters than modes, thermometers that
+        do not tell the modes apart, heaters that do not reach them.
 
     References
     ----------
@@ -188,7 +188,7 @@ def _outcome(modes: ThermalModes, chosen: tuple[int, ...], stable: bool, without
     if not np.isfinite(values).all():
         return SynthesisCode.NOT_CERTIFIED.outcome("The loop is stable in floats, but its gain was not proven.")
     return SynthesisCode.CERTIFIED.outcome(
-        f"Certified for all {len(modes.rates)} modes and the controller as returned: with PI control of mode {said} the "
-        f"tool point moves by less than {values[0]:.3g} m in the norm of the disturbances of norm 1, with exact "
-        f"feed-forward by less than {values[1]:.3g} m; without control by {without:.3g} m. Limits of the heaters, the "
-        "sampling and a network that differs are not covered.")
+        f"Certified for all {len(modes.rates)} modes and the controller as returned: with PI control of mode {said} "
+        f"the L2 gain from the disturbances to the tool point is below {values[0]:.3g} m per unit, with exact "
+        f"feed-forward below {values[1]:.3g}; without control it is {without:.3g}. Limits of the heaters, sampling and "
+        "a network that differs are not covered.")

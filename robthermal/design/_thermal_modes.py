@@ -204,8 +204,8 @@ def thermal_modes(system: System, *, expansion: Mapping[str, float],
     >>> import robthermal as rt
     >>> stage = rt.System(ambients={"room": {"temperature": 295.0}},
     ...     lumps={"left": {"capacity": 500.0}, "right": {"capacity": 500.0}},
-    ...     links=[{"between": ("left", "right"), "conductance": 2.0}, {"between": ("left", "room"), "conductance": 0.5},
-    ...            {"between": ("right", "room"), "conductance": 0.5}],
+    ...     links=[{"between": ("left", "right"), "conductance": 2.0},
+    ...            *({"between": (side, "room"), "conductance": 0.5} for side in ("left", "right"))],
     ...     inputs={"motor": {"lump": "left"}}, sensors={"T1": {"lump": "left"}, "T2": {"lump": "right"}})
     >>> modes = rt.design.thermal_modes(stage, expansion={"left": 2e-6, "right": -2e-6})  # tilt
     >>> (1 / modes.rates).round(6).tolist(), (1e6 * modes.static("motor")).round(6).tolist()
@@ -242,7 +242,7 @@ def reconstruct(modes: ThermalModes, sensors: Sequence[str], chosen: Sequence[in
     Parameters
     ----------
     modes : ThermalModes
-        From `thermal_modes`.
+        Modes of the machine, from `thermal_modes`.
     sensors : sequence of str
         Thermometers that are read, at least as many as modes.
     chosen : sequence of int
@@ -262,8 +262,9 @@ def reconstruct(modes: ThermalModes, sensors: Sequence[str], chosen: Sequence[in
     >>> import robthermal as rt
     >>> stage = rt.System(ambients={"room": {"temperature": 295.0}},
     ...     lumps={"left": {"capacity": 500.0}, "right": {"capacity": 500.0}},
-    ...     links=[{"between": ("left", "right"), "conductance": 2.0}, {"between": ("left", "room"), "conductance": 0.5},
-    ...            {"between": ("right", "room"), "conductance": 0.5}], sensors={"T1": {"lump": "left"}})
+    ...     links=[{"between": ("left", "right"), "conductance": 2.0},
+    ...            *({"between": (side, "room"), "conductance": 0.5} for side in ("left", "right"))],
+    ...     sensors={"T1": {"lump": "left"}})
     >>> modes = rt.design.thermal_modes(stage, expansion={"left": 2e-6, "right": -2e-6})
     >>> seen = rt.design.reconstruct(modes, ["T1"], [1])  # the mode of the tilt, from one thermometer
     >>> seen.tool_error.round(9).tolist()  # the uniform mode is taken for tilt: 4 um/K
@@ -273,7 +274,8 @@ def reconstruct(modes: ThermalModes, sensors: Sequence[str], chosen: Sequence[in
     which = np.asarray(list(chosen), dtype=int)
     n = len(modes.rates)
     if not which.size or len(set(which.tolist())) != which.size or which.min() < 0 or which.max() >= n:
-        raise InputError(f"modes {list(chosen)}", where="argument chosen", expected=f"different numbers from 0 to {n - 1}")
+        raise InputError(f"modes {list(chosen)}", where="argument chosen",
+                         expected=f"different numbers from 0 to {n - 1}")
     seen = modes.readings[place(modes.sensors, sensors, "argument sensors")] @ modes.shapes
     own = seen[:, which]
     if len(own) < which.size or np.linalg.svd(own, compute_uv=False)[-1] <= _SEEN:

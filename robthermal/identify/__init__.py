@@ -8,11 +8,13 @@ from ._lpm import lpm as lpm
 from ._lrm import lrm as lrm
 from ._lrmp import lrmp as lrmp
 from ._outcomes import IdentifyCode as IdentifyCode
+from ._pole_sensitivity import PoleSensitivity as PoleSensitivity
+from ._pole_sensitivity import pole_sensitivity as pole_sensitivity
 from ._read_response import read_response as read_response
 from ._records import mean_inputs as mean_inputs
 from ._response import FrequencyResponse as FrequencyResponse
 from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
-__all__ = ["FrequencyResponse", "IdentifyCode", "bla", "closed_loop", "errors_in_variables", "etfe", "is_response",
-           "lpm", "lrm", "lrmp", "mean_inputs", "read_response", "spectral"]
+__all__ = ["FrequencyResponse", "IdentifyCode", "PoleSensitivity", "bla", "closed_loop", "errors_in_variables", "etfe",
+           "is_response", "lpm", "lrm", "lrmp", "mean_inputs", "pole_sensitivity", "read_response", "spectral"]

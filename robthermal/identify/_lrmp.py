@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from robthermal._arrays import Array
 from robthermal.signals import Record
 
 from .._checks import whole_number
@@ -14,6 +15,7 @@ from ._basis import LocalBasis
 from ._lpm import estimate_locally
 from ._poles import given_poles, most_poles, poles_from_data
 from ._records import as_records, check_excitation, spectrum_of
+from ._resonant_poles import resonant_poles_from_data
 from ._response import FrequencyResponse
 
 
@@ -28,8 +30,9 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
     ----------
     record : Record or sequence of Record
         Measured inputs and outputs. Several records are one estimate with a common G and one transient per record.
-    poles : sequence of complex, "auto", System, or python-control model
-        Continuous-time poles [rad/s], real part negative. ``"auto"`` chooses up to three real poles by held-out error.
+    poles : sequence of complex, "auto", "resonant", System, or python-control model
+        Continuous-time poles [rad/s], real part negative. ``"auto"`` chooses up to three real poles by held-out error,
+        ``"resonant"`` real poles and complex pairs, up to four poles, and moves them until the error stays.
         Of a model the slowest poles are taken, as many as leave a quarter of the points for the noise.
     half_width : int
         Bins on either side of the center that a window uses [-].
@@ -63,12 +66,20 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
     >>> bool(abs(G.response[0, 0] / ((1.0 - a) / (z - a)) - 1.0).max() < 1e-8)
     True
     """
+    records, basis, chosen = prepared(record, poles, half_width)
+    shown = ", ".join(f"{p.real:.4g}" if p.imag == 0.0 else f"{p:.4g}" for p in chosen)
+    return estimate_locally(records, basis, f"lrmp, poles {shown} rad/s, half_width {basis.half_width}")
+
+
+def prepared(record: Record | Sequence[Record], poles: Any, half_width: int
+             ) -> tuple[tuple[Record, ...], LocalBasis, Array]:
+    """Checked records, the local basis, and the poles it is made of [rad/s]."""
     records = as_records(record)
     half_width = whole_number(half_width, "half_width", least=1)
     first, n_samples = records[0], max(len(r) for r in records)
     n_u, n_y = len(first.input_names), len(first.output_names)
     most = most_poles((2 * half_width + 1) * len(records), n_u, n_y, len(records))
-    automatic = isinstance(poles, str) and poles == "auto"
+    automatic = isinstance(poles, str) and poles in ("auto", "resonant")
     if not automatic:
         chosen, may_drop = given_poles(poles, first.sample_time)
         chosen = chosen[: max(1, most)] if may_drop else chosen
@@ -76,13 +87,13 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
     if automatic:
         basis = LocalBasis(half_width=half_width, degree=1, n_samples=n_samples)
         spectra = [spectrum_of(r.inputs, r.outputs) for r in records]
-        chosen = poles_from_data(spectra, basis, first.sample_time, most)
-    basis = LocalBasis(half_width, chosen.size, n_samples, poles=_scaled(chosen, first.sample_time))
-    shown = ", ".join(f"{p.real:.4g}" if p.imag == 0.0 else f"{p:.4g}" for p in chosen)
-    return estimate_locally(records, basis, f"lrmp, poles {shown} rad/s, half_width {half_width}")
+        find = resonant_poles_from_data if poles == "resonant" else poles_from_data
+        chosen = find(spectra, basis, first.sample_time, most)
+    poles_of_basis = scaled_poles(chosen, first.sample_time)
+    return records, LocalBasis(half_width, chosen.size, n_samples, poles=poles_of_basis), chosen
 
 
-def _scaled(poles: np.ndarray, sample_time: float) -> np.ndarray:
+def scaled_poles(poles: Array, sample_time: float) -> Array:
     """p T_s, faster than any sampled signal cut at exp(-50): beyond that exp(p T_s) is zero to rounding."""
     scaled = poles * sample_time
     return np.maximum(scaled.real, -50.0) + 1j * scaled.imag

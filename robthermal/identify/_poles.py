@@ -15,11 +15,12 @@ from ._basis import LocalBasis
 from ._records import Spectrum
 from ._windows import regression
 
-_EXPECTED = "continuous-time poles [rad/s] with negative real part, 'auto', an rt.System or a python-control model"
+_EXPECTED = ("continuous-time poles [rad/s] with negative real part, 'auto', 'resonant', an rt.System or a "
+             "python-control model")
 _GRID = 18  # candidate poles per search
 _BINS = 48  # bins on which candidates are compared, spaced logarithmically
 _MOST = 3  # poles the search adds at most
-_GAIN = 0.02  # relative reduction of the held-out error that pays for one more pole
+GAIN = 0.02  # relative reduction of the held-out error that pays for one more pole
 
 
 def given_poles(poles: Any, sample_time: float) -> tuple[Array, bool]:
@@ -76,8 +77,7 @@ def poles_from_data(spectra: Sequence[Spectrum], basis: LocalBasis, sample_time:
 
     Each row of a window is predicted from the other rows of that window (leave one out, exact for least squares).
     """
-    n_bins = next(s.n_bins for s in spectra if s.n_samples == basis.n_samples)
-    bins = np.unique(np.rint(np.geomspace(1, n_bins, _BINS)).astype(int))
+    bins = compared_bins(spectra, basis)
     lowest = 2.0 * np.pi / (basis.n_samples * sample_time)  # angular frequency of bin 1 [rad/s]
     grid = -np.geomspace(0.05 * lowest, 0.5 * np.pi / sample_time, _GRID)
     chosen: list[float] = []
@@ -86,15 +86,21 @@ def poles_from_data(spectra: Sequence[Spectrum], basis: LocalBasis, sample_time:
         errors = []
         for candidate in grid:
             poles = np.array([*chosen, candidate], dtype=complex) * sample_time
-            errors.append(_held_out_error(spectra, replace(basis, degree=poles.size, poles=poles), bins))
-        if min(errors) > best + np.log1p(-_GAIN):
+            errors.append(held_out_error(spectra, replace(basis, degree=poles.size, poles=poles), bins))
+        if min(errors) > best + np.log1p(-GAIN):
             break
         best = min(errors)
         chosen.append(float(grid[int(np.argmin(errors))]))
     return np.sort(np.array(chosen, dtype=complex))[::-1]
 
 
-def _held_out_error(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> float:
+def compared_bins(spectra: Sequence[Spectrum], basis: LocalBasis) -> Array:
+    """Bins on which candidates are compared."""
+    n_bins = next(s.n_bins for s in spectra if s.n_samples == basis.n_samples)
+    return np.unique(np.rint(np.geomspace(1, n_bins, _BINS)).astype(int))
+
+
+def held_out_error(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> float:
     """Mean logarithm of the leave-one-out error: the bins count alike, whatever their noise level."""
     problem = regression(spectra, basis, bins)
     scale = np.linalg.norm(problem.K, axis=1, keepdims=True)

@@ -1,7 +1,7 @@
 """Hybrid integrator-gain control: an integrator kept in a sector, and the circle criterion for the sampled loop.
 
-The proof needs no new kind: an element in the sector [0, k] is k/2 plus something of gain k/2 at most, and a certificate
-of a closed loop bounds the rest.
+The proof needs no new kind: an element in the sector [0, k] is k/2 plus something of gain k/2 at most, and a
+certificate of a closed loop bounds the rest.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .._control import control
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant
 from ..verification import Certificate
-from ._arguments import held, state_space
+from ._arguments import held
 from ._design import as_system
 from ._outcomes import SynthesisCode
 
@@ -172,7 +172,7 @@ def hybrid_integrator_gain(plant: Any, linear: Any, *, gain: float, rate: float,
     gain : float
         k of the sector [control unit / measured unit].
     rate : float
-        Integrator rate [control unit / (measured unit s)].
+        Rate at which the element integrates inside the sector [control unit / (measured unit s)].
     sample_time : float, optional
         Time between two samples [s], of a continuous plant.
 
@@ -190,13 +190,15 @@ def hybrid_integrator_gain(plant: Any, linear: Any, *, gain: float, rate: float,
     References
     ----------
     Deenen, Heertjes, Heemels and Nijmeijer, Hybrid integrator design for enhanced tracking in motion control, American
-    Control Conference (2017); van den Eijnden et al., IEEE Control Systems Letters 4 (2020); Khalil (2002), theorem 7.1.
+    Control Conference (2017); van den Eijnden et al., IEEE Control Systems Letters 4 (2020); Khalil (2002), Nonlinear
+    Systems, theorem 7.1.
 
     Examples
     --------
     >>> import control, robthermal as rt
-    >>> stage = control.tf([2.0], [3000.0, 160.0, 1.0])  # K/W, time constants 138 s and 22 s
-    >>> d = rt.design.hybrid_integrator_gain(stage, control.tf([4.0, 0.01], [1, 0]), gain=4.0, rate=0.1, sample_time=1.0)
+    >>> stage = control.tf([2.0], [3000.0, 160.0, 1.0])  # K/W, time constants 139 s and 22 s
+    >>> pi = control.tf([4.0, 0.01], [1, 0])
+    >>> d = rt.design.hybrid_integrator_gain(stage, pi, gain=4.0, rate=0.1, sample_time=1.0)
     >>> d.holds, d.offset_free, rt.verify(d.certificate).valid
     (True, True, True)
     >>> rt.design.hybrid_integrator_gain(stage, 4.0, gain=400.0, rate=0.1, sample_time=1.0).holds
@@ -251,23 +253,24 @@ def _largest_gain(P: Plant, C: Plant) -> tuple[float, float]:
     return (float(-1 / real[least]) if real[least] < 0 else np.inf), float(w[least])
 
 
-def _outcome(certificate: Certificate, loop: Plant, k: float, largest: float, where: float, integrates: bool) -> Outcome:
+def _outcome(certificate: Certificate, loop: Plant, k: float, largest: float, where: float, integrates: bool
+             ) -> Outcome:
     if certificate.holds:
         more = ("The linear part integrates, so that the error of constant set-points and loads goes to zero."
                 if integrates else "The linear part does not integrate: constant loads and set-points leave an error, "
-                "and what is proven is the gain from them to it.")
+                "which is only proven to be bounded in proportion to them.")
         return SynthesisCode.CERTIFIED.outcome(
-            f"Circle criterion proven: the sampled loop is stable with every element in the sector [0, {k:g}], whatever "
-            f"its memory, from every start. {more} Limits of the control and what happens between the samples are not "
-            "covered.")
+            f"Circle criterion proven: the sampled loop is stable with every element in the sector [0, {k:g}], "
+            f"whatever its memory, from every start. {more} Limits of the control and what happens between the samples "
+            "are not covered.")
     if not loop.stable:
         text = f"The loop with {k / 2:g}, the middle of the sector, in the place of the element is unstable."
     else:
         norm, at = plant_norm(loop)
         text = f"The circle criterion fails: k/2 times the norm is {k / 2 * norm:.4g} at {at:.3g} rad/s, not below 1."
     if largest == 0.0:
-        advice = "The loop must be stable without the element too: change the linear controller, or use plain PI control."
+        advice = "The loop must be stable without the element too: change the linear controller."
     else:
         advice = f"Gains below about {largest:.4g} pass; what limits them is at {where:.3g} rad/s."
-    return SynthesisCode.NOT_CERTIFIED.outcome(f"{text} Nothing is proven of this loop, which may be stable all the same.",
-                                               remedy=advice)
+    return SynthesisCode.NOT_CERTIFIED.outcome(
+        f"{text} Nothing is proven of this loop, which may be stable all the same.", remedy=advice)

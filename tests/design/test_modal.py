@@ -78,7 +78,7 @@ def test_observability_is_that_of_the_gramian() -> None:
     same = rt.design.thermal_modes(  # two arms that are not linked: one rate twice
         stage(links=[("left", "room", 1.0), ("right", "room", 1.0), ("middle", "room", 1.0), ("frame", "room", 9.0),
                      ("holder", "room", 3.0)]), expansion=YAW)
-    assert same.observable(["T_left"]).sum() == 0 or same.observable(["T_left"])[same.rates == same.rates.max()].sum() == 0
+    assert same.observable(["T_left"]).sum() == 0
     assert same.observable(["T_left", "T_right"])[np.isclose(same.rates, 1 / 250)].all()
 
 
@@ -124,7 +124,11 @@ def test_the_proven_gain_is_that_of_the_whole_network() -> None:
     both = norm(modes, d.controller, d.feed_forward, acting, HEATERS, THREE)
     assert d.open_gain == pytest.approx(without, rel=1e-3)
     assert with_feedback <= d.value < 1.01 * with_feedback and both <= d.value_with_feed_forward < 1.01 * both
-    assert d.value < 0.35 * d.open_gain and d.value_with_feed_forward < d.value
+    assert d.value < 0.35 * d.open_gain
+    motor = rt.design.modal_feedback(modes, sensors=THREE, heaters=HEATERS, disturbances=["motor"], bandwidth=0.05)
+    assert motor.open_gain == pytest.approx(271e-9, rel=0.01)  # the numbers of the documentation
+    assert motor.value == pytest.approx(72.3e-9, rel=0.01)
+    assert motor.value_with_feed_forward == pytest.approx(48.5e-9, rel=0.01)
 
 
 def test_feed_forward_leaves_the_mode_unmoved_at_every_moment() -> None:
@@ -147,7 +151,7 @@ def test_feed_forward_leaves_the_mode_unmoved_at_every_moment() -> None:
 
 def test_it_spends_less_heat_than_holding_every_temperature() -> None:
     """The same yaw from two PIs that hold both arms and from one PI on the mode; the room warms by 1 K."""
-    modes, (E, K) = rt.design.thermal_modes(stage(), expansion=YAW), network()
+    modes, K = rt.design.thermal_modes(stage(), expansion=YAW), network()[1]
     d = rt.design.modal_feedback(modes, sensors=["T_left", "T_right"], heaters=HEATERS, disturbances=["motor"],
                                  bandwidth=0.05)
 
@@ -187,15 +191,16 @@ def test_certificates_of_another_loop_are_rejected() -> None:
     weaker = {**cert.system, "controller": {**cert.system["controller"],
                                             "C": (0.1 * np.asarray(cert.system["controller"]["C"])).tolist(),
                                             "D": (0.1 * np.asarray(cert.system["controller"]["D"])).tolist()}}
-    for changed in (replace(cert, system=weaker), replace(cert, region={**cert.region, "bound": 0.9 * cert.region["bound"]})):
+    tighter = {**cert.region, "bound": 0.9 * cert.region["bound"]}
+    for changed in (replace(cert, system=weaker), replace(cert, region=tighter)):
         assert not rt.verify(changed).valid
 
 
 def test_bad_arguments_are_named() -> None:
     modes = rt.design.thermal_modes(stage(), expansion=YAW)
     for arguments, words in (
-            ({"expansion": {"door": 1.0}}, "door"), ({"expansion": {}}, "no lump"), ({"expansion": {"left": 0.0}}, "zero"),
-            ({"expansion": {"left": np.nan}}, "finite")):
+            ({"expansion": {"door": 1.0}}, "door"), ({"expansion": {}}, "no lump"),
+            ({"expansion": {"left": 0.0}}, "zero"), ({"expansion": {"left": np.nan}}, "finite")):
         with pytest.raises(rt.InputError, match=words):
             rt.design.thermal_modes(stage(), **arguments)
     with pytest.raises(rt.InputError, match="not symmetric"):

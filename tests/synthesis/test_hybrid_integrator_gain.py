@@ -54,10 +54,11 @@ def test_the_element_follows_the_mode_rule_of_deenen() -> None:
 
 
 def test_output_is_always_in_the_sector() -> None:
-    d, rng, h = design(gain=2.5, rate=5.0), np.random.default_rng(0), 0.0
-    for e in rng.normal(size=2000):
-        h = d.element(h, e)
-        assert h * (2.5 * e - h) >= -1e-15
+    d, errors, outputs = design(gain=2.5, rate=5.0), np.random.default_rng(0).normal(size=2000), [0.0]
+    for e in errors:
+        outputs.append(d.element(outputs[-1], e))
+    h = np.array(outputs[1:])
+    assert (h * (2.5 * errors - h)).min() >= -1e-15 and np.abs(h).max() > 1.0
 
 
 @pytest.mark.parametrize("w", [1e-3, 0.02, 0.3])

@@ -20,6 +20,7 @@ from ...identify import (
     lrm,
     lrmp,
     mean_inputs,
+    pole_sensitivity,
     read_response,
     spectral,
 )
@@ -38,8 +39,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
                       poles: Sequence[float] = (), band: tuple[float, float] | None = None,
                       operating_point: Mapping[str, float] | None = None, tables: Sequence[ReadTable] = (),
                       reading: Mapping[Path, Sequence[ReadTable]] | None = None, reference: Sequence[str] = (),
-                      instruments: Mapping[str, str] | None = None, input_noise: Mapping[str, float] | None = None
-                      ) -> FrequencyResponse:
+                      instruments: Mapping[str, str] | None = None, input_noise: Mapping[str, float] | None = None,
+                      pole_deviation: float | None = None) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
     Parameters
@@ -73,6 +74,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         Noisy input, as a measured room: column of a second sensor of the same quantity, in any unit ("lpm").
     input_noise : mapping, optional
         Noisy input: standard deviation of its noise [unit of the input, kelvin of ambients] ("lpm").
+    pole_deviation : float, optional
+        Standard deviation of the prescribed poles relative to their size, for the covariance [-] ("lrmp").
 
     Returns
     -------
@@ -97,6 +100,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
     _one_way(method, reference, instruments, input_noise)
+    if pole_deviation is not None and method != "lrmp":
+        raise InputError(f"method is {method!r}, which has no poles", where="--pole-deviation", expected="lrmp")
     beside = list((instruments or {}).values()) or reference
     parts, references = _read(paths, system, inputs, outputs, tables, reading or {}, beside)
     chosen = [part.select(inputs=list(inputs or part.input_names), outputs=list(outputs or part.output_names))
@@ -107,7 +112,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
          "etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
-         "lrmp": lambda: lrmp(records, poles=given, half_width=half_width)}
+         "lrmp": lambda: (lrmp(records, poles=given, half_width=half_width) if pole_deviation is None else
+                          pole_sensitivity(records, given, half_width).with_uncertain_poles(pole_deviation))}
     if reference:
         G = closed_loop_response(list(zip(records, references, strict=True)), reference, degree=degree,
                                  half_width=half_width)

@@ -35,6 +35,7 @@ class IdentifyTable(Table):
     half_width: Annotated[int, Field(ge=1)] = 8
     degree: Annotated[int, Field(ge=0)] = 2
     poles: list[Number] = []
+    pole_deviation: Positive | None = None
     band: Pair | None = None
     reference: str | list[str] = []
     instruments: dict[str, str] = {}
