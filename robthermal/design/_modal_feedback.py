@@ -170,7 +170,8 @@ def _proven(modes: ThermalModes, seen: ModalReconstruction, K: Plant, used: list
                                             np.zeros((len(used), len(rows))), 0.0)))[0] / _NANO
     loop = close(plain, K)
     certificates = [prove_closed_loop(one, K) for one in (plain, helped)] if loop.stable else []
-    values = [cert.region["bound"] / _NANO if cert.holds else np.inf for cert in certificates] or [np.inf, np.inf]
+    values = [float(np.nextafter(cert.region["bound"] / _NANO, np.inf)) if cert.holds else np.inf
+              for cert in certificates] or [np.inf, np.inf]
     names = [modes.inputs[i] for i in used], [modes.inputs[i] for i in acting]
     system = control.ss(K.A, K.B, K.C, K.D, inputs=list(seen.sensors), outputs=names[0])
     return ModalFeedback(modes, chosen, tuple(names[0]), tuple(names[1]), seen, system, forward, float(without),
