@@ -204,3 +204,28 @@ def test_commands_load_no_more_than_they_need(command: list[str], unused: tuple[
     loaded = {line.rpartition("|")[2].strip() for line in run.stderr.splitlines() if line.startswith("import time:")}
     assert "robthermal.cli.app" in loaded
     assert not loaded & set(unused)
+
+
+def test_a_fit_and_a_response_need_no_statistics_library() -> None:
+    """scipy.signal and scipy.stats take a second to import; filters and quantiles come from elsewhere."""
+    code = """
+import sys
+import numpy as np
+import robthermal as rt
+bar = rt.System(ambients={"room": {"temperature": 293.15}}, lumps={"bar": {"capacity": 50.0, "initial": 293.15}},
+                links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"Q": {"lump": "bar"}},
+                sensors={"T": {"lump": "bar", "noise": 0.01, "time_constant": 3.0}})
+rng = np.random.default_rng(1)
+heat = np.repeat(rng.uniform(0.0, 6.0, 40), 10)
+drive = rt.Record(sample_time=5.0, inputs=heat, outputs=np.zeros((400, 0)), input_names=["Q"], output_names=[])
+readings = rt.thermal.simulate(bar, drive).outputs + 0.01 * rng.standard_normal((400, 1))
+record = rt.Record(sample_time=5.0, inputs=heat, outputs=readings, input_names=["Q"], output_names=["T"])
+fit = rt.calibrate(bar, record, initial="system", parameters={"links.bar-room.conductance": (0.3, 0.8)})
+assert abs(fit.parameters["links.bar-room.conductance"] - 0.5) < 0.01, fit.parameters
+assert fit.ranges() and rt.identify.lpm(record).confidence_radius(0.95).min() > 0.0
+print(*sys.modules)
+"""
+    loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True
+                                ).stdout.split())
+    assert "scipy.optimize" in loaded
+    assert not loaded & {"scipy.signal", "scipy.stats", "pandas", "control", "matplotlib.pyplot"}

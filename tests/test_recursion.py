@@ -1,10 +1,11 @@
-"""Linear recursions in blocks, against a loop over the steps."""
+"""Linear recursions in blocks and filters 1/a, against a loop over the steps."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from robthermal._all_pole import all_pole
 from robthermal._recursion import recursion
 
 
@@ -34,3 +35,15 @@ def test_a_stiff_step_that_forgets_its_start() -> None:
     """Transitions whose products underflow to 0."""
     A, b = np.full((2000, 1, 1), 1e-30), np.ones((2000, 1, 1))
     np.testing.assert_allclose(recursion(A, b, np.array([[1e20]]))[2:, 0, 0], 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("roots", "shape"), [([], (5,)), ([0.9], (1,)), ([0.9], (300, 2)), ([0.99, -0.5, 0.3], (300,)),
+                                              ([0.8 + 0.3j], (300, 2)), ([0.9, 0.2, 0.1], (2,)), ([0.5], (0,))])
+def test_filter_without_zeros_sample_by_sample(roots: list[complex], shape: tuple[int, ...]) -> None:
+    a, signal = np.poly(roots) if roots else np.ones(1), np.random.default_rng(0).standard_normal(shape)
+    y = np.zeros(shape, dtype=complex)
+    for k in range(len(signal)):
+        y[k] = signal[k] - sum(a[j] * y[k - j] for j in range(1, min(k, len(roots)) + 1))
+    found = all_pole(a, signal)
+    assert found.shape == shape
+    np.testing.assert_allclose(found, y if np.iscomplexobj(a) else y.real, rtol=1e-12, atol=1e-12)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
+from .._all_pole import all_pole
 from .._arrays import Floats
 
 _LONGEST = 30
@@ -34,7 +34,7 @@ class Correlation:
         Zeros before the first sample let the innovations before it count too: e was stationary when it began.
         """
         J = np.concatenate([np.zeros_like(J), J])
-        back = np.stack([scipy.signal.lfilter([1.0], a, J[::-1, s], axis=0) for s, a in enumerate(self.polynomials)],
+        back = np.stack([all_pole(a, J[::-1, s]) for s, a in enumerate(self.polynomials)],
                         axis=1)
         return np.einsum("ksi,st,ktj->ij", back, self.innovation, back, optimize=True)
 
@@ -78,7 +78,7 @@ def correlation_of(segments: list[Floats]) -> Correlation:
     """
     n_sensors = segments[0].shape[1]
     polynomials = tuple(burg([e[:, s] for e in segments]) for s in range(n_sensors))
-    v = np.concatenate([np.column_stack([scipy.signal.lfilter(a, [1.0], e[:, s]) for s, a in enumerate(polynomials)])
+    v = np.concatenate([np.column_stack([np.convolve(a, e[:, s])[: len(e)] for s, a in enumerate(polynomials)])
                         for e in segments])
     return Correlation(polynomials, v.T @ v / len(v))
 

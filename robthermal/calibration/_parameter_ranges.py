@@ -30,8 +30,8 @@ def factor(shape: str, count: int, degrees_of_freedom: float, confidence: float)
     if not count:
         return 0.0
     if shape == "box":
-        return float(scipy.stats.t.ppf(1.0 - (1.0 - confidence) / (2 * count), degrees_of_freedom))
-    return math.sqrt(count * float(scipy.stats.f.ppf(confidence, count, degrees_of_freedom)))
+        return float(scipy.special.stdtrit(degrees_of_freedom, 1.0 - (1.0 - confidence) / (2 * count)))
+    return math.sqrt(count * float(scipy.special.fdtri(count, degrees_of_freedom, confidence)))
 
 
 def check_request(confidence: float, shape: str) -> None:

@@ -58,4 +58,4 @@ def covariance_scale(found: Floats, expected: Floats, count: int) -> float:
         return 1.0
     root = vectors[:, kept] / np.sqrt(values[kept])
     ratio = float(np.trace(root.T @ found @ root)) / int(kept.sum()) * count / (count - 1)
-    return ratio if ratio > scipy.stats.chi2.ppf(1.0 - _LEVEL, count - 1) / (count - 1) else 1.0
+    return ratio if ratio > scipy.special.chdtri(count - 1, _LEVEL) / (count - 1) else 1.0

@@ -40,4 +40,4 @@ def whiteness_of(segments: list[Floats]) -> Whiteness:
         rho = np.array([float(e[lag:] @ e[:-lag]) for lag in range(1, lags + 1)]) / power
         Q += n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
         total += lags
-    return Whiteness(Q, total, float(scipy.stats.chi2.sf(Q, total)) if total else 1.0)
+    return Whiteness(Q, total, float(scipy.special.chdtrc(total, Q)) if total else 1.0)

@@ -230,8 +230,8 @@ class _Run:
             for k in range(self.n):
                 true, named = self.plant.lumps, {name: float(values[k]) for name, values in self.inputs.items()}
                 believed = true if self.observer is None else self.observer.estimate(memory)
-                clean = self._readings()
-                seen = clean if self.noise is None or not self.reads else clean + self._noise()
+                clean = self._readings() if self.reads else np.empty(0)
+                seen = clean if self.noise is None else clean + self._noise()
                 given = ControllerInput(wanted_cold[k], self._regulated(believed, seen), believed,
                                         self.linear.surroundings(believed, named))
                 if state is None:
@@ -268,6 +268,8 @@ class _Run:
         return found
 
     def _noise(self) -> Array:
+        if not self.reads:
+            return np.empty(0)
         sigma = np.array([sensor.noise for sensor in self.plant.system.sensors.values()])
         return sigma * (0.0 if self.noise is None else self.noise.standard_normal(len(sigma)))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -58,20 +59,28 @@ class ModuleSet:
                              expected="at least one module, none twice")
         return cls(system, names)
 
-    @property
+    @cached_property  # these are asked for at every sample of a simulated loop
     def parts(self) -> list[Module]:
         """The modules themselves."""
         return [self.system.modules[name] for name in self.names]
 
-    @property
+    @cached_property
     def hot(self) -> list[int]:
         """Lump index of every hot face."""
         return [self.system.lump_names.index(part.hot) for part in self.parts]
 
-    @property
+    @cached_property
     def cold(self) -> list[int]:
         """Lump index of every cold face."""
         return [self.system.lump_names.index(part.cold) for part in self.parts]
+
+    @cached_property
+    def _lines(self) -> tuple[Array, tuple[tuple[Array, Array], ...]]:
+        """Reference temperatures; value there and slope of S, of R, of K: each (n_modules,)."""
+        at = np.array([part.reference_temperature for part in self.parts])
+        pairs = [[(getattr(part, key).value, getattr(part, key).slope) for part in self.parts]
+                 for key in ("seebeck", "resistance", "conductance")]
+        return at, tuple((np.array([v for v, _ in one]), np.array([s for _, s in one])) for one in pairs)
 
     def properties(self, temperatures: ArrayLike | Mapping[str, ArrayLike]) -> Properties:
         """S, R, K at T_avg = (x_h + x_c)/2, and the temperatures of the faces.
@@ -82,10 +91,9 @@ class ModuleSet:
             Lump temperatures [K]; a mapping needs the faces of these modules only.
         """
         hot, cold = self.faces(temperatures)
-        dT = 0.5 * (hot + cold) - np.array([part.reference_temperature for part in self.parts])
-        S, R, K = (np.array([getattr(part, key).value for part in self.parts])
-                   + np.array([getattr(part, key).slope for part in self.parts]) * dT
-                   for key in ("seebeck", "resistance", "conductance"))
+        at, lines = self._lines
+        dT = 0.5 * (hot + cold) - at
+        S, R, K = (value + slope * dT for value, slope in lines)
         for symbol, values in (("S", S), ("R", R), ("K", K)):
             if not (values > 0).all():
                 self._refuse(symbol, values, hot, cold)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from robthermal._arrays import Array
@@ -19,6 +18,7 @@ from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
 from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
+from ._regions import quantile
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -257,7 +257,7 @@ def _elementwise(both: _Both) -> _Quotient:
 
 def _not_significant(square: Array, variance: Array, both: _Both) -> Array:
     q = np.maximum(both.found.degrees_of_freedom, 1)
-    return np.logical_not(square > scipy.stats.f.ppf(0.95, 2, 2 * q) * variance)
+    return np.logical_not(square > quantile(0.95, q) * variance)
 
 
 def _notes(singular: Array, frequencies: Array) -> list[str]:

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
 
 
 def quantile(p: float, q: Array) -> Array:
-    """F_p(2, 2q); infinite where no degrees of freedom are left."""
+    """F_p(2, 2q), from P(F > x) = (1 + x/q)^(-q); infinite where no degrees of freedom are left."""
     real = isinstance(p, (int, float, np.floating)) and not isinstance(p, bool)
     if not real or not 0.0 < p < 1.0:
         raise InputError(f"the confidence level p is {p!r}", where="p", expected="a number between 0 and 1, as 0.95")
     q = np.asarray(q, dtype=float)
-    values, place = np.unique(q, return_inverse=True)
-    quantiles = np.array([scipy.stats.f.ppf(p, 2, 2 * v) if v > 0 else np.inf for v in values])
-    return quantiles[place]
+    some = q > 0
+    kept = np.where(some, q, 1.0)
+    return np.where(some, kept * np.expm1(-np.log1p(-p) / kept), np.inf)
 
 
 def radius_of(variance: Array, degrees_of_freedom: Array, ratio_uncertainty: Array | None, p: float) -> Array:

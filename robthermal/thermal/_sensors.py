@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
+from .._all_pole import all_pole
 from ._equations import Equations
 from ._layout import Layout
 from ._parts import Sensor
@@ -142,7 +142,7 @@ def _lag(x: Array, tau: float, h: float) -> Array:
     p = np.exp(-h / tau)
     ramp = 1 - tau / h * (1 - p)  # weight of the newest sample
     drive = ramp * x[1:] + (1 - p - ramp) * x[:-1]
-    return np.concatenate([x[:1], scipy.signal.lfilter([1.0], [1.0, -p], drive, zi=[p * x[0]])[0]])
+    return all_pole(np.array([1.0, -p]), np.concatenate([x[:1], drive]))
 
 
 def _of(rates: Rates, state: int) -> tuple[Array, Array] | None:

@@ -192,3 +192,14 @@ def test_wrong_shapes_are_refused() -> None:
             n_samples=6,
             method="by hand",
         )
+
+
+@pytest.mark.parametrize("p", [0.05, 0.5, 0.95, 0.999])
+def test_radius_of_the_circle_is_the_quantile_of_f(p):
+    """With one input and variance one the squared radius is F_p(2, 2q), whatever q."""
+    for q in (1, 5, 11, 400):
+        G = rt.identify.FrequencyResponse(frequencies=[0.1], response=np.ones((1, 1, 1)), degrees_of_freedom=[q],
+                                          covariance=np.ones((1, 1, 1)), noise_covariance=np.ones((1, 1, 1)),
+                                          input_names=["u"], output_names=["y"], sample_time=1.0, n_samples=10,
+                                          method="given")
+        assert G.confidence_radius(p)[0, 0, 0] ** 2 == pytest.approx(stats.f.ppf(p, 2, 2 * q), rel=1e-12)

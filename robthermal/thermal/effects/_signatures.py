@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-import scipy
 
+from ..._all_pole import all_pole
 from .._system import System
 from ._response import Array, RecordContext, Response, Signature, Values, Where
 
@@ -81,15 +81,13 @@ def follow(T: Array, tau: float, h: float) -> Array:
     p = np.exp(-h / tau)
     ramp = 1.0 - tau / h * (1.0 - p)
     drive = ramp * T[1:] + (1.0 - p - ramp) * T[:-1]
-    lagged, _ = scipy.signal.lfilter([1.0], [1.0, -p], drive, zi=[p * T[0]])
-    return np.concatenate([T[:1], lagged])
+    return all_pole(np.array([1.0, -p]), np.concatenate([T[:1], drive]))
 
 
 def follow_held(u: Array, tau: float, h: float, start: float) -> Array:
     """First-order lag of a held signal: its value at the start of every sample, (n,)."""
     p = np.exp(-h / tau)
-    lagged, _ = scipy.signal.lfilter([1.0 - p], [1.0, -p], u[:-1], zi=[p * start])
-    return np.concatenate([[start], lagged])
+    return all_pole(np.array([1.0, -p]), np.concatenate([[start], (1.0 - p) * u[:-1]]))
 
 
 def driven_by(record: RecordContext, name: str, v: Array, size: float) -> Response:
