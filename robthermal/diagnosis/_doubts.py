@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..thermal import System
-from .effects import Candidate
+from .effects import AMBIENT_DRIFT, Candidate
 from .fit import Refit
 
-_LIKE_THE_ROOM = ("heat_source", "periodic_load", "ambient_gradient")  # heats that a warmer or colder room gives too
+_LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 
 
 def doubts(system: System, remainder: bool) -> list[str]:
@@ -28,7 +28,9 @@ def doubts(system: System, remainder: bool) -> list[str]:
 
 
 def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
-    """Which effects may be an ambient that was not recorded: heats into a lump that is joined to it.
+    """Which effects may be an ambient that was not recorded, or are inferred of it.
+
+    A constant heat into a lump that is joined to it may be the ambient. That it swings or drifts is a candidate itself.
 
     Parameters
     ----------
@@ -38,12 +40,12 @@ def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
         Effects that were accepted, provisional ones included.
     """
     said = []
-    for room in nominal.system.ambients:
-        if all(room in path.one.record.input_names for path in nominal.records):
-            continue
+    for room in nominal.unrecorded:
         joined = {end for link in nominal.system.links if room in link.between for end in link.between}
         labels = [one.label for one in effects if one.effect.name in _LIKE_THE_ROOM and one.where[0] in joined]
         if labels:
             said.append(f"{room} was not recorded: {', '.join(labels)} may be {room} itself, warmer or colder than the "
                         "system says, or drifting. Record it.")
+        if any(one.effect.name == AMBIENT_DRIFT and one.where == (room,) for one in effects):
+            said.append(f"That {room} drifts is read off other temperatures: record it.")
     return said

@@ -9,6 +9,7 @@ from itertools import product
 from ...errors import InputError
 from ...thermal import System
 from ...thermal.effects import Effect, Quantity, TrialContext, effects
+from ._ambient_drift import LIKE, ambient_drift, as_slow, conductances
 
 Where = tuple[str, ...]
 
@@ -95,7 +96,7 @@ def chosen_effects(names: Iterable[str] | None) -> list[Effect]:
     return [form for name in names for form in known[name].all_forms]
 
 
-def candidates(system: System, names: Iterable[str] | None = None) -> list[Candidate]:
+def candidates(system: System, names: Iterable[str] | None = None, unrecorded: Sequence[str] = ()) -> list[Candidate]:
     """Every effect at every place where it is possible.
 
     Parameters
@@ -104,6 +105,8 @@ def candidates(system: System, names: Iterable[str] | None = None) -> list[Candi
         Nominal system to search.
     names : iterable of str, optional
         Effects; default all.
+    unrecorded : sequence of str
+        Ambients that some record does not hold: where a periodic heat is tried, that they swing or drift is, too.
 
     Returns
     -------
@@ -117,8 +120,22 @@ def candidates(system: System, names: Iterable[str] | None = None) -> list[Candi
     >>> [candidate.label for candidate in found if candidate.effect.name == "seebeck_slope"]
     ['seebeck_slope(m1)', 'seebeck_slope(m2)']
     """
-    return [Candidate(_with_units(effect, system, tuple(where)), tuple(where))
-            for effect in chosen_effects(names) for where in effect.places(system)]
+    chosen = chosen_effects(names)
+    found = [Candidate(_with_units(effect, system, tuple(where)), tuple(where))
+             for effect in chosen for where in effect.places(system)]
+    if unrecorded and any(effect.name == LIKE for effect in chosen):
+        return _with_drifts(found, system, unrecorded)
+    return found
+
+
+def _with_drifts(found: list[Candidate], system: System, unrecorded: Sequence[str]) -> list[Candidate]:
+    """Candidates with those ambients that may swing or drift, and periodic heats beside them as slow as they are."""
+    drift = ambient_drift()
+    drifts = [Candidate(drift, where) for where in drift.places(system) if where[0] in unrecorded]
+    joined = {lump for one in drifts for lump in conductances(system, one.where[0])}
+    slow = [replace(one, effect=as_slow(one.effect)) if one.effect.name == LIKE and one.where[0] in joined else one
+            for one in found]
+    return slow + drifts
 
 
 def _with_units(effect: Effect, system: System, where: tuple[str, ...]) -> Effect:

@@ -189,7 +189,7 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     >>> scores.candidates[scores.order[0]].label
     'sensor_lag(T)'
     """
-    return score_candidates(fit, fit.testable(candidates(fit.system, effects)))
+    return score_candidates(fit, fit.testable(candidates(fit.system, effects, fit.unrecorded)))
 
 
 def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:

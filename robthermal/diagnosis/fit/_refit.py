@@ -174,6 +174,12 @@ class Refit:
         return [(of[id(path)], path) for path in self.records]
 
     @property
+    def unrecorded(self) -> tuple[str, ...]:
+        """Ambients that some record does not hold."""
+        return tuple(name for name in self.system.ambients
+                     if any(name not in path.one.record.input_names for path in self.records))
+
+    @property
     def unit(self) -> str:
         """Unit of `rms`."""
         if not self.records:

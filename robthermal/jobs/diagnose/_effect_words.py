@@ -7,6 +7,7 @@ import re
 from ...thermal import parameter_in_words
 
 WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
+    "ambient_drift": "a swing or drift of {0}, which was not recorded",
     "ambient_gradient": "an ambient at {0} that is warmer or colder than the measured one",
     "condensation": "condensation on {0}",
     "conductance_slope": "the slope of the conductance of {0} over temperature",

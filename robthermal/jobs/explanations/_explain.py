@@ -61,6 +61,14 @@ _CHANGE = Explanation("parameter_change", "effect",
                       {"Acts on": ("parameter of [fit]; tied parameters together",),
                        "Quantities": ("relative [-], the change over the value on a healthy day",)},
                       "docs/explanations/diagnosis_change.md")
+_DRIFT = Explanation("ambient_drift", "effect",
+                     ("An ambient that a record does not hold is not the constant of the system: it swings or drifts. "
+                      "Tried wherever a periodic heat is, and only where the ambient is not recorded.",),
+                     {"Acts on": ("ambient",),
+                      "Quantities": ("difference [K], half of the swing", "period [s]", "phase [rad]"),
+                      "Confused with": ("periodic_load",), "Told apart by": ("a record of the ambient",)},
+                     "docs/explanations/diagnosis_data.md")
+_OTHERS = {one.name: one for one in (_CHANGE, _DRIFT)}  # effects of a diagnosis that are not in the catalog
 
 
 def explainable() -> dict[str, tuple[str, ...]]:
@@ -76,7 +84,7 @@ def explainable() -> dict[str, tuple[str, ...]]:
     >>> "sensor_lag" in rt.jobs.explainable()["effect"]
     True
     """
-    return {"effect": (*effects(), _CHANGE.name), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
+    return {"effect": (*effects(), *_OTHERS), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
             "reason": tuple(_REASONS), "error": tuple(_ERRORS), "word": tuple(GLOSSARY)}
 
 
@@ -118,8 +126,8 @@ def explain(name: str) -> tuple[Explanation, ...]:
 def _all(name: str) -> Iterator[Explanation]:
     if name in effects():
         yield _effect(effects()[name])
-    if name == _CHANGE.name:
-        yield _CHANGE
+    if name in _OTHERS:
+        yield _OTHERS[name]
     if name in KINDS:
         yield _certificate(name)
     if name in outcome_codes():
