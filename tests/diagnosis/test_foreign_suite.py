@@ -14,7 +14,7 @@ import robthermal as rt
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from foreign.cases import SUB, Case, H, all_cases, made  # noqa: E402 - beside the benchmarks
 from foreign.hidden import CATALOG, MAKE, Hidden, lagged  # noqa: E402
-from foreign.judge import answer, wilson  # noqa: E402
+from foreign.judge import answer, one_path, wilson  # noqa: E402
 from foreign.machines import MACHINES, ROOM  # noqa: E402
 from foreign.march import march  # noqa: E402
 from foreign.peers import beta_of, risks, unfalsified  # noqa: E402
@@ -95,6 +95,20 @@ LINK, LAG = ["missing_link", ["x1", "x4"]], ["sensor_lag", ["T1"]]
 ])
 def test_answers_are_judged(verdict, names, others, truth, expected):
     assert answer({"verdict": verdict, "names": names, "others": others, "truth": truth}) == expected
+
+
+@pytest.mark.parametrize(("names", "others", "one"), [
+    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["sample", "hot"]]]], True),
+    ([["missing_link", ["sample", "hot"]]], [[["missing_link", ["sample", "sink"]]]], True),
+    ([["missing_link", ["sample", "sink"]]], [[]], True),
+    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["spreader", "hot"]]]], False),
+    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["sink", "cold"]]]], False),
+    ([["missing_link", ["sample", "sink"]]], [[["natural_convection", ["sample", "hot"]]]], False),
+    ([["missing_link", ["sample", "hot"]]], [[]], False)])
+def test_a_path_at_neighboring_lumps_is_one_answer(names, others, one):
+    row = {"key": "stack/hidden/missing_link/1", "verdict": "ambiguous", "names": names, "others": others,
+           "truth": [["missing_link", ["sample", "sink"]]]}
+    assert one_path(row) is one
 
 
 @pytest.mark.parametrize(("r", "v"), [(1.0, 0.5), (0.2, 1e-4), (5.0, 8.0), (3.0, 0.4)])

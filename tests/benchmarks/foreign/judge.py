@@ -5,11 +5,15 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
+from functools import cache
 from typing import Any
+
+import numpy as np
 
 import robthermal as rt
 
 from .cases import STRENGTH, Case, made
+from .machines import MACHINES
 from .peers import SCALES, choices
 
 Row = dict[str, Any]
@@ -64,6 +68,22 @@ def answer(row: Row) -> str:
     return "unique" if all(len(names) == 1 for names in sets) else "in the set"
 
 
+def one_path(row: Row) -> bool:
+    """Whether every set is the truth, with at most the same heat path from neighboring lumps: one answer."""
+    if answer(row) not in ("unique", "in the set"):
+        return False
+    joined = neighbors(row["key"].split("/")[0])
+    return all(other[0] == name[0] and frozenset(set(name[1]) ^ set(other[1])) in joined
+               for name, others in zip(row["names"], row["others"], strict=True) for other in others)
+
+
+@cache
+def neighbors(machine: str) -> set[frozenset[str]]:
+    """Pairs of lumps that the user's network joins."""
+    system = MACHINES[machine](np.random.default_rng(0)).network(0.01, np.random.default_rng(0))
+    return {frozenset(link.between) for link in system.links}
+
+
 def rate(rows: list[Row], hit: Callable[[Row], bool]) -> str:
     """Share with Wilson's 95 % interval, and the counts."""
     k, n = sum(map(hit, rows)), len(rows)
@@ -84,6 +104,7 @@ def print_tables(rows: list[Row]) -> None:
     hidden = [row for row in rows if row["group"] == "hidden" and within(row)]
     null, outside = ([row for row in rows if row["group"] == group] for group in ("nothing", "outside"))
     print(f"hidden effect: named uniquely, nothing else   {rate(hidden, lambda r: answer(r) == 'unique')}  aim >= 85 %")
+    print(f"  unique, or one path at neighboring lumps    {rate(hidden, one_path)}")
     print(f"  unique or in a set                          "
           f"{rate(hidden, lambda r: answer(r) in ('unique', 'in the set'))}")
     print(f"  refused                                     {rate(hidden, lambda r: answer(r) == 'refused')}")
