@@ -19,6 +19,7 @@ from ._thermal_modes import ModalReconstruction, ThermalModes, place, reconstruc
 
 _INTEGRAL = 4.0  # the integral part takes over this factor below the bandwidth, as in `pid`
 _APART = 1e-6  # smallest singular value of the heaters on the modes, relative
+_TOLD = 0.05  # smallest singular value of the readings of modes that are read together, each of size 1
 _NANO = 1e9  # displacements of certificates are in nanometers
 
 
@@ -35,7 +36,7 @@ class ModalFeedback:
     heaters, disturbances : tuple of str
         Inputs that the controller drives, and those that act on the machine.
     reconstruction : ModalReconstruction
-        How the controlled modes are read from the thermometers.
+        How modes are read from the thermometers, the controlled ones first.
     controller : control.StateSpace
         From deviations of the readings [K] to the heaters [unit], u = +K y; continuous.
     feed_forward : ndarray, shape (n_heaters, n_disturbances)
@@ -78,9 +79,10 @@ def modal_feedback(modes: ThermalModes, *, sensors: Sequence[str], heaters: Sequ
                    disturbances: Sequence[str], bandwidth: float, count: int = 1) -> ModalFeedback:
     """Control the modes that the tool point feels most, and leave the others alone.
 
-    The `count` modes with the largest static displacement under the disturbances are read by least squares, each gets a
-    PI, and the heaters are combined so that each PI heats its own mode only. The modes that are left out see some of
-    this heat and some of them is taken for the controlled ones: the proof is about all modes together.
+    The `count` modes with the largest static displacement under the disturbances each get a PI, and the heaters are
+    combined so that each PI heats its own mode only. They are read by least squares together with those others that the
+    disturbances move most, as many as the thermometers tell apart. The modes that are left out see some of the heat and
+    some of them is taken for the controlled ones: the proof is about all modes together.
 
     Parameters
     ----------
@@ -140,7 +142,8 @@ def modal_feedback(modes: ThermalModes, *, sensors: Sequence[str], heaters: Sequ
         raise InputError(f"{m} modes with {len(used)} heaters and {len(list(sensors))} thermometers",
                          where="argument count", expected="at most as many modes as either")
     chosen = modes.felt(list(disturbances))[:m]
-    seen = reconstruct(modes, sensors, chosen.tolist())
+    seen = _read(modes, sensors, chosen, acting)
+    matrix = seen.matrix[:m]  # the first rows are those of the controlled modes
     own = modes.shapes[:, chosen].T @ modes.heat  # heat into the controlled modes, per input
     reach, sizes, _ = np.linalg.svd(own[:, used])
     if sizes[-1] <= _APART * sizes[0]:
@@ -149,10 +152,25 @@ def modal_feedback(modes: ThermalModes, *, sensors: Sequence[str], heaters: Sequ
     apart = np.linalg.pinv(own[:, used])  # heaters that heat one mode by 1 W, the other controlled ones not at all
     forward = -apart @ own[:, acting]
     proportional = w * modes.capacities[chosen]
-    K = Plant(np.zeros((m, m)), seen.matrix, -apart * (proportional * w / _INTEGRAL),
-              -apart @ (proportional[:, None] * seen.matrix), 0.0)
+    K = Plant(np.zeros((m, m)), matrix, -apart * (proportional * w / _INTEGRAL),
+              -apart @ (proportional[:, None] * matrix), 0.0)
     rows = place(modes.sensors, sensors, "argument sensors")
     return _proven(modes, seen, K, used, acting, rows, forward, tuple(map(int, chosen)))
+
+
+def _read(modes: ThermalModes, sensors: Sequence[str], controlled: Array, acting: list[int]) -> ModalReconstruction:
+    """Controlled modes first, then the others by their size under the disturbances while the thermometers tell them."""
+    readings = modes.readings[place(modes.sensors, sensors, "argument sensors")] @ modes.shapes
+    scale = np.linalg.norm(readings, axis=0)
+    moved = np.abs(modes.shapes.T @ modes.heat[:, acting]).max(axis=1) / (modes.capacities * modes.rates)
+    together = [int(i) for i in controlled]
+    for i in np.argsort(-moved * scale, kind="stable"):
+        more = [*together, int(i)]
+        if i in together or len(more) > len(readings) or scale[more].min() == 0.0:
+            continue
+        if np.linalg.svd(readings[:, more] / scale[more], compute_uv=False)[-1] > _TOLD:
+            together = more
+    return reconstruct(modes, sensors, together)
 
 
 def _proven(modes: ThermalModes, seen: ModalReconstruction, K: Plant, used: list[int], acting: list[int],

@@ -75,7 +75,7 @@ class ThermalModes:
         return self.tool_gains * (self.shapes.T @ self.heat[:, column]) / (self.capacities * self.rates)
 
     def felt(self, names: Sequence[str]) -> Array:
-        """Modes by what the tool point feels of them, most first: the largest of |static| over some inputs.
+        """Modes by what the tool point feels of them, most first: by the size of `static`, the largest of some inputs.
 
         Parameters
         ----------

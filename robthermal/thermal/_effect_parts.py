@@ -10,7 +10,7 @@ from ._part import Finite, Kelvin, Name, NonNegative, Part, Positive, Share
 class Drive(Part):
     """What a heater or an amplifier makes of the value u in its record column.
 
-    v = (1 + gain) u + offset, then (1 + gain_slope |v|) v - cubic v³, then held within ±clip, then delayed, then
+    v = (1 + gain) u + offset, then (1 + gain_slope abs(v)) v - cubic v³, then held within ±clip, then delayed, then
     lagged. Before the record the column had its first value.
 
     Parameters

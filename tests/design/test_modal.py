@@ -127,8 +127,9 @@ def test_the_proven_gain_is_that_of_the_whole_network() -> None:
     assert d.value < 0.35 * d.open_gain
     motor = rt.design.modal_feedback(modes, sensors=THREE, heaters=HEATERS, disturbances=["motor"], bandwidth=0.05)
     assert motor.open_gain == pytest.approx(271e-9, rel=0.01)  # the numbers of the documentation
-    assert motor.value == pytest.approx(72.3e-9, rel=0.01)
-    assert motor.value_with_feed_forward == pytest.approx(48.5e-9, rel=0.01)
+    assert motor.value == pytest.approx(79.3e-9, rel=0.01)
+    assert motor.value_with_feed_forward == pytest.approx(19.2e-9, rel=0.01)
+    assert motor.reconstruction.modes.tolist() == [3, 0, 1] and motor.reconstruction.modes[0] == motor.controlled[0]
 
 
 def test_feed_forward_leaves_the_mode_unmoved_at_every_moment() -> None:
@@ -164,10 +165,10 @@ def test_it_spends_less_heat_than_holding_every_temperature() -> None:
         return float(modes.expansion @ x[:5]), float(np.linalg.norm(directions @ x[5:]))
 
     warm, motor = np.array([1.5, 0.15, 0.2, 0.15, 0.1]), np.array([0, 1.0, 0, 0, 0])
-    for heat, saved in ((warm, 0.1), (motor, 0.75)):
+    for heat, saved in ((warm, 0.04), (motor, 0.7)):
         yaw_all, effort_all = rest(np.eye(2), heat)
-        yaw_mode, effort_mode = rest(d.reconstruction.matrix, heat)
-        assert abs(yaw_all) < 1e-15 and abs(yaw_mode) < 0.15e-6 * np.abs(heat).max()
+        yaw_mode, effort_mode = rest(d.reconstruction.matrix[:1], heat)
+        assert abs(yaw_all) < 1e-15 and abs(yaw_mode) < 13e-9
         assert effort_mode < saved * effort_all
 
 
