@@ -68,7 +68,7 @@ SURFACE = {
     """,
     "identify": """
         FrequencyResponse IdentifyCode PoleSensitivity bla closed_loop errors_in_variables etfe is_response lpm lrm
-        lrmp mean_inputs pole_sensitivity read_response spectral
+        lrmp mean_inputs mean_period pole_sensitivity read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system compare_modules couple_subsystems demo_project design_system

@@ -7,6 +7,7 @@ from ._etfe import etfe as etfe
 from ._lpm import lpm as lpm
 from ._lrm import lrm as lrm
 from ._lrmp import lrmp as lrmp
+from ._mean_period import mean_period as mean_period
 from ._outcomes import IdentifyCode as IdentifyCode
 from ._pole_sensitivity import PoleSensitivity as PoleSensitivity
 from ._pole_sensitivity import pole_sensitivity as pole_sensitivity
@@ -17,4 +18,5 @@ from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
 __all__ = ["FrequencyResponse", "IdentifyCode", "PoleSensitivity", "bla", "closed_loop", "errors_in_variables", "etfe",
-           "is_response", "lpm", "lrm", "lrmp", "mean_inputs", "pole_sensitivity", "read_response", "spectral"]
+           "is_response", "lpm", "lrm", "lrmp", "mean_inputs", "mean_period", "pole_sensitivity", "read_response",
+           "spectral"]

@@ -24,7 +24,7 @@ from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 from ._windows import Regression, regression
 
-_CHUNK = 2048  # windows that are solved together: time against memory
+_CHUNK = 2**19  # numbers in the regressors of windows that are solved together: time against memory
 _ZERO = 1e-8  # relative singular value below which a window does not determine G
 
 
@@ -147,8 +147,10 @@ def _estimate(spectra: Sequence[Spectrum], beside: Sequence[Spectrum] | None, ba
     """All windows, a chunk at a time."""
     n_bins = LocalEstimate(spectra, basis).n_bins  # refuses windows without room or degrees of freedom
     parts = []
-    for first in range(1, n_bins + 1, _CHUNK):
-        bins = np.arange(first, min(first + _CHUNK, n_bins + 1))
+    width = len(spectra) * basis.n_points * basis.size * (len(spectra) + spectra[0].U.shape[0])
+    count = max(16, _CHUNK // width)
+    for first in range(1, n_bins + 1, count):
+        bins = np.arange(first, min(first + count, n_bins + 1))
         problem = regression(spectra, basis, bins)
         W = problem.K if beside is None else regression(beside, basis, bins).K
         parts.append(_solve(problem, W, variance if beside is None else None, basis.size))

@@ -136,3 +136,25 @@ def test_the_input_itself_is_no_instrument(network) -> None:
     record, _ = heated_room(network, 8, 0.1, n=300)
     with pytest.raises(rt.InputError, match="the input itself"):
         rt.identify.errors_in_variables(record, instruments={"q1": record.inputs[:, 1]})
+
+
+def test_repeated_periods_make_the_estimate_consistent(network) -> None:
+    """A chamber that repeats twice, measured with noise of 0.4; the heater, in step with it, is exact."""
+    plant, rng, kept, taken = network(2, speed=20.0), np.random.default_rng(11), [], []
+    for _ in range(6):
+        q = np.tile(rng.normal(size=1000), 2)
+        room = 0.5 * q + np.tile(lfilter([0.3], [1, -0.8], rng.normal(size=1000)), 2)
+        Y = plant.outputs(np.column_stack([q, room]), np.zeros(3)) + 0.02 * rng.normal(size=(2000, 2))
+        mean, noise = rt.identify.mean_period(
+            plant.record_of(np.column_stack([q, room + 0.4 * rng.normal(size=2000)]), Y), 1000)
+        np.testing.assert_allclose(mean.outputs, (Y[:1000] + Y[1000:]) / 2, atol=1e-12)
+        assert list(noise) == ["q1"] and noise["q1"] == pytest.approx(0.4 / np.sqrt(2), rel=0.07)  # 3 deviations
+        for G, place in ((rt.identify.errors_in_variables(mean, noise=noise, half_width=20), kept),
+                         (rt.identify.lpm(mean, half_width=20), taken)):
+            place.append((G.response / plant.response(G.frequencies) - 1.0)[0, :, 30:80].mean(axis=1))
+    left, direct = np.abs(np.mean(kept, axis=0)), np.abs(np.mean(taken, axis=0))
+    assert (left < 0.4 * direct).all() and direct.min() > 0.05, (left, direct)
+    with pytest.raises(rt.InputError, match="fits 1 times"):
+        rt.identify.mean_period(mean, 600)
+    with pytest.raises(rt.InputError, match="several records"):
+        rt.identify.mean_period([mean, mean], 500)
