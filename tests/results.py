@@ -35,7 +35,8 @@ signals.multisines systems.datasheets thermal.Assembly thermal.Material thermal.
 thermal.load_curve thermal.module_from_polynomials thermal.reduce thermal.steady_state thermal.system_from_matrices
 thermal.trajectory thermal.invert_datasheet thermal.size_sink design.tune_pi synthesis.hinf
 design.protection design.setpoint_ramp thermal.DrivableRange thermal.PwmRipple
-synthesis.anti_windup synthesis.frf_pid synthesis.lpv synthesis.polytopic_feedback synthesis.invariant_ellipsoid
+synthesis.anti_windup synthesis.frf_pid synthesis.FrfMatrixDesign synthesis.lpv
+synthesis.polytopic_feedback synthesis.invariant_ellipsoid
 synthesis.mpc synthesis.hybrid_integrator_gain
 design.tem_feedback design.modal_feedback""".split()
 

@@ -50,8 +50,8 @@ SURFACE = {
         loop_poles observer pid place_sensors reachable regulated_points simulate_law simulate_loop state_feedback
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep
-        RobustAgainst Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
+        Design FeedbackDesign FrfDesign FrfMatrixDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign
+        MpcStep RobustAgainst Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
         mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,
@@ -101,8 +101,8 @@ SURFACE = {
     """,
     "synthesis": """
         AntiWindupDesign
-        Design FeedbackDesign FrfDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign MpcStep
-        RobustAgainst SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv
+        Design FeedbackDesign FrfDesign FrfMatrixDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign
+        MpcStep RobustAgainst SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv
         mixed mpc
         mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight

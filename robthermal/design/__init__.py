@@ -4,6 +4,7 @@ from ..synthesis import AntiWindupDesign as AntiWindupDesign
 from ..synthesis import Design as Design
 from ..synthesis import FeedbackDesign as FeedbackDesign
 from ..synthesis import FrfDesign as FrfDesign
+from ..synthesis import FrfMatrixDesign as FrfMatrixDesign
 from ..synthesis import HybridIntegratorGain as HybridIntegratorGain
 from ..synthesis import InvariantEllipsoid as InvariantEllipsoid
 from ..synthesis import LpvDesign as LpvDesign
@@ -114,7 +115,7 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "setpoint_ramp", "simulate_law", "simulate_loop", "state_feedback", "step_response_linearity",
            "tem_feedback", "tem_polytope", "thermal_modes", "tune_pi", "unobservable"]
 # of synthesis
-__all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "HybridIntegratorGain", "InvariantEllipsoid",
-            "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
+__all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "FrfMatrixDesign", "HybridIntegratorGain",
+            "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
             "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback",
             "polytopic_feedback", "uncertainty_weight"]

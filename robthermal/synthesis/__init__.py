@@ -11,7 +11,8 @@ from ._ellipsoid import InvariantEllipsoid as InvariantEllipsoid
 from ._ellipsoid import invariant_ellipsoid as invariant_ellipsoid
 from ._feedback import FeedbackDesign as FeedbackDesign
 from ._feedback import polytopic_feedback as polytopic_feedback
-from ._frf_pid import FrfDesign as FrfDesign
+from ._frf_design import FrfDesign as FrfDesign
+from ._frf_matrix import FrfMatrixDesign as FrfMatrixDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf
@@ -29,7 +30,7 @@ from ._outcomes import SynthesisCode as SynthesisCode
 from ._output_feedback import output_feedback as output_feedback
 from ._uncertainty_weight import uncertainty_weight as uncertainty_weight
 
-__all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "HybridIntegratorGain", "InvariantEllipsoid",
-           "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid",
+__all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "FrfMatrixDesign", "HybridIntegratorGain",
+           "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid",
            "h2", "hinf", "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis",
            "output_feedback", "polytopic_feedback", "uncertainty_weight"]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +12,14 @@ import numpy as np
 from .._arrays import Array
 from .._checks import finite_number, positive_number, quoted, whole_number
 from .._control import control
-from .._drawing import axes_for
 from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate
-from ._design import Design, RobustAgainst, as_system
+from ._design import RobustAgainst, as_system
 from ._frf_data import Discs, direction, read_discs, resonance_missed, winding
-from ._frf_plot import draw_sensitivity
+from ._frf_design import FrfDesign
+from ._frf_matrix import frf_matrix, is_matrix
 from ._frf_program import Bins, best_start
-from ._margins import Margins
 from ._outcomes import SynthesisCode
 from ._plant import split
 from ._structure import Structure, read_structure
@@ -32,92 +30,10 @@ _REFINED = 6  # rounds in which the margin of a model is raised at the bins, unt
 _FOLLOWED = np.radians(90)  # of 1 + GC at the last bin: beyond it the winding is not that of a stable loop
 
 
-@dataclass(frozen=True)
-class FrfDesign(Design):
-    """A controller of fixed structure from frequency responses; negative feedback: u = C (r - y).
-
-    Parameters
-    ----------
-    controller : control.StateSpace
-        C from error to control, u = C (r - y); its numbers are the gains.
-    value : float
-        Bound of the sensitivity: proven with a model, else evaluated over circles and bins; infinity where not kept.
-    lower : float
-        Always 1: no loop with integral action has a sensitivity that stays below it.
-    closed_loop : control.StateSpace or control.FRD
-        Sensitivity in floats; at the bins where there is no model.
-    certificates : list of Certificate
-        Proofs, about the numbers of plant and controller; `rt.verify` checks each again.
-    robust_against : RobustAgainst
-        What set of plants the claim covers.
-    outcome : Outcome
-        How it ended; its text is the remedy.
-    method : str
-        Equations or program that gave the controller.
-    solver : str
-        What solved them, and in which precision.
-    solve_time : float
-        Time of the whole synthesis with its proofs [s].
-    iterations : int
-        Levels or steps that were tried.
-    plant : GeneralizedPlant or None
-        Parts of the plant the controller was made for; None where there is only a response.
-    gains : mapping
-        Gains by name: Kp [control unit per measurement unit], Ki [the same per second], Kd [the same times seconds].
-    modulus_margin : mapping
-        "stated": what was asked; "robust": smallest distance of -1 from GC over all circles and bins [-].
-    discs : list
-        Frequencies, centers and radii of the responses.
-    structure : Structure
-        Basis that the gains multiply.
-    """
-
-    gains: Mapping[str, float] = field(default_factory=dict)
-    modulus_margin: Mapping[str, float] = field(default_factory=dict)
-    discs: list[Discs] = field(default_factory=list, repr=False)
-    structure: Structure | None = field(default=None, repr=False)
-
-    @cached_property
-    def margins(self) -> Margins:
-        """Modulus, gain [-], phase [deg] and delay [s] margins at the bins, of the centers; "robust": modulus."""
-        if self.structure is None:
-            return {}
-        found: Margins = {}
-        x = np.array(list(self.gains.values()))
-        for k, one in enumerate(self.discs):
-            L = one.center * (self.structure.basis(one.omega) @ x)
-            alpha = 2 / float(abs((1 - L) / (1 + L)).max())
-            large = abs(L) > 1
-            crossing = np.flatnonzero(large[:-1] & ~large[1:])
-            phase = np.pi - abs(np.angle(L[crossing]))
-            found[self.controller.output_labels[0] if len(self.discs) == 1 else f"response {k}"] = {
-                "disk": alpha, "gain": (2 + alpha) / (2 - alpha) if alpha < 2 else np.inf,
-                "phase": float(np.degrees(phase.min())) if len(phase) else np.inf,
-                "delay": float((phase / one.omega[crossing]).min()) if len(phase) else np.inf,
-                "modulus": float(abs(1 + L).min())}
-        return found
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the sensitivity over frequency, of the responses and of the worst plants in their circles.
-
-        Parameters
-        ----------
-        ax : matplotlib axes, optional
-            Axes to draw into; default new ones.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
-        gains = np.array(list(self.gains.values()))
-        C = [self.structure.basis(one.omega) @ gains if self.structure else 0 * one.center
-             for one in self.discs]
-        return draw_sensitivity(axes_for(ax), self.discs, C, self.modulus_margin.get("stated"))
-
-
 def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5, probability: float = 0.99,
             bandwidth: float | None = None, weights: Mapping[str, Any] | None = None, unstable_poles: int = 0,
-            initial: Mapping[str, float] | None = None, sample_time: float | None = None) -> FrfDesign:
+            initial: Mapping[str, float] | None = None, sample_time: float | None = None,
+            decentralized: bool = False) -> FrfDesign:
     """Design the PI, PID or PD with the largest integral gain (PD: proportional gain) that keeps a modulus margin.
 
     The margin is kept by every plant in the confidence circles of the response, jointly over all bins with the stated
@@ -128,11 +44,13 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     G : FrequencyResponse, sequence of them, control.StateSpace or control.TransferFunction
         Response from control to measurement, one input and one output; several are served by one controller. A
         measured response of a sampled plant contains the hold. With a model the result is certified at every frequency.
+        Two inputs and two outputs: matrices of gains, "pi" or "pid", of stable plants, without bandwidth and weights.
     structure : {"pi", "pid", "pd"} or int
         Kp + Ki/s, the same with a filtered derivative (filter time 1/the highest frequency), Kp with derivative, or PI
         with so many lags (a/(s + a))^k at the bandwidth.
     modulus_margin : float
-        Smallest distance of the loop GC from -1 [-], above 0 and below 1.
+        Smallest distance of the loop GC from -1 [-], above 0 and below 1; of matrices the smallest singular value of
+        I + GC.
     probability : float
         Probability that the circles of all bins contain the plant [-].
     bandwidth : float, optional
@@ -146,6 +64,8 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
         Gains by name of a stabilizing controller to start from.
     sample_time : float, optional
         Sample time of a sampled controller [s]; by default a continuous one, of a sampled model that of the model.
+    decentralized : bool
+        Of two inputs and two outputs, whether only the diagonal of every matrix of gains may differ from zero.
 
     Returns
     -------
@@ -162,7 +82,8 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     References
     ----------
     Karimi and Galdos, Fixed-order H∞ controller design for nonparametric models by convex optimization, Automatica 46
-    (2010); Karimi, Nicoletti and Zhu, Int. J. Robust Nonlinear Control 28 (2018).
+    (2010); Karimi and Kammer, A data-driven approach to robust control of multivariable systems by convex
+    optimization, Automatica 85 (2017); Karimi, Nicoletti and Zhu, Int. J. Robust Nonlinear Control 28 (2018).
 
     Examples
     --------
@@ -175,6 +96,17 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     margin = positive_number(modulus_margin, "modulus_margin")
     if margin >= 1:
         raise InputError(f"modulus_margin = {margin:g}", where="argument modulus_margin", expected="below 1")
+    if is_matrix(G):
+        for name, value in (("bandwidth", bandwidth), ("weights", weights), ("unstable_poles", unstable_poles)):
+            if value:
+                raise InputError(f"{name} beside two inputs and two outputs", where=f"argument {name}",
+                                 expected="modulus_margin, structure, decentralized, initial, sample_time",
+                                 remedy="rt.design.hinf takes weights and unstable plants.")
+        time_given = None if sample_time is None else positive_number(sample_time, "sample_time", "s")
+        return frf_matrix(G, structure, decentralized, margin, _probability(probability), initial, time_given)
+    if decentralized:
+        raise InputError("decentralized with one input and one output", where="argument decentralized",
+                         expected="False, or a plant of two inputs and two outputs")
     discs = read_discs(G, _probability(probability))
     dt = _sample_time(discs, sample_time)
     speed = None if bandwidth is None else positive_number(bandwidth, "bandwidth", "rad/s")

@@ -66,8 +66,8 @@ def _words(design: Design) -> tuple[str, str, str]:
                 "Eigenvalues of the loops at the vertices, computed.")
     if isinstance(design, FrfDesign):
         return ("Sensitivity of the loop", "Size of the sensitivity over frequency, with what was asked for.",
-                "Size of the sensitivity 1/(1 + GC), computed from the response; dotted, where there are confidence "
-                "circles, the worst plant in them.")
+                "Size of the sensitivity 1/(1 + GC), of matrices its largest singular value, computed from the "
+                "response; dotted, where there are confidence circles, the worst plant in them.")
     what = "loops at the vertices" if isinstance(design, LpvDesign) else "closed loop"
     return ("Gain of the loop over frequency", f"Largest singular value of the {what} over frequency.",
             f"Largest singular value of the {what} from disturbances to performance outputs, computed.")
