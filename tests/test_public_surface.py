@@ -51,8 +51,8 @@ SURFACE = {
         step_response_linearity tem_feedback tem_polytope tune_pi unobservable TemFeedback
         AntiWindupDesign
         Design FeedbackDesign FrfDesign FrfMatrixDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign
-        MpcStep RobustAgainst Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv mixed mpc
-        mu_synthesis output_feedback polytopic_feedback
+        MpcStep RobustAgainst Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid
+        lpv mixed mpc mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,
     "diagnosis": """
@@ -102,8 +102,8 @@ SURFACE = {
     "synthesis": """
         AntiWindupDesign
         Design FeedbackDesign FrfDesign FrfMatrixDesign HybridIntegratorGain InvariantEllipsoid LpvDesign MpcDesign
-        MpcStep RobustAgainst SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain invariant_ellipsoid lpv
-        mixed mpc
+        MpcStep RobustAgainst SynthesisCode Terminal anti_windup frf_pid h2 hinf hybrid_integrator_gain
+        invariant_ellipsoid lpv mixed mpc
         mu_synthesis output_feedback polytopic_feedback
         uncertainty_weight
     """,

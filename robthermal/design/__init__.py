@@ -116,6 +116,6 @@ __all__ = ["Bounds", "CertifiedLoop", "ClosedLoop", "ColdSide", "Collapse", "Com
            "tem_feedback", "tem_polytope", "thermal_modes", "tune_pi", "unobservable"]
 # of synthesis
 __all__ += ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "FrfMatrixDesign", "HybridIntegratorGain",
-            "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup", "frf_pid", "h2", "hinf",
-            "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis", "output_feedback",
-            "polytopic_feedback", "uncertainty_weight"]
+            "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "Terminal", "anti_windup",
+            "frf_pid", "h2", "hinf", "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc",
+            "mu_synthesis", "output_feedback", "polytopic_feedback", "uncertainty_weight"]

@@ -31,6 +31,6 @@ from ._output_feedback import output_feedback as output_feedback
 from ._uncertainty_weight import uncertainty_weight as uncertainty_weight
 
 __all__ = ["AntiWindupDesign", "Design", "FeedbackDesign", "FrfDesign", "FrfMatrixDesign", "HybridIntegratorGain",
-           "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal", "anti_windup", "frf_pid",
-           "h2", "hinf", "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed", "mpc", "mu_synthesis",
-           "output_feedback", "polytopic_feedback", "uncertainty_weight"]
+           "InvariantEllipsoid", "LpvDesign", "MpcDesign", "MpcStep", "RobustAgainst", "SynthesisCode", "Terminal",
+           "anti_windup", "frf_pid", "h2", "hinf", "hybrid_integrator_gain", "invariant_ellipsoid", "lpv", "mixed",
+           "mpc", "mu_synthesis", "output_feedback", "polytopic_feedback", "uncertainty_weight"]
