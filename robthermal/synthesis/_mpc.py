@@ -28,6 +28,7 @@ from ._plant import hidden_mode, say_mode, split
 
 _LONGEST = 500  # samples of the horizon
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05)  # of bounds by a function at the operating point, in turn
+_REFERENCE = (1.0, 2.0)  # sizes of the exported starts, of the terminal set
 _TRIED = 2000  # states of the terminal set at which such bounds are looked at
 
 
@@ -107,7 +108,10 @@ class MpcDesign(Design):
         return self.program.step(state)
 
     def export(self, path: str | Path, name: str = "controller") -> None:
-        """Write what is proven: terminal cost, law and set; the quadratic program itself is not exported.
+        """Write terminal cost, law and set, the numbers of the quadratic program, and steps to test a solver with.
+
+        No solver is written: ``program`` holds A, B, Q, R and the rows G x + H u <= g, ``reference`` states on the
+        boundary of the terminal set and twice as far, with the first control and the cost that `step` finds.
 
         Parameters
         ----------
@@ -123,7 +127,8 @@ class MpcDesign(Design):
         """
         if Path(path).suffix in (".c", ".h"):
             raise InputError("a predictive controller has no C source here", where=ascii(str(path)),
-                             expected=".json, .mat or a folder", remedy="Give P, K and level to a solver for it.")
+                             expected=".json, .mat or a folder",
+                             remedy="Give program and terminal of the JSON to a solver, and test it with reference.")
         # without a sample time no program is written: the terminal law alone would run beyond its set
         still = replace(self, controller=control.ss([], [], [], self.controller.D, inputs=self.controller.input_labels,
                                                     outputs=self.controller.output_labels))
@@ -148,8 +153,23 @@ class MpcDesign(Design):
         return ax
 
     def _facts(self) -> dict[str, Any]:
-        return super()._facts() | {"terminal": {"P": self.terminal.P, "K": self.terminal.K,
-                                                "level": self.terminal.level}, "horizon": self.horizon}
+        end = {"P": self.terminal.P, "K": self.terminal.K, "level": self.terminal.level}
+        return super()._facts() | {"terminal": end, "horizon": self.horizon} | self._written()
+
+    def _written(self) -> dict[str, Any]:
+        """The program in numbers, and steps of it; nothing where there is no terminal set."""
+        if self.program is None or self.plant is None:
+            return {}
+        own, limits = self.program, self.program.limits
+        written = {"A": self.plant.A, "B": self.plant.B2, "Q": own.Q, "R": own.R, "G": limits.G, "H": limits.H,
+                   "g": limits.g, "control_limits": "a function of the state, not written" if limits.function else
+                   "all limits are rows of G x + H u <= g"}
+        axes = np.sqrt(self.terminal.level) * np.linalg.inv(np.linalg.cholesky(self.terminal.P)).T
+        starts = [size * column for size in _REFERENCE for column in axes.T]
+        steps = [own.step(x) for x in starts]
+        return {"program": written, "reference": {
+            "x": np.array(starts), "control": np.array([one.control for one in steps]),
+            "cost": np.array([one.cost for one in steps]), "feasible": [one.holds for one in steps]}}
 
 
 def mpc(plant: control.StateSpace, *, horizon: int, Q: ArrayLike, R: ArrayLike, limits: Any,

@@ -9,6 +9,7 @@ import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.io import loadmat
 from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import fsolve, minimize
 
@@ -189,12 +190,25 @@ def test_the_picture_is_the_boundary_of_the_terminal_set(cart):
     assert np.einsum("ik,ij,jk->k", points, cart.terminal.P, points) == pytest.approx(cart.terminal.level)
 
 
-def test_files_hold_the_terminal_set_and_no_program(cart, tmp_path):
+def test_files_hold_the_terminal_set_the_numbers_of_the_program_and_steps_of_it(cart, tmp_path):
     cart.export(tmp_path / "out")
     facts = json.loads((tmp_path / "out" / "design.json").read_text())
     assert facts["terminal"]["level"] == cart.terminal.level and facts["horizon"] == HORIZON
     assert rt.Certificate.load(tmp_path / "out" / "certificates" / "1_ellipsoid.json").holds
     assert not list((tmp_path / "out").glob("*.c"))
+    program, (A, B) = facts["program"], sampled(CART, T)
+    assert np.allclose(program["A"], A) and np.allclose(program["B"], B)
+    G, H, g = (np.array(program[key]) for key in "GHg")
+    steps = facts["reference"]
+    assert np.shape(steps["x"]) == (4, 2) and len(steps["cost"]) == 4 and all(steps["feasible"][:2])
+    for k in (0, 1):  # on the boundary of the terminal set: from the file alone, by scipy
+        x = np.array(steps["x"][k])
+        assert x @ np.array(facts["terminal"]["P"]) @ x == pytest.approx(facts["terminal"]["level"])
+        u, cost, _ = brute_force(cart, CART, np.array(program["Q"]), np.array(program["R"]), G, H, g, x)
+        assert steps["cost"][k] == pytest.approx(cost, rel=1e-4)
+        assert steps["control"][k] == pytest.approx(u[0], abs=3e-3)
+    cart.export(tmp_path / "law.mat")
+    assert np.allclose(loadmat(tmp_path / "law.mat")["reference"]["x"][0, 0], steps["x"])
     with pytest.raises(InputError, match="no C source"):
         cart.export(tmp_path / "law.c")
 
