@@ -12,7 +12,7 @@ from ._ellipsoid import invariant_ellipsoid as invariant_ellipsoid
 from ._feedback import FeedbackDesign as FeedbackDesign
 from ._feedback import polytopic_feedback as polytopic_feedback
 from ._frf_design import FrfDesign as FrfDesign
-from ._frf_matrix import FrfMatrixDesign as FrfMatrixDesign
+from ._frf_matrix_design import FrfMatrixDesign as FrfMatrixDesign
 from ._frf_pid import frf_pid as frf_pid
 from ._h2 import h2 as h2
 from ._hinf import hinf as hinf

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,16 +11,14 @@ import numpy as np
 from .._arrays import Array
 from .._checks import finite_number, quoted
 from .._control import control
-from .._drawing import axes_for, line_of
 from ..errors import InputError, Outcome
 from ..identify import FrequencyResponse
 from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant, responder
 from ..verification import Certificate
 from ._design import RobustAgainst, as_system
 from ._frf_data import model_grid
-from ._frf_design import FrfDesign
+from ._frf_matrix_design import ENTRIES, FrfMatrixDesign, MatrixResponse
 from ._frf_matrix_program import MatrixBins, ascend_matrix
-from ._margins import Margins
 from ._outcomes import SynthesisCode
 from ._plant import split
 from ._structure import Structure, read_structure
@@ -31,103 +27,6 @@ _LARGEST_STEP = np.radians(75)  # of det(I + GK) between two bins: above it the 
 _STATIC = np.radians(60)  # of an eigenvalue of G G(first)⁻¹ real part: the first bin shows the static gain
 _TINY = 1e-3  # integral action of a start, relative
 _REFINED = 6  # rounds in which the margin of a model is raised at the bins, until it holds between them
-_NAMES = ("11", "12", "21", "22")
-
-
-@dataclass(frozen=True)
-class MatrixResponse:
-    """Plants of which each entry differs from center by at most its radius; ``model``: the plant, where it is known.
-
-    Parameters
-    ----------
-    omega : ndarray, shape (n_f,)
-        Frequencies of the bins [rad/s].
-    center : ndarray, shape (n_f, 2, 2)
-        Measured values of the four entries.
-    spread : ndarray, shape (n_f,)
-        Norm of the matrix of radii: no plant in the circles differs by more.
-    model : Plant or None
-        State space, where the response is that of a model.
-    where : str
-        Name of the argument, for messages.
-    """
-
-    omega: Array
-    center: Array
-    spread: Array
-    model: Plant | None
-    where: str
-
-
-@dataclass(frozen=True)
-class FrfMatrixDesign(FrfDesign):
-    """PI or PID matrices for two inputs and two outputs; negative feedback: u = K (r - y).
-
-    As `FrfDesign`. ``gains``: by name and entry, "Kp11" (first control, first measurement) to "Kd22"; ``value``: bound
-    of the largest singular value of the sensitivity (I + GK)⁻¹; ``modulus_margin``: smallest singular value of I + GK.
-
-    Parameters
-    ----------
-    responses : list of MatrixResponse
-        Frequencies, values and circles the gains were made for.
-
-    Examples
-    --------
-    >>> import control, numpy as np, robthermal as rt
-    >>> plant = control.ss(np.diag([-1.0, -0.5]), np.eye(2), [[1.0, 0.3], [-0.2, 1.0]], np.zeros((2, 2)))
-    >>> d = rt.design.frf_pid(plant, modulus_margin=0.7, decentralized=True)
-    >>> d.holds, d.gains["Ki12"], rt.verify(d.certificates[0]).valid
-    (True, 0.0, True)
-    """
-
-    responses: Sequence[MatrixResponse] = ()
-
-    @cached_property
-    def margins(self) -> Margins:
-        """Smallest singular value of I + GK over the bins, as "modulus" [-], and the disk margin it implies."""
-        if self.structure is None:
-            return {}
-        found: Margins = {}
-        X = _matrices(self.structure, self.gains)
-        for k, one in enumerate(self.responses):
-            K = np.einsum("fb,bij->fij", self.structure.basis(one.omega), X)
-            L = one.center @ K
-            eye = np.eye(2)
-            modulus = float(np.linalg.svd(eye + L, compute_uv=False)[:, -1].min())
-            alpha = 2 / float(np.linalg.norm((eye - L) @ np.linalg.inv(eye + L), 2, axis=(1, 2)).max())
-            found["both loops" if len(self.responses) == 1 else f"response {k}"] = {"disk": alpha, "modulus": modulus}
-        return found
-
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the largest singular value of the sensitivity, of responses and of the worst plants in their circles.
-
-        Parameters
-        ----------
-        ax : matplotlib axes, optional
-            Axes to draw into; default new ones.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
-        ax = axes_for(ax)
-        for k, one in enumerate(self.responses):
-            name = "response" if len(self.responses) == 1 else f"response {k}"
-            basis = self.structure.basis(one.omega) if self.structure else np.zeros((len(one.omega), 0))
-            K = np.einsum("fb,bij->fij", basis, _matrices(self.structure, self.gains) if self.structure
-                          else np.zeros((0, 2, 2)))
-            least = np.linalg.svd(np.eye(2) + one.center @ K, compute_uv=False)[:, -1]
-            worst = least - one.spread * np.linalg.norm(K, 2, axis=(1, 2))
-            ax.loglog(one.omega, 1 / least, **line_of(k), label=name)
-            if one.spread.any():
-                ax.loglog(one.omega, np.where(worst > 0, 1 / np.where(worst > 0, worst, 1), np.nan),
-                          **line_of(k) | {"linestyle": ":"}, label=f"worst plant in the circles of {name}")
-        ax.axhline(1 / self.modulus_margin["stated"], color="0.5", linestyle="--",
-                   label=f"asked for: at most {1 / self.modulus_margin['stated']:.3g}")
-        ax.set(xlabel="frequency [rad/s]", ylabel="largest singular value of the sensitivity [-]")
-        ax.legend(loc="best")
-        return ax
 
 
 def is_matrix(G: Any) -> bool:
@@ -243,7 +142,7 @@ def _bins(found: Sequence[MatrixResponse], structure: Structure, decentralized: 
 def _start(bins: MatrixBins, structure: Structure, initial: Mapping[str, float] | None, lowest: float
            ) -> Array:
     """Free numbers of stabilizing gains: those given, or a little integral action of the right direction."""
-    names = [f"{name}{entry}" for name in structure.names for entry in _NAMES]
+    names = [f"{name}{entry}" for name in structure.names for entry in ENTRIES]
     flat = bins.patterns.reshape(len(bins.patterns), -1)
     if initial is not None:
         allowed = [names[k] for k in np.flatnonzero(flat.any(axis=0))]
@@ -308,11 +207,6 @@ def _realized(structure: Structure, gains: Array) -> Plant:
     return Plant(A, B, C, D, structure.dt)
 
 
-def _matrices(structure: Structure, gains: Mapping[str, float]) -> Array:
-    return np.array([[gains.get(f"{name}{entry}", 0.0) for entry in _NAMES] for name in structure.names]).reshape(
-        -1, 2, 2)
-
-
 def _problem(model: Plant) -> Plant:
     """(w, u) to (S w, error): z = Gu + w, y = -z, so that u = +K y is negative feedback."""
     n, one = len(model.A), np.eye(2)
@@ -337,7 +231,7 @@ def _finished(found: Sequence[MatrixResponse], structure: Structure, bins: Matri
     value = 1 / robust if kept and not models else np.inf
     if models and kept and all(one.holds for one in certificates):
         value = max(float(one.region["bound"]) for one in certificates)
-    names = [f"{name}{entry}" for name in structure.names for entry in _NAMES]
+    names = [f"{name}{entry}" for name in structure.names for entry in ENTRIES]
     controller = as_system(K, ["error1", "error2"], ["control1", "control2"])
     eye, at = np.eye(2), found[0].omega
     L = found[0].center @ np.einsum("fb,bij->fij", structure.basis(at), gains)
