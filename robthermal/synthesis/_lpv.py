@@ -49,8 +49,8 @@ def lpv(plants: Sequence[control.StateSpace], scheduling: Mapping[str, Sequence[
     n_meas, n_ctrl : int
         Numbers of measurements y and of controls u.
     rates : mapping, optional
-        Largest rate of every quantity [its unit per second]. What is proven holds for every rate: they are checked and
-        named in the result, and do not help a design.
+        Largest rate of every quantity [its unit per second]. What is proven holds for every rate; with rates given the
+        outcome also says how far below that bound any design could come that makes use of them.
     gamma : float, optional
         Norm that is enough [output unit per input unit]; the controllers are then made for it, not for the optimum.
 
@@ -99,7 +99,7 @@ def lpv(plants: Sequence[control.StateSpace], scheduling: Mapping[str, Sequence[
                          where="argument plants", expected=f"at most {MOST_UNKNOWNS}",
                          remedy="Take fewer vertices, or reduce the plants.")
     run = _Run(given, filters_for(given), asked)
-    return run.design(listed, schedule, "" if rates is None else " at the rates given and at any other", start)
+    return run.design(listed, schedule, rates is not None, start)
 
 
 def _check_rates(rates: Any, schedule: Schedule) -> None:
@@ -122,7 +122,7 @@ class _Run:
     count: int = 0
     level: float = np.inf
 
-    def design(self, listed: Sequence[control.StateSpace], schedule: Schedule, rates: str, start: float) -> LpvDesign:
+    def design(self, listed: Sequence[control.StateSpace], schedule: Schedule, rates: bool, start: float) -> LpvDesign:
         """The result."""
         mean, best = _mean(self.given), self._best()
         lower = -np.inf
@@ -136,7 +136,8 @@ class _Run:
         method = "scheduled controllers over a polytope (matrix inequalities)" + self.filters.words
         return LpvDesign(controller, best[2] if holds and best is not None else np.inf, lower, loop,
                          [best[1]] if holds and best is not None else [], self._robust(holds, rates),
-                         self._said(best, holds), method, "Clarabel", time.perf_counter() - start, self.count, mean,
+                         self._said(best, holds, lower if rates else -np.inf), method, "Clarabel",
+                         time.perf_counter() - start, self.count, mean,
                          tuple(as_system(K, *labels) for K in shown), tuple(listed),
                          dict(zip(schedule.names, schedule.points.T, strict=True)))
 
@@ -176,19 +177,24 @@ class _Run:
                                 made_by=made_by("Clarabel semidefinite program", "candidate in floats"))
         return (controllers, certificate, bound) if certificate.holds else None
 
-    def _robust(self, holds: bool, rates: str) -> RobustAgainst:
+    def _robust(self, holds: bool, rates: bool) -> RobustAgainst:
         if not holds:
             return RobustAgainst("Nothing is proven, of these plants or of others.")
         return RobustAgainst(
             f"Proven for every plant that is an average of the {len(self.given)} vertices, constant or varying with "
-            f"time in any way{rates}, with the controllers averaged by the same weights; a plant between the vertices "
-            "that is not their average is not covered.", {"vertices": float(len(self.given))})
+            f"time in any way{' at the rates given and at any other' * rates}, with the controllers averaged by the "
+            "same weights; a plant between the vertices that is not their average is not covered.",
+            {"vertices": float(len(self.given))})
 
-    def _said(self, best: tuple[list[Plant], Certificate, float] | None, holds: bool) -> Outcome:
+    def _said(self, best: tuple[list[Plant], Certificate, float] | None, holds: bool, frozen: float) -> Outcome:
+        """`frozen`: largest optimum of one vertex, which no scheduled controller beats at any rate; -inf: not asked."""
         if holds and best is not None:
+            gain = "" if not np.isfinite(frozen) else (
+                f" A design that uses the rates could reach {frozen:.4g} at best, the largest optimum of one vertex "
+                "alone (estimated).")
             return SynthesisCode.CERTIFIED.outcome(
                 f"Certified for the numbers of the controllers as returned: H-infinity norm, of a varying plant L2 "
-                f"gain, below {best[2]:.7g} for all plants of the hull.")
+                f"gain, below {best[2]:.7g} for all plants of the hull.{gain}")
         if best is not None:
             return SynthesisCode.INFEASIBLE.outcome(
                 f"gamma = {self.asked:g}: the best achievable with one quadratic form is about {self.level:#.4g}.")

@@ -131,6 +131,9 @@ def test_a_smaller_gain_is_asked_for_by_a_larger_gamma(spring):
     plants = list(spring.plants)
     mild = rt.design.lpv(plants, {"k": [-1, 3]}, 1, 1, gamma=2 * spring.value, rates={"k": 5.0})
     assert mild.holds and spring.value < mild.value <= 2 * spring.value and "rates given" in str(mild.robust_against)
+    assert f"could reach {spring.lower:.4g} at best" in mild.outcome.text and "at best" not in spring.outcome.text
+    alone = [rt.design.hinf(plant, 1, 1, tolerance=0.005).value for plant in plants]
+    assert spring.lower <= max(alone) <= 1.01 * spring.lower  # no schedule does better than the best for one plant
     speed = [max(abs(np.linalg.eigvals(K.A)).max() for K in d.controllers) for d in (spring, mild)]
     assert speed[1] < speed[0]
     none = rt.design.lpv(plants, {"k": [-1, 3]}, 1, 1, gamma=0.9 * spring.lower)
