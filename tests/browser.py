@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,10 @@ from pathlib import Path
 from typing import Any
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+# The browser reads descriptor 3 and writes descriptor 4.
+_START = ("import fcntl, os, sys; "
+          "ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]; "
+          "[os.dup2(end, 3 + k) for k, end in enumerate(ends)]; os.execv(sys.argv[3], sys.argv[3:])")
 _TALLEST = 16_000  # px of a picture: what the browser can draw at once
 
 
@@ -23,10 +28,8 @@ class Page:
 
     Parameters
     ----------
-    process : subprocess.Popen
-        Browser, whose debugging pipe is open.
     ask, answers : int
-        File descriptors of the two ends of that pipe.
+        File descriptors of its debugging pipe: to write to, and to read from.
     """
 
     def __init__(self, ask: int, answers: int) -> None:
@@ -108,10 +111,9 @@ def browser() -> Iterator[Page]:
     asked, ask = os.pipe()
     answers, answer = os.pipe()
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        # The browser reads descriptor 3 and writes descriptor 4.
-        line = f'exec "$@" 3<&{asked} 4>&{answer}'
-        process = subprocess.Popen(["sh", "-c", line, "sh", CHROMIUM, *options, f"--user-data-dir={profile}"],
-                                   pass_fds=(asked, answer), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        words = [sys.executable, "-c", _START, str(asked), str(answer), CHROMIUM, *options]
+        process = subprocess.Popen([*words, f"--user-data-dir={profile}"], pass_fds=(asked, answer),
+                                   stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         os.close(asked)
         os.close(answer)
         try:

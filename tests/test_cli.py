@@ -595,6 +595,7 @@ def test_version(run: Run) -> None:
 
 @pytest.mark.parametrize(("args", "words"), [
     (["nonsense"], ["nonsense", "--help"]),
+    (["diagnos"], ["Did you mean 'diagnose', 'design'? See robthermal --help."]),
     (["demo", "--nonsense"], ["--nonsense", "demo --help"]),
     (["check"], ["SYSTEM.toml", "check --help"]),
     (["certify", "x.toml", "--temperature", "warm", "5"], ["--temperature"]),
@@ -607,3 +608,19 @@ def test_wrong_command_lines(run: Run, args: list[str], words: list[str]) -> Non
 def test_no_command_shows_the_help(run: Run) -> None:
     done = run()
     assert done.status == 2 and "Commands:" in done.err
+
+
+def test_the_list_of_commands_has_whole_sentences(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    listed = run("--help").out.partition("Commands:\n")[2].rstrip()
+    said = [" ".join(one.split()[1:]) for one in re.split(r"\n(?=  [a-z])", listed)]
+    assert len(said) == len(COMMANDS) and all(one.endswith(".") and "..." not in one for one in said)
+
+
+@pytest.mark.parametrize(("option", "value", "known"), [
+    ("--current", "m9=0:1", "one of m1"), ("--setpoint", "m9=5", "one of m1"),
+    ("--ambient", "hall=1:2", "one of room")])
+def test_names_that_the_system_lacks_are_refused_by_their_option(run: Run, system: Path, option: str, value: str,
+                                                                 known: str) -> None:
+    said = run("certify", system, option, value)
+    assert said.status == 2 and f"robthermal: {option}: there is no" in said.err and known in said.err

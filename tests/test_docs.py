@@ -144,3 +144,12 @@ def test_the_recipes_run_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.
     assert names["verdict"].valid and proof.holds and possible.outcome.ok
     assert usable.current == pytest.approx(1.47, abs=0.01) and usable.outcome.ok
     assert 500 not in rt.signals.find_glitches(names["record"]).get("T", ())
+
+
+def test_pictures_are_small_and_shown() -> None:
+    """Every picture of the folder is on a page, or on the README, and none is too large for a slow line."""
+    pictures = [one for one in (DOCS / "images").iterdir() if one.is_file()]
+    assert len(pictures) > 8
+    pages = "".join(page.read_text(encoding="utf-8") for page in [*DOCS.rglob("*.md"), ROOT / "README.md"])
+    assert [one.name for one in pictures if f"images/{one.name}" not in pages] == []
+    assert [one.name for one in pictures if one.stat().st_size >= 120_000] == []

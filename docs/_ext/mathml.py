@@ -126,7 +126,8 @@ def _inline(self: Any, node: nodes.Element) -> None:
 
 
 def _display(self: Any, node: nodes.Element) -> None:
-    self.body.append(f'<div class="formula">{_markup(node, block=True)}</div>\n')
+    reached = 'tabindex="0" role="group" aria-label="Formula"'  # by keyboard: a wide one is moved sideways
+    self.body.append(f'<div class="formula" {reached}>{_markup(node, block=True)}</div>\n')
     raise nodes.SkipNode
 
 

@@ -90,7 +90,9 @@ class UsableCurrent:
         return pd.DataFrame.from_dict(rows, orient="index", columns=["current [A]", "basis", "meaning"])
 
     def __str__(self) -> str:
-        lines = [f"  {name:<12}{bound.current:9.4g} A  {bound.basis}" for name, bound in self.limits.items()]
+        amounts = {name: f"{one.current:.4g} A" if one.current < np.inf else "no bound"
+                   for name, one in self.limits.items()}
+        lines = [f"  {name:<12}{amounts[name]:>11}  {bound.basis}" for name, bound in self.limits.items()]
         return "\n".join([self.outcome.text, *lines])
 
     def plot(self, ax: Any = None) -> Any:

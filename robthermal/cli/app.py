@@ -108,7 +108,7 @@ def _run(job: rt.jobs.request.Project, out: Path, as_json: bool, only: Sequence[
 
 @app.command()
 def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml) and measured files, or these alone.",
-                                                      metavar="[SYSTEM.toml] [FILE]...")],
+                                                      metavar="SYSTEM.toml|FILE")],
           column: ColumnMap = None, record: ReadOption = None, as_json: Json = False) -> None:
     """Say whether a system file and its records are sound, and how each measured file is understood.
 
@@ -133,7 +133,8 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
 
 
 @app.command()
-def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.")],
+def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Record with the inputs.",
+                                                                           metavar="RECORD.csv")],
              out: Annotated[Path, typer.Option("--out", callback=place,
                                                help="Record to write (.csv, .parquet, .mat).")],
              column: ColumnMap = None, read: ReadOption = None, as_json: Json = False) -> None:
@@ -157,9 +158,9 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 @app.command()
 def calibrate(system: SystemFile,
               records: Annotated[list[Path], typer.Argument(
-                  help="Training records, frequency responses from `robthermal frf`, or both.")],
+                  help="Training records, frequency responses from `robthermal frf`, or both.", metavar="TRAIN.csv")],
               validation: Annotated[list[Path] | None, typer.Option(
-                  "--validation", help="Held-out record or response.")] = None,
+                  "--validation", help="Held-out record or response, may repeat.", metavar="FILE")] = None,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
               max_iterations: Annotated[int, typer.Option(help="A fit that needs more has not converged.")] = 50,
@@ -196,14 +197,17 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
                 help="Range of one module [A]; default its declared limits.", metavar="NAME=LO:HI")] = None,
             ambient: AmbientRange = None,
             setpoint: Annotated[list[str] | None, typer.Option(
-                help="Regulated cold face, in the unit of the file.", metavar="NAME=VALUE")] = None,
+                help="Temperature of a cold face that is regulated, in the unit of the file.",
+                metavar="NAME=VALUE")] = None,
             parameters: Annotated[list[str] | None, typer.Option(
                 help="Ranges of uncertain parameters: calibrated.json, or one range [its unit]; may repeat.",
                 metavar="FILE.json|NAME=LO:HI")] = None,
             confidence: Annotated[float, typer.Option(help="Of ranges from a calibration, above 0.5.")] = 0.95,
-            method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+            method: Annotated[str, typer.Option(
+                help="Norm of the contraction: energy, sum, max or lyapunov.")] = "energy",
             structure: Annotated[str, typer.Option(help="With lyapunov: full or block P.")] = "full",
-            large: Annotated[bool, typer.Option(help="With lyapunov: more than 40 lumps too, slowly.")] = False,
+            large: Annotated[bool, typer.Option(
+                "--large", help="With lyapunov: more than 40 lumps too, slowly.")] = False,
             as_json: Json = False) -> None:
     """Certify a system: contraction in a box, a box that is never left, current limits, runaway limit.
 
@@ -299,7 +303,8 @@ def limit_map(system: SystemFile, out: Out = Path("robthermal-map"),
                   help="Of all cold faces, in the unit of the file; default the lower end of --temperature to nominal "
                   "ambient, 3 values.", metavar="LO,HI,N")] = None,
               temperature: Box = None,
-              method: Annotated[str, typer.Option(help="energy, sum, max or lyapunov.")] = "energy",
+              method: Annotated[str, typer.Option(
+                  help="Norm of the contraction: energy, sum, max or lyapunov.")] = "energy",
               as_json: Json = False) -> None:
     """Map the allowed current over ambient temperature, heat load and set-point.
 
@@ -334,6 +339,8 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
 
 for _command in (results.report, results.verify, learn.new, learn.explain, learn.datasheet):
     app.command()(_command)
+for _known in app.registered_commands:  # whole sentences in the list of commands; they would be cut to one line
+    _known.short_help = (_known.callback.__doc__ or "").partition("\n")[0]
 
 
 def main() -> None:
@@ -361,7 +368,8 @@ def _usage(error: Any) -> str:
     """What is wrong with the command line, and where to look; the help itself where nothing was asked."""
     said = error.format_message().rstrip(".")
     command = error.ctx.command_path if error.ctx else "robthermal"
-    return f"{said}. See {command} --help." if said and "\n" not in said else f"no command\n{said}"
+    end = "" if said.endswith("?") else "."
+    return f"{said}{end} See {command} --help." if said and "\n" not in said else f"no command\n{said}"
 
 
 def _stop(message: str, status: int, **details: object) -> NoReturn:

@@ -29,9 +29,10 @@ from .terminal import (
 def diagnose(system: SystemFile,
              records: Annotated[list[Path], typer.Argument(
                  help="Training records, or frequency responses from `robthermal frf`.",
-                 metavar="TRAIN.csv...")],
+                 metavar="TRAIN.csv")],
              validation: Annotated[list[Path] | None, typer.Option(
-                 "--validation", help="Record or response that no fit sees, may repeat.")] = None,
+                 "--validation", help="Record or response that no fit sees, may repeat.",
+                 metavar="FILE")] = None,
              reference: Annotated[list[Path] | None, typer.Option(
                  "--reference", help="Records of the healthy machine: what has changed since? Takes all files up to "
                  "the next option, may repeat.", metavar="OLD.csv...")] = None,

@@ -12,18 +12,23 @@ import robthermal as rt
 from .terminal import ColumnMap, Json, ReadOption, answer, drawing, place, progress, reading, say
 
 
-def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machine.")],
-        system: Annotated[Path | None, typer.Option("--system", help="System file: columns and poles.")] = None,
-        inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column, may repeat.")] = None,
-        outputs: Annotated[list[str] | None, typer.Option("--output", help="Output column, may repeat.")] = None,
+def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machine.", metavar="RECORD.csv")],
+        system: Annotated[Path | None, typer.Option("--system", help="System file: columns and poles.",
+                                                     metavar="SYSTEM.toml")] = None,
+        inputs: Annotated[list[str] | None, typer.Option("--input", help="Input column, may repeat.",
+                                                         metavar="COLUMN")] = None,
+        outputs: Annotated[list[str] | None, typer.Option("--output", help="Output column, may repeat.",
+                                                          metavar="COLUMN")] = None,
         method: Annotated[str, typer.Option(help="etfe, spectral, lpm, lrm or lrmp.")] = "lpm",
         half_width: Annotated[int, typer.Option(help="Bins on each side of a local window.")] = 8,
         degree: Annotated[int, typer.Option(help="Degree of the local polynomials.")] = 2,
-        poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative.")] = None,
+        poles: Annotated[list[float] | None, typer.Option("--pole", help="Prescribed pole [rad/s], negative, may "
+                                                           "repeat.", metavar="VALUE")] = None,
         pole_deviation: Annotated[float | None, typer.Option(
             "--pole-deviation", help="Of lrmp: how uncertain its poles are, relative to their size; widens the bands.",
             metavar="SHARE")] = None,
-        band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].")] = None,
+        band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].",
+                                                                     metavar="LO HI")] = None,
         reference: Annotated[list[str] | None, typer.Option(
             "--reference", help="Of a closed loop: column of a set-point or added excitation, one per input, may "
             "repeat.", metavar="COLUMN")] = None,
@@ -59,16 +64,19 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
     answer(summary, as_json, lambda: say(str(G), *G.notes, f"frequency response: {out}"))
 
 
-def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.", metavar="NAME...")],
+def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.", metavar="NAME")],
                period: Annotated[int, typer.Option(help="Samples in a period.")],
-               sample_time: Annotated[float, typer.Option(help="[s].")],
+               sample_time: Annotated[float, typer.Option(help="Time between two samples [s].")],
                band: Annotated[tuple[float, float], typer.Option(help="Excited frequencies [Hz].", metavar="LO HI")],
                amplitude: Annotated[float, typer.Option(help="Largest deviation from the mean [unit of the inputs].")],
                periods: Annotated[int, typer.Option(help="How many periods.")] = 1,
-               nonnegative: Annotated[bool, typer.Option("--nonnegative", help="No value below 0.")] = False,
-               arrangement: Annotated[str, typer.Option(help="orthogonal, zippered, independent.")] = "orthogonal",
+               nonnegative: Annotated[bool, typer.Option(
+                   "--nonnegative", help="Shift the mean so that no value is negative: heaters.")] = False,
+               arrangement: Annotated[str, typer.Option(
+                   help="Of several inputs: orthogonal, zippered or independent.")] = "orthogonal",
                seed: Annotated[int, typer.Option(help="Of the random phases.")] = 0,
-               system: Annotated[Path | None, typer.Option("--system", help="For the design check.")] = None,
+               system: Annotated[Path | None, typer.Option("--system", help="System file, for the design check.",
+                                                            metavar="SYSTEM.toml")] = None,
                out: Annotated[Path, typer.Option("--out", help="Record to write.", callback=place)] = Path(
                    "excitation.csv"),
                as_json: Json = False) -> None:

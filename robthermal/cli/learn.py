@@ -41,7 +41,7 @@ def explain(name: Annotated[str | None, typer.Argument(
 
 def datasheet(
     sheets: Annotated[list[str] | None, typer.Argument(
-        metavar="[NAME|SHEETS.csv]...", help="Sheets known to the package, or files of sheets.")] = None,
+        metavar="NAME|SHEETS.csv", help="Sheets known to the package, or files of sheets.")] = None,
     rating: Annotated[list[str] | None, typer.Option(
         "--rating", metavar="'Th=27, Vmax=14.3, Imax=4.4, dTmax=60, Qmax=37.7'",
         help="One hot-side column of a sheet [°C V A K W]; repeat it for the others.")] = None,

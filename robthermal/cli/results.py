@@ -25,7 +25,8 @@ def report(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results f
     show_report(rebuilt, folder, as_json)
 
 
-def verify(certificates: Annotated[list[Path], typer.Argument(metavar="CERT.json|DIR...")],
+def verify(certificates: Annotated[list[Path], typer.Argument(
+        help="Certificates, or folders of results with all of theirs.", metavar="CERT.json|DIR")],
            junit: Annotated[Path | None, typer.Option("--junit", help="JUnit file to write, for a pipeline.",
                                                       callback=place)] = None,
            second: Annotated[bool, typer.Option("--second", help="Let the second checker derive them too.")] = False,

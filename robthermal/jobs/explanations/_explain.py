@@ -115,7 +115,7 @@ def explain(name: str) -> tuple[Explanation, ...]:
     """
     found = tuple(_all(name))
     if not found:
-        known = [one for names in explainable().values() for one in names]
+        known = list(dict.fromkeys(one for names in explainable().values() for one in names))
         near = get_close_matches(name, known, n=4, cutoff=0.5)
         raise InputError(f"nothing is called {name!r}", where="explain",
                          expected=f"one of {', '.join(near)}" if near else "",

@@ -237,7 +237,9 @@ def _section(result: LimitMap, data: pd.DataFrame) -> Section:
             "regulated machine, the current up to which a box inside the stated one is never left, the contraction "
             "limit inside the stated box (which is not a limit for use), and the rating. Conditions without a needed "
             "current cannot be held. All rows are in map.csv.")
-    return Section("Map of current limits", text, figures=(figure,), tables=(Table(data, "Conditions."),), anchor="map")
+    words = {name: name.replace("degC", "°C").replace("setpoint", "set-point") for name in data.columns}
+    return Section("Map of current limits", text, figures=(figure,),
+                   tables=(Table(data.rename(columns=words), "Conditions."),), anchor="map")
 
 
 def _axis(text: str | None, option: str) -> tuple[float, ...]:

@@ -67,6 +67,13 @@ def boxes_from_text(system: System, *, temperature: tuple[float, float] | None =
     currents = {**default, **dict(_range(text, "--current") for text in current)}
     surroundings = dict(_range(text, "--ambient") for text in ambient)
     points = dict(_value(text, "--setpoint") for text in setpoint)
+    for option, given, what, known in (("--current", currents, "module", system.module_names),
+                                       ("--setpoint", points, "module", system.module_names),
+                                       ("--ambient", surroundings, "ambient", system.ambient_names)):
+        unknown = [name for name in given if name not in known]
+        if unknown:
+            raise InputError(f"there is no {what} {unknown[0]!r}", where=option,
+                             expected=f"one of {', '.join(known)}" if known else f"none: the system has no {what}")
     return Boxes(temperature=box, current=currents,
                  ambient={name: range_in_kelvin(pair, unit, "--ambient") for name, pair in surroundings.items()},
                  setpoint={name: in_kelvin(value, unit, "--setpoint") for name, value in points.items()},

@@ -15,6 +15,7 @@ from ...errors import InputError
 _MAX_BYTES = 10_000_000
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 T = TypeVar("T", bound=BaseModel)
+_NEAR = 0.7  # likeness of a key that is offered for an unknown one
 _OF_UNIONS = ("float", "constrained-float", "str", "list[str]")  # where pydantic says which of several types it tried
 
 
@@ -42,8 +43,9 @@ def read_text(path: Path, kind: str, largest: int = _MAX_BYTES) -> str:
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="Check the path.") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"is not valid {kind}: {error}", where=str(path), remedy="Is this the right file?") from None
+    except UnicodeDecodeError:
+        raise InputError("is not a text file in UTF-8", where=str(path), expected=f"a {kind} file",
+                         remedy="Is this the right file?") from None
 
 
 def read_toml(path: Path, schema: type[T], remedy: str) -> T:
@@ -88,7 +90,7 @@ def refusal(error: ValidationError, path: Path, remedy: str, known: Collection[s
     last = str(fault["loc"][-1])
     if fault["type"] == "extra_forbidden" and last in known:
         remedy = f"{last!r} is a key of another table: is this the right file, and the right table? {remedy}"
-    elif fault["type"] == "extra_forbidden" and (near := get_close_matches(last, known, n=1)):
+    elif fault["type"] == "extra_forbidden" and (near := get_close_matches(last, known, n=1, cutoff=_NEAR)):
         remedy = f"Did you mean {near[0]!r}? {remedy}"
     return InputError(what, where=str(path), remedy=remedy)
 
