@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 AXE = ROOT / "build" / "axe" / "package" / "axe.min.js"  # .ci/run fetches it
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
 needs_axe = pytest.mark.skipif(not AXE.is_file(), reason="no axe-core in build/axe (.ci/run fetches it with npm)")
+LOOKS = ("proven", "failed", "answer")  # of the head
 RULES = "axe.run(document).then(found => JSON.stringify(found.violations.map(one => [one.id, one.nodes[0].html])))"
 
 
@@ -34,7 +35,7 @@ def files(report: Report, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
                      numbers=(("error", "1 → 0.1 K", "noise alone 0.1 K"),),
                      claims=[replace(one, verified=None, tested=True, file="") for one in report.claims])
     return {name: write_html(one, folder / f"{name}.html")
-            for name, one in (("proven", report), ("failed", failed), ("answer", answer))}
+            for name, one in zip(LOOKS, (report, failed, answer), strict=True)}
 
 
 def violations(page: Page) -> list[list[str]]:
@@ -47,8 +48,8 @@ def violations(page: Page) -> list[list[str]]:
 @pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_axe_finds_nothing(page: Page, files: dict[str, Path], width: int, dark: bool) -> None:
-    for file in files.values():
-        page.show(file, width=width, dark=dark)
+    for name in LOOKS:
+        page.show(files[name], width=width, dark=dark)
         assert page.console == []
         assert violations(page) == []
 
@@ -74,9 +75,11 @@ def test_what_has_the_focus_is_seen(page: Page, files: dict[str, Path]) -> None:
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_nothing_has_to_be_moved_sideways(page: Page, files: dict[str, Path], width: int) -> None:
-    for file in files.values():
-        page.show(file, width=width)
+    beyond = "Math.max(...[...document.querySelectorAll('.scroll')].map(box => box.scrollWidth - box.clientWidth))"
+    for name in LOOKS:
+        page.show(files[name], width=width)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate(beyond) <= 0
 
 
 def test_a_phone_shows_the_usable_current_on_its_first_screen(page: Page, report: Report, tmp_path: Path) -> None:
