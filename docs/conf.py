@@ -32,6 +32,7 @@ nb_execution_mode = "cache"
 nb_execution_cache_path = str(Path(__file__).parents[1] / "build" / "notebooks")
 nb_execution_timeout = 120  # a cell may take this long [s]
 nb_execution_raise_on_error = True
+nb_output_stderr = "warn"  # a tutorial that prints a warning stops the build
 nb_merge_streams = True  # what a cell prints is one block
 if tags.has("tests"):  # noqa: F821  (defined by Sphinx)
     notebooks = (Path(__file__).parent / "tutorials").glob("*.ipynb")

@@ -73,3 +73,5 @@ def test_runs_and_its_assertions_hold(path: Path, kernel: NotebookClient, tmp_pa
         if index and cell.cell_type == "code":
             kernel.execute_cell(nbformat.v4.new_code_cell(LOOK.format(described(cell))), index)
     assert not list(tmp_path.iterdir()), "a tutorial leaves no files behind"
+    printed = [one.text for cell in kernel.nb.cells for one in cell.get("outputs", ()) if one.get("name") == "stderr"]
+    assert printed == [], "a warning stands on the page"

@@ -130,6 +130,10 @@ class NormalKernel:
 
     def _noise(self, left: Array, count: int, full: bool) -> Array:
         """E[V_o V_p*] from the upper triangle of what is left of the products Y_o* Y_p, or its diagonal."""
+        with np.errstate(divide="ignore", invalid="ignore"):  # no degree of freedom left: not known
+            return self._spread(left, count, full)
+
+    def _spread(self, left: Array, count: int, full: bool) -> Array:
         if not full:
             return ordered(np.einsum("oob->ob", left).real, count) / self.degrees_of_freedom
         noise = np.empty((self.n_y, self.n_y, count), dtype=complex)
