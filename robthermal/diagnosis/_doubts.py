@@ -44,8 +44,8 @@ def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
         joined = {end for link in nominal.system.links if room in link.between for end in link.between}
         labels = [one.label for one in effects if one.effect.name in _LIKE_THE_ROOM and one.where[0] in joined]
         if labels:
-            said.append(f"{room} was not recorded: {', '.join(labels)} may be {room} itself, warmer or colder than the "
-                        "system says, or drifting. Record it.")
+            said.append(f"The temperature of {room} was not recorded: {', '.join(labels)} may be {room} itself, "
+                        "warmer or colder than the system says, or drifting. Record it.")
         if any(one.effect.name == AMBIENT_DRIFT and one.where == (room,) for one in effects):
             said.append(f"That {room} drifts is read off other temperatures: record it.")
     return said
