@@ -42,6 +42,22 @@ def probability(p: float) -> str:
     return f"p = {p:.2g}" if p >= 1e-16 else "p < 1e-16"
 
 
+def chance(p: float) -> str:
+    """A probability for a cell of a table: three digits, a bound where it is too small to be computed, a dash for none.
+
+    Parameters
+    ----------
+    p : float
+        Probability [-].
+
+    Examples
+    --------
+    >>> chance(0.0312), chance(0.0), chance(float("nan"))
+    ('0.0312', '< 1e-16', '–')
+    """
+    return "–" if isnan(p) else f"{p:.3g}" if p >= 1e-16 else "< 1e-16"
+
+
 def downwards(value: float, digits: int) -> str:
     """`value` with so many digits, never larger than it is.
 

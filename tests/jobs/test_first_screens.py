@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from commands import Run
 
 import robthermal as rt
+from robthermal._digits import chance
 from robthermal.jobs.diagnose._effect_words import WORDS, in_words, labels_in_words
 
 BAR = """
@@ -55,3 +57,8 @@ def test_what_is_called_simulated_has_a_banner(run: Run, tmp_path: Path, name: s
     assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["label"] == label
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert ('class="banner"' in page) == bool(label)
+
+
+@pytest.mark.parametrize(("p", "said"), [(0.0, "< 1e-16"), (1e-300, "< 1e-16"), (0.0312, "0.0312"), (np.nan, "–")])
+def test_a_probability_is_never_written_as_zero(p: float, said: str) -> None:
+    assert chance(p) == said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..._digits import chance
 from ..._pandas import pd
 from ...diagnosis import Diagnosis
 
@@ -21,7 +22,7 @@ def ranking(found: Diagnosis) -> pd.DataFrame:
         What was found.
     """
     scores = found.scores
-    rows = [{"candidate": candidate.label, "F": float(scores.statistic[i]), "p": float(scores.p_value[i]),
+    rows = [{"candidate": candidate.label, "F": float(scores.statistic[i]), "p": chance(float(scores.p_value[i])),
              "size": float(scores.size[i]), "± std": float(scores.std[i]), "limit": float(scores.limit[i]),
              "unit": candidate.effect.size.unit, "answer": _reason(found, i)}
             for i, candidate in enumerate(scores.candidates)]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._digits import chance
 from ..._pandas import pd
 from ...diagnosis import Diagnosis, Found, effects
 from ...fitting import rmse
@@ -167,7 +168,7 @@ def _candidate_tables(ranked: pd.DataFrame) -> tuple[Table, ...]:
 def _effect_section(found: Diagnosis) -> Section:
     listed = found.effects or found.provisional
     rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std, "unit": unit,
-             "ΔBIC": effect.delta_bic, "p": effect.p_value, **_evidence(effect)}
+             "ΔBIC": effect.delta_bic, "p": chance(effect.p_value), **_evidence(effect)}
             for effect in listed for name, (value, std, unit) in effect.values.items()]
     text = f"{_own_words(found)}\n\n"
     text += "augmented.toml holds these effects." if found.effects else "augmented.toml holds the system refitted."
@@ -258,9 +259,10 @@ def _response(one: ResponseResiduals) -> Figure:
 def _located_section(found: Diagnosis) -> Section:
     where = found.located
     lumps = pd.DataFrame({"lump": list(where.lumps), "F of an extra heat": [where.strength[n] for n in where.lumps],
-                          "p": list(where.lumps.values())}).sort_values("F of an extra heat", ascending=False,
-                                                                        ignore_index=True)
-    sensors = pd.DataFrame({"sensor": list(where.sensors), "p of whiteness": list(where.sensors.values())})
+                          "p": [chance(p) for p in where.lumps.values()]})
+    lumps = lumps.sort_values("F of an extra heat", ascending=False, ignore_index=True)
+    sensors = pd.DataFrame({"sensor": list(where.sensors),
+                            "p of whiteness": [chance(p) for p in where.sensors.values()]})
     conditions = pd.DataFrame([line.split(": ", 1) for line in where.conditions], columns=["condition", "misfit"])
     with house_style():
         figures = [_from_axes(where.plot(), "Evidence of an extra heat by lump.", "F statistic of an extra heat.")]
