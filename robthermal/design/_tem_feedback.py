@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -24,7 +24,7 @@ from ..verification import Certificate
 from ._modules import Array
 from ._numbers import numbers
 from ._tem_hull import TemHull, read_box, tem_hull
-from ._tem_program import Ellipsoid, largest_ball
+from ._tem_program import Ellipsoid, largest_ball, most_of_any_form
 
 _QUARTERS, _HALVINGS = 7, 4  # of the rate, where the one asked for is not reached
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # of the room of the currents: samples may need smaller gains
@@ -189,9 +189,10 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
         Current of all modules at the operating point, or {module: current} [A].
     rate : float
         Rate that is asked for: V falls at least as exp(-2 rate t) [1/s].
-    method : {"quadratic"}
-        One quadratic form for the whole box. A form that varies with the temperatures would give nothing more (docs,
-        "State feedback of modules").
+    method : {"quadratic", "parameter_dependent"}
+        Both return one quadratic form for the whole box. The second also states the largest ball of starts that a form
+        varying with the temperatures could keep, which is the reason why none is designed (docs, "State feedback of
+        modules").
     covariance : Estimates or mapping, optional
         Result of a calibration, whose joint ranges at `probability` are covered, or {parameter: (lower, upper)}; links
         and modules only.
@@ -235,14 +236,9 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     (True, True, True)
     """
     start = time.perf_counter()
-    if method == "parameter_dependent":
-        raise InputError('method = "parameter_dependent"', where="argument method",
-                         expected='"quadratic": one quadratic form for the whole box',
-                         remedy="A form that varies with the temperatures cannot give more: one corner of the box "
-                         "alone already limits the starts to those of one form (docs, Synthesis).")
-    if method != "quadratic":
+    if method not in ("quadratic", "parameter_dependent"):
         raise InputError(f"method = {quoted(method)}", where="argument method",
-                         expected='"quadratic": the certificate knows one quadratic form for the whole box')
+                         expected='"quadratic" or "parameter_dependent"')
     asked = positive_number(rate, "rate", "1/s")
     box = read_box(system, temperature, current, covariance, probability, ambient)
     point = _operating(system, operating, box, heat)
@@ -263,6 +259,11 @@ def tem_feedback(system: System, *, temperature: Any, current: Any, operating: A
     if found is not None and held is not None:
         found, cert = _sampled(found, hull, asked, room, current_room, proven)
     outcome = _outcome(found, cert, asked, hull, room, current_room)
+    if method == "parameter_dependent" and held is None and outcome.ok and found is not None:
+        most = most_of_any_form(hull, asked, room, current_room, found)
+        outcome = replace(outcome, text=(
+            f"{outcome.text} The form is the same at all temperatures: one that varies with them keeps at most "
+            f"{most:.4g} K (estimated from one corner of the box alone), this one {found.semi_axis:.4g} K."))
     return _design(system, box, point, found, cert, asked, outcome, held or 0.0,
                    time.perf_counter() - start)
 

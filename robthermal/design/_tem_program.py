@@ -16,6 +16,7 @@ from ._modules import Array
 from ._tem_hull import TemHull
 
 _ROUNDS, _ADDED = 25, 6
+_ALONE = 4  # vertices that are tried by themselves
 _SPARE = (1e-3, 1e-2)  # of the rate in the program, in turn
 
 
@@ -56,6 +57,17 @@ def largest_ball(hull: TemHull, rate: float, room: Array, current_room: Array) -
                         float((current_room**2 / np.maximum(np.einsum("ki,ij,kj->k", F, W, F), 1e-300)).min()))
             return Ellipsoid(W * scale * (1 - 1e-6), F, reached, solves)
     return None
+
+
+def most_of_any_form(hull: TemHull, rate: float, room: Array, current_room: Array, found: Ellipsoid) -> float:
+    """Smallest semi-axis [K] beyond which no form, constant or varying with the temperatures, keeps a ball.
+
+    Where the temperatures may move either way, P frozen at one vertex solves the program of that vertex alone; its
+    ball bounds all others. The vertices tried are those at which the ellipsoid that was found is slowest.
+    """
+    program = _Program(hull, rate, room, current_room)
+    alone = [program.solve([number]) for _, number in _rates(hull, found.W, found.F)[:_ALONE]]
+    return min(float(np.sqrt(np.linalg.eigvalsh(one[0])[0])) for one in alone if one is not None)
 
 
 def _start(hull: TemHull) -> list[int]:
