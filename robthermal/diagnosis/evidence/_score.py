@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -24,6 +24,8 @@ POWER = 0.9
 ALIAS = 1e-3  # sine of the angle below which two signatures are the same, and one is no signature
 BIC_GAP = 10.0
 _DIGITS = 6  # of the logarithm of a statistic
+_TOGETHER = 64  # signatures at once
+Trial = tuple[int, Candidate]  # number of a candidate, and its trial values
 Pair = tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]
 
 
@@ -192,9 +194,56 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     return score_candidates(fit, fit.testable(candidates(fit.system, effects, fit.unrecorded)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Candidates at the best of their trial values, one entry each, with what their scores need."""
+
+    trials: list[Trial]
+    n_columns: NDArray[np.intp]
+    size: Array
+    std: Array
+    statistic: Array
+    possible: NDArray[np.bool_]
+    identifiability: Array
+    own: Array  # length of the projected signature; 0 where nothing is left of it
+    unit: Array
+    n_trials: int
+
+
 def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     """Score these candidates, each at the best of its trial values."""
-    trials = [(number, trial) for number, candidate in enumerate(tested) for trial in candidate.trials(fit.paths[0])]
+    groups = [_tried(fit, trials) for trials in _together(fit, tested)]
+    n_trials = sum(group.n_trials for group in groups)
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(group, name) for group in groups], axis=-1)
+
+    unit, n_columns, own = joined("unit"), joined("n_columns"), joined("own")
+    nu = max(fit.degrees_of_freedom - 1, 1)
+    # the phase of a pair was chosen by the data: two degrees of freedom
+    chance = scipy.stats.f.sf(joined("statistic") / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
+    normal = scipy.stats.norm
+    threshold = math.sqrt(max(normal.isf(ALPHA / 2 / max(n_trials, 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
+    # unit noise, whatever is missing
+    limit = np.where(own > 0, (threshold + normal.ppf(POWER)) / np.where(own > 0, own, 1.0), np.inf)
+    return Scores(tuple(trial for group in groups for _, trial in group.trials), joined("size"), joined("std"),
+                  joined("statistic"), np.minimum(chance * max(n_trials, 1), 1.0),
+                  joined("possible") & (own > 0), joined("identifiability"), limit, unit, n_trials)
+
+
+def _together(fit: Refit, tested: Sequence[Candidate]) -> Iterator[list[Trial]]:
+    """Trials of some candidates at a time: all signatures of a long record at once would not fit into the memory."""
+    some: list[Trial] = []
+    for number, candidate in enumerate(tested):
+        some += [(number, trial) for trial in candidate.trials(fit.paths[0])]
+        if len(some) >= _TOGETHER:
+            yield some
+            some = []
+    yield some
+
+
+def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
+    """All trials of some candidates, and the best of each."""
     J = (fit.whiten([path.columns([trial for _, trial in trials]) for path in fit.paths]) if trials else
          np.zeros((fit.z.size, 0)))
     explained = fit.basis.T @ J
@@ -207,23 +256,16 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     own_safe = np.where(visible, own, 1.0)
     unit = np.where(visible, rest / own_safe, 0.0)
     along = unit.T @ fit.rest
-    nu = max(fit.degrees_of_freedom - 1, 1)
     power = float(fit.rest @ fit.rest)
-    variance = np.maximum(power - along**2, 1e-12 * power) / nu
+    variance = np.maximum(power - along**2, 1e-12 * power) / max(fit.degrees_of_freedom - 1, 1)
     statistic = along**2 / variance / inflation(fit, unit)
-    # the phase of a pair was chosen by the data: two degrees of freedom
-    chance = scipy.stats.f.sf(statistic / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
-    p_value = np.minimum(chance * max(len(trials), 1), 1.0)
     size, std = along / own_safe, np.sqrt(variance) / own_safe
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
-    normal = scipy.stats.norm
-    threshold = math.sqrt(max(normal.isf(ALPHA / 2 / max(len(trials), 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
-    limit = np.where(visible, (threshold + normal.ppf(POWER)) / own_safe, np.inf)  # unit noise, whatever is missing
     possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
                          in zip(trials, size, std, strict=True)], bool)
     best = _best_of(trials, statistic, size, possible)
-    return Scores(tuple(trials[i][1] for i in best), size[best], std[best], statistic[best], p_value[best],
-                  possible[best] & visible[best], identifiability[best], limit[best], unit[:, best], len(trials))
+    return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best], possible[best],
+                  identifiability[best], np.where(visible, own, 0.0)[best], unit[:, best], len(trials))
 
 
 def promising(fit: Refit, scores: Scores) -> bool:
@@ -262,8 +304,8 @@ def explains(fit: Refit, scores: Scores) -> float:
     return (fit.rss - least) / (fit.rss - fit.n_readings)
 
 
-def turned(fit: Refit, trials: list[tuple[int, Candidate]], rest: Array
-           ) -> tuple[list[tuple[int, Candidate]], Callable[[Array], Array], NDArray[np.intp]]:
+def turned(fit: Refit, trials: list[Trial], rest: Array
+           ) -> tuple[list[Trial], Callable[[Array], Array], NDArray[np.intp]]:
     """Join the two columns of every paired trial to the one at the best angle.
 
     Parameters
@@ -284,6 +326,8 @@ def turned(fit: Refit, trials: list[tuple[int, Candidate]], rest: Array
     ndarray of int
         Columns that each one had.
     """
+    if not any(trial.effect.paired for _, trial in trials):
+        return trials, lambda columns: columns, np.ones(len(trials), np.intp)
     first, at = [], 0
     while at < len(trials):
         first.append(at)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg import qr
+from scipy.linalg.lapack import dgeqrf
 
 from ...errors import Diverged, InputError
 
@@ -19,6 +19,7 @@ _DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squa
 _LESS = 0.1  # factor on a damping that was not needed
 _NONE = 1e-7  # damping below which the full step is tried
 _WORTH = 0.05  # of the decrease that the linearization predicts: less is left to a larger damping
+_ROWS = 1024  # turned at once: they stay in the cache
 _AS_PREDICTED = 0.75  # of the predicted decrease: the model is nearly linear along the step, which may be longer
 
 
@@ -60,11 +61,37 @@ class Point:
     @cached_property
     def small(self) -> tuple[Array, Array]:
         """Derivatives (p + 1, p) and residuals (p + 1,) turned so that all other rows are 0: for linear problems."""
-        whole = np.column_stack([self.J, self.z])
-        rows = whole.shape[1]
-        R = np.zeros((rows, rows))
-        R[:len(whole)] = np.triu(qr(whole, mode="raw", overwrite_a=True, check_finite=False)[0][0])[:rows]
-        return R[:, :-1], R[:, -1]
+        return turned(self.J, self.z)
+
+
+def turned(J: Array, z: Array) -> tuple[Array, Array]:
+    """Columns J (m, p) and z (m,) turned so that all but the first p + 1 rows are 0: |z - J a| is the same for every a.
+
+    Some rows at a time, then the triangles that are left of them (Golub and Van Loan 2013, section 5.2.2): a whole
+    record does not fit into a cache.
+
+    Parameters
+    ----------
+    J : ndarray, shape (m, p)
+        Columns of a least-squares problem.
+    z : ndarray, shape (m,)
+        Its right side.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (p + 1, p) and (p + 1,)
+    """
+    size = J.shape[1] + 1
+    parts = [np.column_stack([J[first:first + _ROWS], z[first:first + _ROWS]]) for first in range(0, len(J), _ROWS)]
+    R = np.zeros((size, size))
+    last = _triangle(np.concatenate([_triangle(part) for part in parts]))
+    R[:len(last)] = last
+    return R[:, :-1], R[:, -1]
+
+
+def _triangle(columns: Array) -> Array:
+    """R of columns = Q R, with no more rows than columns."""
+    return np.asarray(np.triu(dgeqrf(columns)[0][:columns.shape[1]]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,8 +199,11 @@ def _curved(now: Point, new: Point, step: Array, damping: float, bounds: tuple[A
     J = now.J
     scale = np.linalg.norm(J, axis=0)
     scale[scale == 0] = 1.0
-    rows = np.concatenate([J / scale, np.sqrt(damping) * np.eye(step.size)]) if damping else J / scale
-    against = np.concatenate([-beyond, np.zeros(len(rows) - len(J))])
+    rows, against = turned(J, -beyond)
+    rows = rows / scale
+    if damping:
+        rows = np.concatenate([rows, np.sqrt(damping) * np.eye(step.size)])
+        against = np.append(against, np.zeros(step.size))
     acceleration = np.linalg.lstsq(rows, against, rcond=_FLAT)[0] / scale
     along, across = J @ step, beyond + J @ acceleration
     t = _lowest(now.z, along, across)

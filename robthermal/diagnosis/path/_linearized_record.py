@@ -322,12 +322,15 @@ class LinearizedRecord:
         ndarray, shape (n, n_sensors, m)
             [K].
         """
-        n, nl = self.x.shape
-        start, end = np.zeros((n, nl, len(responses))), np.zeros((n, nl, len(responses)))
-        for j, response in enumerate(responses):
-            if response.heat is not None:
-                start[..., j], end[..., j] = response.heat
-        out = self.answer(start, end)
+        def heat(some: slice) -> tuple[Array, Array]:
+            start = np.zeros((*self.x[some].shape, len(responses)))
+            end = np.zeros_like(start)
+            for j, response in enumerate(responses):
+                if response.heat is not None:
+                    start[..., j], end[..., j] = response.heat[0][some], response.heat[1][some]
+            return start, end
+
+        out = self._answered(heat, len(responses))
         for j, response in enumerate(responses):
             if response.reading is not None:
                 out[..., j] += response.reading[:, self.one.columns]
@@ -346,13 +349,18 @@ class LinearizedRecord:
         ndarray, shape (n, n_sensors, m)
             [K].
         """
+        return self._answered(lambda some: (start[some], end[some]), start.shape[2])
+
+    def _answered(self, heat: Callable[[slice], tuple[Array, Array]], m: int) -> Array:
+        """As `answer`, of m heats that are asked for some samples at a time."""
         A, by_start, by_end = self.steps
-        out = np.empty((*self.one.readings.shape, start.shape[2]))
-        state = np.zeros((A.shape[1], start.shape[2]))
+        out = np.empty((*self.one.readings.shape, m))
+        state = np.zeros((A.shape[1], m))
         for first in range(0, len(out), _SAMPLES):
             some = slice(first, first + _SAMPLES)
-            push = by_start[some] @ start[some]
-            push += by_end[some] @ end[some]
+            start, end = heat(some)
+            push = by_start[some] @ start
+            push += by_end[some] @ end
             states = recursion(A[some], push, state)
             np.matmul(self.C[some], states[:-1], out=out[some])
             state = states[-1]
