@@ -93,7 +93,7 @@ def test_nothing_is_evaluated_outside_the_bounds(seed: int) -> None:
     assert all(np.all((v >= low) & (v <= high)) for v in asked)
 
 
-@pytest.mark.parametrize("rows", [1, 4, 5, 60])
+@pytest.mark.parametrize("rows", [1, 4, 5, 60, 1024, 1025, 3000])  # some are turned at a time
 def test_the_triangle_stands_for_all_rows(rows: int) -> None:
     rng = np.random.default_rng(rows)
     J, z = rng.standard_normal((rows, 4)), rng.standard_normal(rows)
@@ -105,6 +105,23 @@ def test_the_triangle_stands_for_all_rows(rows: int) -> None:
 
 
 # Scores
+
+
+def test_scores_are_the_same_however_many_signatures_are_formed_at_once(
+        plant: rt.System, convected: rt.Record, monkeypatch: pytest.MonkeyPatch) -> None:
+    fit = rt.diagnosis.refit(plant, convected)
+    found = []
+    for together in (1, 64, 10**6):
+        monkeypatch.setattr(sys.modules["robthermal.diagnosis.evidence._score"], "_TOGETHER", together)
+        found.append(rt.diagnosis.score(fit))
+    for one in found[1:]:
+        assert [c.label for c in one.candidates] == labels(found[0]) and one.n_trials == found[0].n_trials
+        assert [c.shape for c in one.candidates] == [c.shape for c in found[0].candidates]
+        for name in ("size", "std", "statistic", "p_value", "identifiability", "limit", "signatures"):
+            np.testing.assert_allclose(getattr(one, name), getattr(found[0], name), rtol=1e-6, atol=1e-9, err_msg=name)
+        assert np.array_equal(one.possible, found[0].possible)
+    none = rt.diagnosis.score(fit, [])
+    assert none.candidates == () and none.n_trials == 0 and none.order == []
 
 
 def test_the_phase_of_a_load_is_that_of_least_squares(plant: rt.System, convected: rt.Record) -> None:

@@ -1,0 +1,67 @@
+"""Time and memory of a diagnosis of 10 000 samples: a plant of the blind suite, a bar and a stack of foreign truth.
+
+Run: python tests/benchmarks/bench_long_records.py [--samples 10000] [--cases blind/B/hidden/missing_link/101 ...].
+Peak memory is that of the process: give one case at a time for its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+from collections.abc import Callable
+from time import process_time
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"  # before numpy is loaded
+
+import blind.cases  # noqa: E402
+import foreign.cases  # noqa: E402
+from _timing import header  # noqa: E402
+
+import robthermal as rt  # noqa: E402
+
+Data = tuple[rt.System, rt.Record, rt.Record]
+CASES = ("blind/B/hidden/missing_link/101", "foreign/bar/hidden/missing_link/2", "foreign/stack/hidden/missing_link/2")
+
+
+def of_blind_suite(key: str, samples: int) -> Data:
+    """A data set of the blind suite with a longer training record."""
+    blind.cases.N_TRAIN, blind.cases.VALIDATION_START = samples, samples * blind.cases.H + 600.0
+    topology, group, effect, seed = key.split("/")
+    given, _ = blind.cases.made(blind.cases.Case(topology, group, effect, int(seed)))
+    return given.system, given.train, given.validation
+
+
+def of_foreign_truth(key: str, samples: int) -> Data:
+    """A data set of foreign truth with a longer training record."""
+    foreign.cases.N_TRAIN, foreign.cases.PAUSE = samples, samples * foreign.cases.H + 1800.0
+    machine, group, effect, seed = key.split("/")
+    made = foreign.cases.made(foreign.cases.Case(machine, group, effect, int(seed)))
+    return made.system, made.train, made.unseen
+
+
+SUITES: dict[str, Callable[[str, int], Data]] = {"blind": of_blind_suite, "foreign": of_foreign_truth}
+
+
+def main() -> None:
+    """Diagnose every case and print a row of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--cases", nargs="*", default=CASES)
+    chosen = parser.parse_args()
+    header(f"diagnosis of {chosen.samples} samples")
+    for name in chosen.cases:
+        suite, _, key = name.partition("/")
+        system, train, unseen = SUITES[suite](key, chosen.samples)
+        start = process_time()
+        found = rt.diagnose(system, train, validation=unseen)
+        seconds, peak = process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        named = "; ".join(" or ".join([effect.label, *(f"{other}({', '.join(where)})" for other, where in others)])
+                          for effect, others in zip(found.effects, found.alternatives, strict=True))
+        print(f"{name:<40} {len(system.lumps)} lumps, {len(found.scores.candidates)} candidates: {seconds:.0f} CPU s, "
+              f"{peak:.0f} MB at most, {found.verdict}: {named}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
