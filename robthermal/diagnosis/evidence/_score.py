@@ -215,7 +215,7 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     groups = [_tried(fit, trials) for trials in _together(fit, tested)]
     n_trials = sum(group.n_trials for group in groups)
 
-    def joined(name: str) -> Array:
+    def joined(name: str) -> Any:
         return np.concatenate([getattr(group, name) for group in groups], axis=-1)
 
     unit, n_columns, own = joined("unit"), joined("n_columns"), joined("own")
@@ -227,8 +227,8 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     # unit noise, whatever is missing
     limit = np.where(own > 0, (threshold + normal.ppf(POWER)) / np.where(own > 0, own, 1.0), np.inf)
     return Scores(tuple(trial for group in groups for _, trial in group.trials), joined("size"), joined("std"),
-                  joined("statistic"), np.minimum(chance * max(n_trials, 1), 1.0),
-                  joined("possible") & (own > 0), joined("identifiability"), limit, unit, n_trials)
+                  joined("statistic"), np.minimum(chance * max(n_trials, 1), 1.0), joined("possible"),
+                  joined("identifiability"), limit, unit, n_trials)
 
 
 def _together(fit: Refit, tested: Sequence[Candidate]) -> Iterator[list[Trial]]:
@@ -264,8 +264,9 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
     possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
                          in zip(trials, size, std, strict=True)], bool)
     best = _best_of(trials, statistic, size, possible)
-    return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best], possible[best],
-                  identifiability[best], np.where(visible, own, 0.0)[best], unit[:, best], len(trials))
+    return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best],
+                  (possible & visible)[best], identifiability[best], np.where(visible, own, 0.0)[best],
+                  unit[:, best], len(trials))
 
 
 def promising(fit: Refit, scores: Scores) -> bool:
