@@ -338,7 +338,7 @@ def test_not_certified_is_an_answer(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (["--setpoint", "m9=5"], ["m9", "some of m1", "--setpoint"]),
+    (["--setpoint", "m9=5"], ["m9", "one of m1", "--setpoint"]),
     (["--setpoint", "m1=cold"], ["m1=cold", "NAME=VALUE"]),
     (["--setpoint", "m1=-60"], ["outside of the box", "--temperature"]),
     (["--setpoint", "m1=-60", "--temperature", "-80", "85"], ["cannot be held", "reachable range, m1", "°C to"]),
