@@ -22,6 +22,7 @@ from .search import (
     ShortList,
     refit_short_list,
     revise,
+    revised,
     with_neighbors,
     without,
 )
@@ -119,8 +120,11 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         else:
             finer = state.nominal
         progress("testing over blocks, segments and validation data what may be named")
+        tried = len(state.rounds)
         state, found = _lasting(state, finer)
-        if len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
+        if 0 < len(found) < tried and finer.structure.n_coarse:  # what is dropped may have made up for a wrong place
+            state, found = _lasting(chosen_again(state, finer), finer)
+        elif len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
             state, found = _lasting(revise(replace(state, misfit_left=False)), finer)
         if not found:
             return _nothing_lasts(judged, finer)
@@ -128,6 +132,23 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         return _graded(judged, state, finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
+
+
+def chosen_again(state: SearchState, nominal: Refit) -> SearchState:
+    """The state with every effect chosen again among all candidates, beside the others that are left.
+
+    Parameters
+    ----------
+    state : SearchState
+        With fewer effects than were accepted.
+    nominal : Refit
+        Without any effect.
+    """
+    rounds, fit = revised(state.rounds, nominal, state.names)
+    if rounds and fit.structure.coarse:  # what a finer network changes depends on where the model is
+        fit = coarsened(fit)
+        rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
+    return replace(state, rounds=rounds, fit=fit, misfit_left=False)
 
 
 def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evidence, ...]]:

@@ -5,6 +5,7 @@ The truth is a bar of 60 cells, by scipy's matrix exponential, against five lump
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,11 +13,11 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
-from robthermal.diagnosis._graded import _predicts
+from robthermal.diagnosis._graded import _predicts, chosen_again
 from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis.diagnose import doubts
 from robthermal.diagnosis.fit import Refit, coarsened
-from robthermal.diagnosis.search import Accepted, decide, refit_short_list, with_neighbors
+from robthermal.diagnosis.search import Accepted, begin, decide, refit_short_list, with_neighbors
 from robthermal.diagnosis.search._neighbors import neighboring
 
 H, N, CELLS, LUMPS, ROOM = 10.0, 400, 60, 5, 296.0
@@ -88,6 +89,19 @@ def test_a_path_from_the_middle_of_a_lump_is_among_its_names():
     most = max(removed.values())
     assert one.before.outcome.ok and removed[frozenset({"x2", "x5"})] > 0.9 * most
     assert all(gain < 0.5 * most for where, gain in removed.items() if where not in ({"x1", "x5"}, {"x2", "x5"}))
+
+
+def test_what_is_left_after_a_drop_is_chosen_again():
+    """A heat stayed named in a wrong lump when the link that made up for the place was dropped (plate, seed 7)."""
+    before = finer(18)
+    entries = refit_short_list(before, rt.diagnosis.score(before, ["missing_link"])).entries
+    wrong = entries[-1]
+    assert set(wrong.candidate.where) not in ({"x1", "x5"}, {"x2", "x5"})
+    kept = replace(begin(before, ["missing_link"]), rounds=(Accepted(before, best=wrong),), fit=wrong.fit)
+    again = chosen_again(kept, before)
+    assert set(again.rounds[0].best.candidate.where) in ({"x1", "x5"}, {"x2", "x5"})
+    assert again.fit is again.rounds[0].best.fit
+    assert before.rss - again.fit.rss > 3.0 * (before.rss - wrong.fit.rss) > 0.0
 
 
 @pytest.mark.parametrize(("one", "other", "answer"), [
