@@ -94,11 +94,13 @@ def test_a_named_effect_is_adopted(tmp_path: Path) -> None:
 
 
 def test_what_is_ambiguous_is_not_adopted(tmp_path: Path) -> None:
-    """With one sensor a lag and a hidden mass explain the records alike."""
-    report, summary = go(write_bar(tmp_path, lag=LAG, project=f"{PROJECT}[diagnose]\nadopt = true\n"), tmp_path / "out")
+    """The system says that the room is 3 K colder than it is: a constant heat explains the records as well."""
+    project = write_bar(tmp_path, project=f"{PROJECT}[diagnose]\nadopt = true\n")
+    (tmp_path / "bar.toml").write_text(SYSTEM.replace("temperature = 20.0", "temperature = 17.0"))
+    report, summary = go(project, tmp_path / "out")
     assert report.verdict == "FAIL" and summary["diagnose"]["adopted"] is False  # type: ignore[index]
     assert {"diagnosis_ambiguous", "validation_misfit"} <= {one.code for one in report.reasons if one.level == "fail"}
-    assert "sensors.T.time_constant" not in summary["certify"]["parameters"]  # type: ignore[index]
+    assert "lumps.bar.heat" not in summary["certify"]["parameters"]  # type: ignore[index]
 
 
 def test_an_effect_beside_a_remainder_is_not_adopted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
