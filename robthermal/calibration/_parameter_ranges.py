@@ -26,11 +26,18 @@ def factor(shape: str, count: int, degrees_of_freedom: float, confidence: float)
         Degrees of freedom ν of the estimated noise; infinite if it is known.
     confidence : float
         Probability 1 - α that all ranges hold at once.
+
+    Examples
+    --------
+    >>> round(factor("ellipsoid", 3, math.inf, 0.95) ** 2, 3), round(factor("box", 1, math.inf, 0.95), 3)
+    (7.815, 1.96)
     """
     if not count:
         return 0.0
     if shape == "box":
         return float(scipy.special.stdtrit(degrees_of_freedom, 1.0 - (1.0 - confidence) / (2 * count)))
+    if math.isinf(degrees_of_freedom):  # p F_{p,∞} is χ²_p
+        return math.sqrt(float(scipy.special.chdtri(count, 1.0 - confidence)))
     return math.sqrt(count * float(scipy.special.fdtri(count, degrees_of_freedom, confidence)))
 
 
