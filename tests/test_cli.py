@@ -268,9 +268,15 @@ def test_demo_replaces_an_earlier_result_and_nothing_else(run: Run, tmp_path: Pa
 # Interrupt
 
 
+def heard() -> None:
+    """Listen to interrupts, which a shell turns off for what it runs in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
     child = subprocess.Popen([sys.executable, "-c", CHILD, "demo", "--out", "out"], cwd=tmp_path, env=environment(),
-                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                             preexec_fn=heard)  # noqa: PLW1509
     assert child.stdout is not None and child.stdout.readline() == "ready\n"
     time.sleep(2.5)  # in the middle of the job, which takes several times as long
     child.send_signal(signal.SIGINT)
@@ -284,12 +290,16 @@ def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
 
 def test_an_interrupt_that_python_loses_ends_the_job_at_its_next_step() -> None:
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), progress() as told:
-        told("simulating")
-        with contextlib.suppress(KeyboardInterrupt):  # as inside a callback of an import
-            signal.raise_signal(signal.SIGINT)
-        told("writing")
-    assert signal.getsignal(signal.SIGINT) is before
+    try:
+        heard()
+        with pytest.raises(KeyboardInterrupt), progress() as told:
+            told("simulating")
+            with contextlib.suppress(KeyboardInterrupt):  # as inside a callback of an import
+                signal.raise_signal(signal.SIGINT)
+            told("writing")
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_interrupt_while_writing_leaves_nothing(run: Run, system: Path, tmp_path: Path,
