@@ -264,7 +264,7 @@ def closed_loop(numbers: dict[str, Any], system: rt.System, inputs: list[float],
     return np.array(rows)
 
 
-@pytest.mark.parametrize("which", ["bench", "two"])
+@pytest.mark.parametrize("which", [pytest.param("bench", marks=pytest.mark.exhaustive), "two"])
 def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
         which: str, bench: rt.System, two: rt.jobs.design.ControllerDesign, request: pytest.FixtureRequest) -> None:
     done = two if which == "two" else request.getfixturevalue("nonlinear")

@@ -12,6 +12,7 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
+LONG = {"case_studies", "certify_in_ci", "convection", "missing_plate", "scanner", "two_hours"}  # tests do the same
 PATIENCE = 300  # a cell may take this long before it counts as hanging [s]
 
 LOOK = "__import__('figures').look_at_open_figures(described={!r})"  # leaves no name behind
@@ -62,7 +63,8 @@ def kernel() -> Iterator[NotebookClient]:
             yield client
 
 
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=by_name)
+@pytest.mark.parametrize("path", [pytest.param(path, marks=[pytest.mark.exhaustive] * (path.stem in LONG))
+                                  for path in NOTEBOOKS], ids=by_name)
 def test_runs_and_its_assertions_hold(path: Path, kernel: NotebookClient, tmp_path: Path) -> None:
     afresh = f"%reset -f\nimport os\nos.chdir({str(tmp_path)!r})\ndel os"  # no name of an earlier notebook is left
     kernel.nb = read(path)

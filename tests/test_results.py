@@ -19,6 +19,7 @@ from results import instances, public_classes
 
 import robthermal as rt
 
+pytestmark = pytest.mark.exhaustive  # what is made here is made by the tests of each package too
 # Made by no short example; each of the same kind as others that are here, or made of nothing but what is.
 ELSEWHERE = {"calibration.Estimates", "diagnosis.Measurement", "diagnosis.Response", "diagnosis.Decision",
              "diagnosis.JointCheck", "design.CertifiedLoop", "design.Polarity", "coupling.Joint", "coupling.Norm",

@@ -69,6 +69,7 @@ def test_the_margin_of_the_claim_is_not_idle():
     assert found.max() * c**2 > 1 - 20 * (1 - c**2)
 
 
+@pytest.mark.exhaustive
 def test_random_machines_and_observers():
     """Whatever is certified shrinks in an own integration, with limits active; some must be certified."""
     rng, held = np.random.default_rng(13), 0

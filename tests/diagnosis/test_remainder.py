@@ -86,6 +86,7 @@ def test_a_null_gets_no_name_and_says_what_is_left():
     assert "finer network" in found.outcome.text
 
 
+@pytest.mark.exhaustive
 def test_the_dominant_effect_is_named_with_its_remainder():
     one, found = a_case("hidden", "heater_power_slope", 0), diagnosed("hidden", "heater_power_slope", 0)
     assert found.verdict == "named_with_remainder" and found.outcome.ok
@@ -102,6 +103,7 @@ def test_the_dominant_effect_is_named_with_its_remainder():
     assert sum(share for _, share in rest.where[:1]) <= 1.0 and rest.share >= 0.8 and rest.low < rest.high
 
 
+@pytest.mark.exhaustive
 def test_a_report_with_a_remainder_passes_with_the_remark():
     found = diagnosed("hidden", "heater_power_slope", 0)
     report = diagnosis_report(Diagnosed(found, (), (), ()))
@@ -114,6 +116,7 @@ def test_a_report_with_a_remainder_passes_with_the_remark():
     assert refused.verdict == "FAIL" and {one.level for one in refused.reasons} == {"fail"}
 
 
+@pytest.mark.exhaustive
 def test_the_file_holds_what_the_contract_asks_for():
     answer = diagnosed("hidden", "heater_power_slope", 0).to_dict()
     assert answer["format"] == "robthermal-diagnosis/2"

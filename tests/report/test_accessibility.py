@@ -44,6 +44,7 @@ def violations(page: Page) -> list[list[str]]:
     return found
 
 
+@pytest.mark.exhaustive
 @needs_axe
 @pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
