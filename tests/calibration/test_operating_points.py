@@ -9,6 +9,8 @@ from voltage_rig import ROOM, TRUE, drive, system, voltage
 
 import robthermal as rt
 
+pytestmark = pytest.mark.exhaustive
+
 H, N, NOISE = 4.0, 700, np.array([0.02, 0.002])  # s, samples, K and V
 POINTS = (-0.8, 0.5, 1.8)  # A
 NAMES = {"modules.m1.seebeck.value": "S", "modules.m1.seebeck.slope": "dS", "modules.m1.resistance.value": "R",

@@ -53,6 +53,7 @@ def test_coupling_and_both_lags_are_added_to_the_two_heater_board(board: rt.diag
             assert unit == "s" and abs(value - 20.3) < 3 * std < 9.0
 
 
+@pytest.mark.exhaustive
 def test_without_random_heat_coupling_is_named_and_lag_of_sensor_and_heater_stay_a_set(
         records: tuple[rt.Record, rt.Record], room: float) -> None:
     """The model is not exact then: by ΔBIC alone the lag of the heater, which no board has, is the only name."""
