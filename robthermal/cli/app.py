@@ -352,7 +352,8 @@ def main() -> None:
     except _UsageError as error:
         _stop(_usage(error), 2)
     except InputError as error:
-        _stop(str(error), 2, what=error.what, where=error.where, expected=error.expected, remedy=error.remedy)
+        message = "\n".join([str(error), *getattr(error, "__notes__", [])])
+        _stop(message, 2, what=error.what, where=error.where, expected=error.expected, remedy=error.remedy)
     except Diverged as error:
         _stop(str(error), 1, time=error.time)
     except OSError as error:  # a full disk, a folder without permission

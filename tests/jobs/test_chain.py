@@ -210,6 +210,7 @@ def test_a_stage_that_fails_leaves_the_earlier_ones(folder: Path, run: Run) -> N
     edit(folder / "project.toml", "controller = 20.0", "controller = -5000.0")  # this loop is not stable
     said = run("run", folder / "project.toml", "--out", folder / "out")
     assert said.status == 2 and "[couple]" in said.err or "project.toml" in said.err
+    assert said.err.endswith(f"The stages before it are done: {folder / 'out' / 'report.html'}\n")
     summary = json.loads((folder / "out" / "summary.json").read_text())
     assert summary["verdict"] is None and summary["stages"]["couple"]["status"] == "failed"
     assert not [one for one in summary["reasons"] if one["code"] == "not_certified"], "the claims that are there hold"

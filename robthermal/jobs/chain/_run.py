@@ -169,3 +169,4 @@ def _write_failed(context: Context, stages: Sequence[Stage], failed: str, error:
              *(Stage(name, "skipped", text=f"It comes after {failed}, which could not be computed.") for name in later)]
     drop_report(context.out)
     write_report(assemble(context, found, context.project.system), context.out)
+    error.add_note(f"The stages before it are done: {context.out / 'report.html'}")

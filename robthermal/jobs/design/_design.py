@@ -153,9 +153,9 @@ def design_system(system: System, request: DesignRequest,
     free = feedback_linearization(system, current_limits=_asked(system, request))  # refusals before the long work
     plant = cold_side(free, regulate=request.regulate)
     kalman = _kalman(system, request)
-    possible = _reach(free, request)
+    possible, at = _reach(free, request)
     if not possible.outcome:
-        raise _refusal(possible, system, request)
+        raise _refusal(possible, free, request, at, "by the system file or the request")
     if request.bandwidth is not None or request.margins is None:
         pid(plant, bandwidth=request.bandwidth or _BANDWIDTH, sample_time=request.sample_time)
     progress("searching the runaway limit")
@@ -189,18 +189,25 @@ def _asked(system: System, request: DesignRequest) -> Pairs:
     return {name: (request.current or {}).get(name, (one.low, one.high)) for name, one in declared.items()}
 
 
-def _reach(law: FeedbackLinearization, request: DesignRequest) -> Reachable:
-    """Whether the set-points are held, at the worst end of the ambient ranges."""
-    found = [reachable(law, request.setpoint, inputs=at, regulate=request.regulate) for at in ambient_ends(request)]
-    return next((r for r in found if not r.outcome), found[0])
+def _reach(law: FeedbackLinearization, request: DesignRequest) -> tuple[Reachable, dict[str, float]]:
+    """Whether the set-points are held, and in which ambients; an end of their ranges where they are not, if any."""
+    found = [(reachable(law, request.setpoint, inputs=at, regulate=request.regulate), at)
+             for at in ambient_ends(request)]
+    return next((pair for pair in found if not pair[0].outcome), found[0])
 
 
-def _refusal(r: Reachable, system: System, request: DesignRequest) -> InputError:
+def _refusal(r: Reachable, law: FeedbackLinearization, request: DesignRequest, at: dict[str, float],
+             limits: str) -> InputError:
     """Set-points that cannot be held, in the words of the command line."""
     reason = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
-    drivable = {name: drivable_range(module, request.temperature) for name, module in system.modules.items()
+    drivable = {name: drivable_range(module, request.temperature) for name, module in law.system.modules.items()
                 if module.supply is not None and r.binding == "current"}
     reason += "".join(f"; {name} can have {one}" for name, one in drivable.items())
+    if r.binding == "current" and not drivable:
+        ends = {name: high if r.current[name] > 0 else low
+                for name, low, high in zip(law.names, law.current_low, law.current_high, strict=True)}
+        reason += f", {', '.join(f'{name} {value:.4g} A' for name, value in ends.items())} {limits}"
+    reason += "".join(f", with {name} at {celsius(value)}" for name, value in at.items())
     ranges = "; ".join(f"{name} {celsius(min(r.passive[name], r.limit[name]))} to "
                        f"{celsius(max(r.passive[name], r.limit[name]))}" for name in r.setpoint)
     wanted = ", ".join(f"{name} at {celsius(value)}" for name, value in r.setpoint.items())
@@ -209,14 +216,19 @@ def _refusal(r: Reachable, system: System, request: DesignRequest) -> InputError
                       remedy="Move the set-points, or cool the hot side better.")
 
 
+def _over(request: DesignRequest) -> str:
+    """What the certificates are about."""
+    return ", for the ranges of the parameters" if request.parameters else ""
+
+
 def _law(system: System, request: DesignRequest, tried: Iterator[Pairs]) -> tuple[FeedbackLinearization, Reachable]:
     """Law with the first of the limits that hold the set-points."""
     for pairs in tried:
         law = feedback_linearization(system, current_limits=pairs)
-        reach = _reach(law, request)
+        reach, at = _reach(law, request)
         if reach.outcome:
             return law, reach
-    raise _refusal(reach, system, request)
+    raise _refusal(reach, law, request, at, "by runaway limit, certificates and system file" + _over(request))
 
 
 def _reference(law: FeedbackLinearization, request: DesignRequest, settling: float) -> tuple[np.ndarray, float]:
