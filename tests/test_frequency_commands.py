@@ -139,3 +139,21 @@ def test_uncertain_poles_widen_the_bands(bar):
     assert "poles within 20 %" in found["unsure"].method
     refused = command("frf", "run.csv", "--system", "bar.toml", "--pole-deviation", 0.2, folder=folder)
     assert refused.status == 2 and "lrmp" in refused.err
+
+
+def test_functions_instead_of_poles(bar):
+    """The bar has one pole: as a fractional pole of order one it is the same response as with the pole."""
+    system, folder = bar
+    found = {}
+    for key, more in (("pole", ("--pole", -0.06)), ("function", ("--basis", "fractional:0.06:1"))):
+        done = command("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", *more, "--out", f"{key}.json",
+                       folder=folder)
+        assert done.status == 0, done.err
+        found[key] = rt.identify.FrequencyResponse.load(folder / f"{key}.json")
+    away = np.abs(found["function"].response - found["pole"].response)
+    known = np.isfinite(away) & np.isfinite(found["pole"].confidence_radius())
+    assert known.mean() > 0.4 and (away < 2.0 * found["pole"].confidence_radius())[known].mean() > 0.95
+    assert found["function"].method.startswith("lrmp, fractional:0.06:1")
+    for more, said in ((("--basis", "sqrt"), "diffusion:held:TAU"), (("--basis", "diffusion", "--pole", -1), "poles")):
+        refused = command("frf", "run.csv", "--system", "bar.toml", "--method", "lrmp", *more, folder=folder)
+        assert refused.status == 2 and said in refused.err

@@ -67,8 +67,8 @@ SURFACE = {
         Diverged InputError Outcome OutcomeCode RobthermalError
     """,
     "identify": """
-        FrequencyResponse IdentifyCode PoleSensitivity bla closed_loop errors_in_variables etfe is_response lpm lrm
-        lrmp mean_inputs mean_period pole_sensitivity read_response spectral
+        Diffusion FractionalPole FrequencyResponse IdentifyCode PoleSensitivity bla closed_loop errors_in_variables
+        etfe is_response lpm lrm lrmp mean_inputs mean_period pole_sensitivity read_response spectral
     """,
     "jobs": """
         Boxes DesignRequest MapRequest certify_system compare_modules couple_subsystems demo_project design_system

@@ -27,6 +27,9 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
         pole_deviation: Annotated[float | None, typer.Option(
             "--pole-deviation", help="Of lrmp: how uncertain its poles are, relative to their size; widens the bands.",
             metavar="SHARE")] = None,
+        basis: Annotated[list[str] | None, typer.Option(
+            "--basis", help="Of lrmp, instead of poles: diffusion, diffusion:held:TAU or diffusion:insulated:TAU [s], "
+            "fractional:CORNER:ORDER [rad/s], may repeat.", metavar="FUNCTION")] = None,
         band: Annotated[tuple[float, float] | None, typer.Option(help="Frequencies to keep [Hz].",
                                                                      metavar="LO HI")] = None,
         reference: Annotated[list[str] | None, typer.Option(
@@ -55,7 +58,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
                                                band=band, tables=reading(record, column), reference=reference or [],
                                                instruments=rt.jobs.measured.instruments_from_text(instrument or []),
                                                input_noise=rt.jobs.measured.noise_from_text(input_noise or []),
-                                               pole_deviation=pole_deviation)
+                                               pole_deviation=pole_deviation, basis=basis or [])
     G.save(out)
     if plot:
         G.plot().flat[0].figure.savefig(plot)

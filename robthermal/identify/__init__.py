@@ -4,6 +4,8 @@ from ._bla import bla as bla
 from ._closed_loop import closed_loop as closed_loop
 from ._errors_in_variables import errors_in_variables as errors_in_variables
 from ._etfe import etfe as etfe
+from ._local_functions import Diffusion as Diffusion
+from ._local_functions import FractionalPole as FractionalPole
 from ._lpm import lpm as lpm
 from ._lrm import lrm as lrm
 from ._lrmp import lrmp as lrmp
@@ -17,6 +19,6 @@ from ._response import FrequencyResponse as FrequencyResponse
 from ._response_files import is_response as is_response
 from ._spectral import spectral as spectral
 
-__all__ = ["FrequencyResponse", "IdentifyCode", "PoleSensitivity", "bla", "closed_loop", "errors_in_variables", "etfe",
-           "is_response", "lpm", "lrm", "lrmp", "mean_inputs", "mean_period", "pole_sensitivity", "read_response",
-           "spectral"]
+__all__ = ["Diffusion", "FractionalPole", "FrequencyResponse", "IdentifyCode", "PoleSensitivity", "bla", "closed_loop",
+           "errors_in_variables", "etfe", "is_response", "lpm", "lrm", "lrmp", "mean_inputs", "mean_period",
+           "pole_sensitivity", "read_response", "spectral"]

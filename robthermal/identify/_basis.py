@@ -34,6 +34,16 @@ class LocalBasis:
         return self.degree + 1
 
     @property
+    def transient_size(self) -> int:
+        """Functions of the transient of one record."""
+        return self.size
+
+    @property
+    def sliding(self) -> bool:
+        """Whether the sums of neighboring windows share their terms, so that the fast solvers can be used."""
+        return True
+
+    @property
     def step(self) -> float:
         """Angle between neighboring bins [rad]."""
         return 2.0 * np.pi / self.n_samples
@@ -45,6 +55,12 @@ class LocalBasis:
         else:
             x = offsets / self.half_width
         return np.stack([x**s for s in range(self.size)], axis=-1)
+
+    def functions(self, bins: Array, offsets: Array) -> tuple[Array, Array]:
+        """Functions of plant and transient, (B, m, size) and (B, m, transient_size), with `bins` (B,) counted from 1
+        and `offsets` (B, m)."""
+        found = self.powers(offsets) * self.weights(bins, offsets)[..., None]
+        return found, found
 
     def real_functions(self) -> Array:
         """Real functions phi_s of the offsets -l ... l, (R+1, m), that span the powers up to a common phase."""

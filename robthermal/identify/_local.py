@@ -56,26 +56,29 @@ class LocalEstimate:
                     where="half_width",
                     remedy="Use a longer record or a smaller half_width.",
                 )
-        unknowns = self.basis.size * (self.n_u + len(self.spectra))
         if self.nominal_degrees_of_freedom < 1:
             raise InputError(
                 f"no degrees of freedom left: {sum(points_per_record(self.spectra, self.basis))} points per window for "
-                f"{unknowns} unknowns per output",
+                f"{self.unknowns} unknowns per output",
                 where="half_width",
-                expected=f"half_width large enough for more than {unknowns} points",
-                remedy="Increase half_width, or take a lower degree, fewer poles or fewer inputs.",
+                expected=f"half_width large enough for more than {self.unknowns} points",
+                remedy="Increase half_width, or take a lower degree, fewer poles, functions or inputs.",
             )
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of a window per output, plant and transients."""
+        return self.basis.size * self.n_u + self.basis.transient_size * len(self.spectra)
 
     @property
     def nominal_degrees_of_freedom(self) -> int:
         """q of a window with full rank."""
-        points = sum(points_per_record(self.spectra, self.basis))
-        return points - self.basis.size * (self.n_u + len(self.spectra))
+        return sum(points_per_record(self.spectra, self.basis)) - self.unknowns
 
     @cached_property
     def _kernel(self) -> Kernel | None:
         equal = all(s.n_samples == self.basis.n_samples for s in self.spectra)
-        return Kernel(self.spectra, self.basis) if equal else None
+        return Kernel(self.spectra, self.basis) if equal and self.basis.sliding else None
 
     def run(self) -> LocalArrays:
         """Response, gram block, noise and degrees of freedom of bins 1 ... F."""
@@ -125,7 +128,7 @@ class LocalEstimate:
 
     def _parts(self, bins: Array) -> Iterator[Array]:
         rows = sum(points_per_record(self.spectra, self.basis))
-        width = rows * (self.basis.size * (self.n_u + len(self.spectra)) + self.n_y) * 16
+        width = rows * (self.unknowns + self.n_y) * 16
         count = max(1, _EXACT_BYTES // width)
         return (bins[first : first + count] for first in range(0, bins.size, count))
 

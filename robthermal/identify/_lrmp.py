@@ -1,4 +1,4 @@
-"""Local rational method with prescribed poles: linear in its parameters, exact for known slow poles. Evers Sec. 4.4."""
+"""Local method with prescribed poles or functions: linear in its parameters, exact for known slow poles. Evers 4.4."""
 
 from __future__ import annotations
 
@@ -8,18 +8,22 @@ from typing import Any
 import numpy as np
 
 from robthermal._arrays import Array
+from robthermal.errors import InputError
 from robthermal.signals import Record
 
 from .._checks import whole_number
 from ._basis import LocalBasis
+from ._function_basis import function_basis
+from ._local_functions import LocalFunctions, local_functions
 from ._lpm import estimate_locally
-from ._poles import given_poles, most_poles, poles_from_data
+from ._poles import POLES_EXPECTED, given_poles, most_poles, poles_from_data
 from ._records import as_records, check_excitation, spectrum_of
 from ._resonant_poles import resonant_poles_from_data
 from ._response import FrequencyResponse
 
 
-def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> FrequencyResponse:
+def lrmp(record: Record | Sequence[Record], poles: Any = None, half_width: int = 8, *, basis: Any = None
+         ) -> FrequencyResponse:
     """Frequency response by the local rational method with prescribed poles.
 
     Plant and transient are, within a window, a constant plus one function per pole, in the variable exp(j omega T_s),
@@ -36,6 +40,10 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
         Of a model the slowest poles are taken, as many as leave a quarter of the points for the noise.
     half_width : int
         Bins on either side of the center that a window uses [-].
+    basis : str, FractionalPole, Diffusion, callable, or sequence of them, optional
+        Instead of poles, functions of frequency that the plant is locally a combination of, with a constant: as text
+        ("diffusion", "diffusion:held:500" with tau [s], "fractional:0.01:0.5" with corner [rad/s] and order), as
+        objects, or callables that turn n frequencies [Hz] into an array (n,) or (n_basis, n).
 
     Returns
     -------
@@ -45,7 +53,8 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
     Raises
     ------
     InputError
-        For poles that are unstable, on the imaginary axis or not numbers, and as `lpm`.
+        For poles that are unstable, on the imaginary axis or not numbers; for functions that are not finite, of another
+        shape, or combinations of the others at these frequencies; for poles and functions together; and as `lpm`.
 
     References
     ----------
@@ -66,9 +75,26 @@ def lrmp(record: Record | Sequence[Record], poles: Any, half_width: int = 8) -> 
     >>> bool(abs(G.response[0, 0] / ((1.0 - a) / (z - a)) - 1.0).max() < 1e-8)
     True
     """
-    records, basis, chosen = prepared(record, poles, half_width)
+    if basis is not None:
+        if poles is not None:
+            raise InputError("poles and basis are given together", where="basis", expected="one of them",
+                             remedy="A pole -w is the function FractionalPole(w, 1).")
+        return _with_functions(record, local_functions(basis), half_width)
+    if poles is None:
+        raise InputError("neither poles nor basis is given", where="poles", expected=POLES_EXPECTED)
+    records, local, chosen = prepared(record, poles, half_width)
     shown = ", ".join(f"{p.real:.4g}" if p.imag == 0.0 else f"{p:.4g}" for p in chosen)
-    return estimate_locally(records, basis, f"lrmp, poles {shown} rad/s, half_width {basis.half_width}")
+    return estimate_locally(records, local, f"lrmp, poles {shown} rad/s, half_width {local.half_width}")
+
+
+def _with_functions(record: Record | Sequence[Record], functions: LocalFunctions, half_width: int
+                    ) -> FrequencyResponse:
+    records = as_records(record)
+    half_width = whole_number(half_width, "half_width", least=1)
+    check_excitation([r.inputs for r in records], records[0].input_names)
+    spectra = [spectrum_of(r.inputs, r.outputs) for r in records]
+    basis = function_basis(functions, spectra, half_width, records[0].sample_time)
+    return estimate_locally(records, basis, f"lrmp, {functions.text}, half_width {half_width}")
 
 
 def prepared(record: Record | Sequence[Record], poles: Any, half_width: int

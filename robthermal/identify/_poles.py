@@ -15,8 +15,8 @@ from ._basis import LocalBasis
 from ._records import Spectrum
 from ._windows import regression
 
-_EXPECTED = ("continuous-time poles [rad/s] with negative real part, 'auto', 'resonant', an rt.System or a "
-             "python-control model")
+POLES_EXPECTED = ("continuous-time poles [rad/s] with negative real part, 'auto', 'resonant', an rt.System or a "
+                  "python-control model")
 _GRID = 18  # candidate poles per search
 _BINS = 48  # bins on which candidates are compared, spaced logarithmically
 _MOST = 3  # poles the search adds at most
@@ -26,15 +26,15 @@ GAIN = 0.02  # relative reduction of the held-out error that pays for one more p
 def given_poles(poles: Any, sample_time: float) -> tuple[Array, bool]:
     """Poles [rad/s], slowest first, and whether surplus ones may be dropped (true for models)."""
     if isinstance(poles, str):
-        raise InputError(f"poles is {poles!r}", where="poles", expected=_EXPECTED)
+        raise InputError(f"poles is {poles!r}", where="poles", expected=POLES_EXPECTED)
     if callable(getattr(poles, "poles", None)):
         return _checked(_model_poles(poles, sample_time)), True
     try:
         numbers = np.atleast_1d(np.asarray(poles))
     except ValueError as error:
-        raise InputError("poles is a ragged nest of lists", where="poles", expected=_EXPECTED) from error
+        raise InputError("poles is a ragged nest of lists", where="poles", expected=POLES_EXPECTED) from error
     if numbers.dtype.kind not in "iufc" or numbers.ndim != 1:
-        raise InputError(f"poles is {poles!r}", where="poles", expected=_EXPECTED)
+        raise InputError(f"poles is {poles!r}", where="poles", expected=POLES_EXPECTED)
     return _checked(numbers.astype(complex)), False
 
 
@@ -50,17 +50,17 @@ def _model_poles(model: Any, sample_time: float) -> Array:
 
 def _checked(poles: Array) -> Array:
     if not poles.size:
-        raise InputError("no pole is given", where="poles", expected=_EXPECTED)
+        raise InputError("no pole is given", where="poles", expected=POLES_EXPECTED)
     for pole in poles:
         shown = f"{pole.real:g}" if pole.imag == 0 else f"{pole:g}"
         if not np.isfinite(pole):
-            raise InputError(f"the pole {shown} is not finite", where="poles", expected=_EXPECTED)
+            raise InputError(f"the pole {shown} is not finite", where="poles", expected=POLES_EXPECTED)
         if pole.real >= 0.0:
             kind = "on the imaginary axis" if pole.real == 0.0 else "unstable"
             raise InputError(
                 f"the pole {shown} rad/s is {kind}",
                 where="poles",
-                expected=_EXPECTED,
+                expected=POLES_EXPECTED,
                 remedy="Time constants tau enter as -1/tau.",
             )
     return poles[np.argsort(np.abs(poles), kind="stable")]

@@ -45,15 +45,15 @@ def points_per_record(spectra: Sequence[Spectrum], basis: LocalBasis) -> tuple[i
 def regression(spectra: Sequence[Spectrum], basis: LocalBasis, bins: Array) -> Regression:
     """Regressors and outputs of the windows centered at `bins` (B,), counted from 1 on the grid of the basis."""
     n_u, rows = spectra[0].U.shape[0], points_per_record(spectra, basis)
-    n_transient = basis.size * len(spectra)
+    n_transient = basis.transient_size * len(spectra)
     K = np.zeros((bins.size, sum(rows), n_transient + n_u * basis.size), dtype=complex)
     Y = np.empty((bins.size, sum(rows), spectra[0].Y.shape[0]), dtype=complex)
     top = 0
     for place, (spectrum, m) in enumerate(zip(spectra, rows, strict=True)):
         mine, offsets = rows_of(spectrum, basis, bins)
-        functions = basis.powers(offsets) * basis.weights(bins, offsets)[..., None]  # (B, m, R+1)
+        functions, of_transient = basis.functions(bins, offsets)
         part = slice(top, top + m)
-        K[:, part, place * basis.size : (place + 1) * basis.size] = functions
+        K[:, part, place * basis.transient_size : (place + 1) * basis.transient_size] = of_transient
         U = np.moveaxis(spectrum.U[:, mine - 1], 0, -1)  # (B, m, n_u)
         for s in range(basis.size):
             column = n_transient + (basis.degree - s) * n_u

@@ -135,7 +135,7 @@ def test_too_many_poles_leave_no_degrees_of_freedom() -> None:
         ([2j], "imaginary axis"),
         ("slow", "'auto'"),
         ("", "'auto'"),
-        (None, "poles is None"),
+        (None, "neither poles nor basis"),
         ({"a": 1}, "poles"),
         ([[-0.1]], "poles"),
         (["-0.1"], "poles"),

@@ -91,6 +91,7 @@ def test_bins_without_excitation_are_a_remark(tmp_path: Path) -> None:
     ('reference = "dihter"', "", "dihter"), ('reference = ["dither", "room"]', "", "2 reference(s)"),
     ('reference = "x"', "7.5", "never changes: x"),
     ('reference = "dither"\nmethod = "lrmp"', "", "[identify.loop] method"),
+    ('method = "lrmp"\nbasis = ["sqrt"]', "", "[identify.loop] basis[0]"),
     ("band = [10.0, 20.0]", "", "[identify.loop] band"), ("half_width = 5000", "", "[identify.loop] half_width")])
 @pytest.mark.filterwarnings("ignore:.*split")
 def test_bad_references(reference: str, extra: str, what: str, tmp_path: Path, run: Run) -> None:

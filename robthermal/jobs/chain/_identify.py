@@ -77,7 +77,8 @@ def _estimate(project: Project, one: Identification, model: System | None) -> Fr
                                   method=options.method, half_width=options.half_width, degree=options.degree,
                                   poles=options.poles, band=options.band, reading=project.reading,
                                   reference=one.reference, instruments=options.instruments,
-                                  input_noise=options.input_noise, pole_deviation=options.pole_deviation)
+                                  input_noise=options.input_noise, pole_deviation=options.pole_deviation,
+                                  basis=options.basis)
     except InputError as error:
         if any(path.name in error.where for path in one.records):
             raise

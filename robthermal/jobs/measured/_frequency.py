@@ -40,7 +40,7 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
                       operating_point: Mapping[str, float] | None = None, tables: Sequence[ReadTable] = (),
                       reading: Mapping[Path, Sequence[ReadTable]] | None = None, reference: Sequence[str] = (),
                       instruments: Mapping[str, str] | None = None, input_noise: Mapping[str, float] | None = None,
-                      pole_deviation: float | None = None) -> FrequencyResponse:
+                      pole_deviation: float | None = None, basis: Sequence[str] = ()) -> FrequencyResponse:
     """Estimate a frequency response from record files.
 
     Parameters
@@ -76,6 +76,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
         Noisy input: standard deviation of its noise [unit of the input, kelvin of ambients] ("lpm").
     pole_deviation : float, optional
         Standard deviation of the prescribed poles relative to their size, for the covariance [-] ("lrmp").
+    basis : sequence of str
+        Functions instead of poles, as "diffusion:held:500" ("lrmp").
 
     Returns
     -------
@@ -100,6 +102,9 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
     if method not in _METHODS:
         raise InputError(f"method is {method!r}", where="--method", expected=", ".join(_METHODS))
     _one_way(method, reference, instruments, input_noise)
+    if basis and (method != "lrmp" or poles or pole_deviation is not None):
+        raise InputError(f"method is {method!r}" + ", with poles" * (method == "lrmp"), where="--basis",
+                         expected="lrmp without poles", remedy="A pole -w is the function fractional:w:1.")
     if pole_deviation is not None and method != "lrmp":
         raise InputError(f"method is {method!r}, which has no poles", where="--pole-deviation", expected="lrmp")
     beside = list((instruments or {}).values()) or reference
@@ -112,7 +117,8 @@ def estimate_response(paths: Sequence[Path], *, system: System | None = None, in
          "etfe": lambda: etfe(records), "spectral": lambda: spectral(records),
          "lpm": lambda: lpm(records, degree=degree, half_width=half_width),
          "lrm": lambda: lrm(records, degree=degree, half_width=half_width),
-         "lrmp": lambda: (lrmp(records, poles=given, half_width=half_width) if pole_deviation is None else
+         "lrmp": lambda: (lrmp(records, half_width=half_width, basis=list(basis)) if basis else
+                          lrmp(records, poles=given, half_width=half_width) if pole_deviation is None else
                           pole_sensitivity(records, given, half_width).with_uncertain_poles(pole_deviation))}
     if reference:
         G = closed_loop_response(list(zip(records, references, strict=True)), reference, degree=degree,

@@ -36,6 +36,7 @@ class IdentifyTable(Table):
     degree: Annotated[int, Field(ge=0)] = 2
     poles: list[Number] = []
     pole_deviation: Positive | None = None
+    basis: list[str] = []
     band: Pair | None = None
     reference: str | list[str] = []
     instruments: dict[str, str] = {}
