@@ -32,7 +32,8 @@ class Ball:
     slack: int | None = None
 
 
-def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array, *, ball: Ball | None = None) -> Point:
+def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array, *, ball: Ball | None = None,
+                    tolerance: float | None = None) -> Point:
     """Find x with the least x'Px/2 + cost'x under rows x <= bounds: a convex quadratic program.
 
     Parameters
@@ -47,6 +48,8 @@ def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array, *
         Right-hand sides of the inequalities.
     ball : Ball, optional
         One more constraint, of a Euclidean norm.
+    tolerance : float, optional
+        Of gap and feasibility; default the solver's own.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def least_quadratic(quadratic: Array, cost: Array, rows: Array, bounds: Array, *
         left = np.vstack([rows, top, -ball.rows])
         right = np.concatenate([bounds, [ball.radius], ball.center])
         cones.append(second_order(1 + len(ball.center)))
-    found = solved(cost, csc_matrix(left), right, cones, quadratic=quadratic)
+    found = solved(cost, csc_matrix(left), right, cones, quadratic=quadratic, tolerance=tolerance)
     if not found.solved:
         return Point(np.zeros(len(cost)), np.nan, found.status, False)
     return found

@@ -18,9 +18,11 @@ from .._control import control
 from .._drawing import axes_for
 from ..certify import scheduled
 from ..errors import InputError, Outcome
+from ..export import Program
 from ..synthesis import FeedbackDesign, RobustAgainst, SynthesisCode
 from ..thermal import System, steady_state
 from ..verification import Certificate
+from ._export_currents import currents_program
 from ._modules import Array
 from ._numbers import numbers
 from ._tem_hull import TemHull, read_box, tem_hull
@@ -125,6 +127,20 @@ class TemFeedback(FeedbackDesign):
         wanted = np.array(list(self.operating_current.values())) + (x - list(self.operating_temperatures.values())
                                                                     ) @ self.gain.T
         return np.clip(wanted, low, high)
+
+    @property
+    def has_source(self) -> bool:
+        """Whether `export` writes C source: of a law whose proof covers samples."""
+        return bool(self.holds and self.sample_time)
+
+    @property
+    def _no_source(self) -> str:
+        return ("C source runs in samples, which this proof does not cover: design with sample_time=." if self.holds
+                else "No law was proven, and none is written.")
+
+    def _source(self, name: str) -> Program:
+        return currents_program(self.gain, self.operating_temperatures, self.operating_current, self.current_limits,
+                                self.temperature, self.sample_time, name, self._said)
 
     def _facts(self) -> dict[str, Any]:
         return super()._facts() | {"level": self.level, "operating_temperatures": dict(self.operating_temperatures),

@@ -34,7 +34,7 @@ int main(void)
         worst = ratio <= worst ? worst : ratio;
     }}
     printf("%.3g\\n", worst);
-    return worst <= 1e-9 ? 0 : 1;
+    return worst <= {tolerance:g} ? 0 : 1;
 }}
 #endif"""
 
@@ -99,11 +99,12 @@ def comment(text: str) -> str:
     return re.sub(r"[^ -~]", "_", text).replace("*/", "* /").replace("??", "_?")  # ?? would start a trigraph
 
 
-def self_test(prefix: str, flag: str, table: Sequence[Sequence[float]], n_in: int, setup: str, call: str) -> str:
+def self_test(prefix: str, flag: str, table: Sequence[Sequence[float]], n_in: int, setup: str, call: str,
+              tolerance: float) -> str:
     """Text of a program that runs a test vector, behind a preprocessor flag.
 
     It prints the largest difference relative to the largest value of the same output, 0 without fused multiply-add,
-    and ends with status 1 above 1e-9.
+    and ends with status 1 above the tolerance.
 
     Parameters
     ----------
@@ -117,7 +118,9 @@ def self_test(prefix: str, flag: str, table: Sequence[Sequence[float]], n_in: in
         Number of inputs in a row.
     setup, call : str
         C lines before the loop, and inside it: they fill `out` from `in`, row `t`.
+    tolerance : float
+        Largest relative difference that passes.
     """
     width = len(table[0])
     return _MAIN.format(p=prefix, flag=flag, rows=rows(table), n=len(table), width=width, n_in=n_in,
-                        n_out=width - n_in, setup=setup, call=call)
+                        n_out=width - n_in, setup=setup, call=call, tolerance=tolerance)

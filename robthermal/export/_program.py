@@ -12,7 +12,7 @@ _TEXT = """\
  *
  * Written by robthermal. C99. Numbers are hexadecimal: exact. Sums run from the left.
  * Test: cc -std=c99 -ffp-contract=off -D{flag} this.c -lm && ./a.out prints the largest difference from the
- * vector at the end, relative to the largest value: 0 without fused multiply-add. Exit status 1 above 1e-9.
+ * vector at the end, relative to the largest value{exactly}. Exit status 1 above {tolerance:g}.
  */
 #ifndef {p}_included
 #define {p}_included
@@ -48,6 +48,8 @@ class Program:
         C lines of the test before the loop over the rows, and inside it: they fill `out` from `in`, row `t`.
     columns : sequence of str, optional
         What every column of a row is, inputs first.
+    tolerance : float
+        Largest relative difference at which the test passes; 1e-9 for sums that are repeated digit by digit.
 
     Examples
     --------
@@ -66,6 +68,7 @@ class Program:
     setup: str
     call: str
     columns: Sequence[str] = ()
+    tolerance: float = 1e-9
 
     def text(self) -> str:
         """Source of the file.
@@ -75,5 +78,8 @@ class Program:
         str
         """
         about = "\n".join(f" * {line}".rstrip() for line in self.about.splitlines()).removeprefix(" * ")
-        main = self_test(self.prefix, self.flag, self.vector, self.n_in, self.setup, self.call)
-        return _TEXT.format(about=about, p=self.prefix, flag=self.flag, body=self.body, main=main)
+        main = self_test(self.prefix, self.flag, self.vector, self.n_in, self.setup, self.call,
+                         self.tolerance)
+        exactly = ": 0 without fused multiply-add" if self.tolerance <= 1e-9 else ""
+        return _TEXT.format(about=about, p=self.prefix, flag=self.flag, body=self.body, main=main, exactly=exactly,
+                            tolerance=self.tolerance)

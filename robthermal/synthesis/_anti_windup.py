@@ -21,11 +21,13 @@ from .._checks import quoted
 from .._control import control
 from ..conic import inside
 from ..errors import InputError, Outcome
+from ..export import Program
 from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant
 from ..verification import Certificate
 from ._affine import Matrices, Unknowns, symmetric
 from ._attraction import Attraction, attraction, prove_gain, prove_region
 from ._design import Design, RobustAgainst, as_system
+from ._export import program
 from ._outcomes import SynthesisCode
 from ._plant import GeneralizedPlant, chosen, split
 
@@ -71,12 +73,15 @@ class AntiWindupDesign(Design):
         In the region x'Px falls at least as exp(-2 rate t) [1/s], sampled by (1 - rate)² per sample; 0 without one.
     energy : float
         Largest energy of disturbances (integral or sum of squares) that `value` is proven for, from rest.
+    limits : tuple of float
+        Largest absolute value of each control [control unit]; the C source keeps them.
     """
 
     matrix: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     level: float = 0.0
     rate: float = 0.0
     energy: float = 0.0
+    limits: tuple[float, ...] = ()
 
     def contains(self, x: ArrayLike) -> bool:
         """Whether a start is proven to come to rest.
@@ -94,7 +99,11 @@ class AntiWindupDesign(Design):
         return bool(self.level > 0 and state @ self.matrix @ state <= self.level)
 
     def _facts(self) -> dict[str, Any]:
-        return super()._facts() | {"matrix": self.matrix, "level": self.level, "rate": self.rate, "energy": self.energy}
+        return super()._facts() | {"matrix": self.matrix, "level": self.level, "rate": self.rate, "energy": self.energy,
+                                   "limits": list(self.limits)}
+
+    def _source(self, name: str) -> Program:
+        return program(self.controller, name, self._said, self.limits)
 
 
 def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: ArrayLike,
@@ -174,7 +183,7 @@ def anti_windup(plant: control.StateSpace, K: control.StateSpace, *, limits: Arr
             outcome, method, "Clarabel", time.perf_counter() - start, 1 if proven is not None else 2, None,
             np.zeros((size, size)) if region is None else region.P,
             region.level if region is not None else np.inf if outcome.ok else 0.0,
-            0.0 if region is None else region.rate, energy)
+            0.0 if region is None else region.rate, energy, tuple(largest))
 
     if proven is not None and found is not None:
         value = float(proven.region["bound"])

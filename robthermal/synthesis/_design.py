@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,10 @@ import numpy as np
 from .._control import control
 from .._drawing import axes_for
 from ..errors import Outcome
+from ..export import Program
 from ..linear import Plant, close, read_plant, responder
 from ..verification import Certificate
-from ._export import export_design
+from ._export import document, export_design, program, said
 from ._margins import Margins, margins
 from ._plant import GeneralizedPlant
 
@@ -164,7 +165,26 @@ class Design:
         InputError
             For another ending, C source of a continuous controller, or a file that cannot be written.
         """
-        export_design(self.controller, self._facts(), self.certificates, path, name)
+        export_design(document(self.controller, name) | self._facts(), self.certificates, path,
+                      partial(self._source, name) if self.has_source else None, self._no_source)
+
+    @property
+    def has_source(self) -> bool:
+        """Whether `export` writes C source: of a controller that is sampled."""
+        return bool(self.controller.dt)
+
+    @property
+    def _no_source(self) -> str:
+        """How to get a design that has C source."""
+        return "C source needs a sampled controller: design it with sample_time=."
+
+    @property
+    def _said(self) -> str:
+        """What is proven, as lines of the comment at the top of C source."""
+        return said(self.outcome.text)
+
+    def _source(self, name: str) -> Program:
+        return program(self.controller, name, self._said)
 
     def _facts(self) -> dict[str, Any]:
         """What design.json says beside the controller."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,11 @@ _ABOUT = """\
 Controller u = K y, {n} states, sample time {h:.17g} s. In every sample:
 
     {p}_step(&state, y, u);     u from the measurements of this sample, then the next state
+{limited}
+Measurements: {y}. Controls: {u}. The state starts at zero.
+{outcome}"""
 
-Measurements: {y}. Controls: {u}. The state starts at zero."""
+_LIMITED = "u is inside the limits of the controls; what they cut off goes to the state inside.\n"
 
 _BODY = """\
 typedef struct {{
@@ -33,8 +37,8 @@ typedef struct {{
 
 static inline void {p}_step({p}_state *s, const double y[{n_y}], double u[{n_u}])
 {{
-    double next[{states}] = {{0}};
-{output}
+    double next[{states}] = {{0}};{held}
+{output}{limit}
 {state}
     for (int k = 0; k < {states}; k++)
         s->x[k] = next[k];
@@ -42,19 +46,18 @@ static inline void {p}_step({p}_state *s, const double y[{n_y}], double u[{n_u}]
 """
 
 
-def export_design(controller: control.StateSpace, facts: Mapping[str, Any], certificates: Sequence[Certificate],
-                  path: str | Path, name: str, source: bool = True) -> None:
-    """Write one file, or a folder with all of them; `facts`: what design.json says beside the controller.
+def export_design(content: Mapping[str, Any], certificates: Sequence[Certificate], path: str | Path,
+                  source: Callable[[], Program] | None, remedy: str) -> None:
+    """Write one file, or a folder with all of them.
 
-    `source`: whether a folder gets C source of a sampled controller.
+    `content`: what design.json says; `source`: makes the C source, None where there is none; `remedy`: how to get one.
     """
-    content = document(controller, name) | dict(facts)
     if Path(path).suffix:
-        if controller.dt:
-            write_export(path, lambda: content, lambda: program(controller, name))
+        if source is not None:
+            write_export(path, lambda: content, source)
         else:  # no test vector: there is no program
             by_suffix(path, {".json": lambda: json_bytes(plain(content)), ".mat": lambda: matlab_bytes(content)},
-                      "C source needs a sampled controller: design it with sample_time=.")
+                      remedy)
         return
     folder = Path(path)
     try:
@@ -65,9 +68,18 @@ def export_design(controller: control.StateSpace, facts: Mapping[str, Any], cert
     for k, certificate in enumerate(certificates):
         measure = certificate.region.get("measure", certificate.kind)
         certificate.save(folder / "certificates" / f"{k + 1}_{measure}.json")
-    if controller.dt and source:
+    if source is not None:
+        text = source().text().encode("ascii")
         for suffix in (".c", ".h"):
-            write(folder / f"controller{suffix}", program(controller, name).text().encode("ascii"))
+            write(folder / f"controller{suffix}", text)
+
+
+def said(outcome: str) -> str:
+    """What is proven, as lines of the comment at the top of C source.
+
+    `outcome`: text of the outcome of the design.
+    """
+    return "\n".join(textwrap.wrap(comment(f"As designed: {outcome}"), 110))
 
 
 def document(K: control.StateSpace, name: str) -> dict[str, Any]:
@@ -77,17 +89,32 @@ def document(K: control.StateSpace, name: str) -> dict[str, Any]:
                            "inputs": list(K.input_labels), "outputs": list(K.output_labels)}}
 
 
-def program(controller: control.StateSpace, name: str) -> Program:
-    """C source of a sampled controller, the doubles of the certificate."""
+def program(controller: control.StateSpace, name: str, outcome: str, limits: Sequence[float] = ()) -> Program:
+    """C source of a sampled controller, the doubles of the certificate.
+
+    `limits`: largest absolute values of the controls, where what they cut off are the last inputs of the controller.
+    """
     K = read_plant(controller)
-    p, n, (n_u, n_y) = identifier(name, "controller"), len(K.A), K.D.shape
-    given = [*(f"s->x[{k}]" for k in range(n)), *(f"y[{k}]" for k in range(n_y))]
-    body = _BODY.format(p=p, states=max(n, 1), n_y=n_y, n_u=n_u, output=_sums("u", np.hstack([K.C, K.D]), given),
+    p, n, (n_u, n_in) = identifier(name, "controller"), len(K.A), K.D.shape
+    n_y = n_in - len(limits)
+    given = [f"{word}[{k}]" for word, count in (("s->x", n), ("y", n_y), ("q", len(limits))) for k in range(count)]
+    wanted = "v" if limits else "u"
+    body = _BODY.format(p=p, states=max(n, 1), n_y=n_y, n_u=n_u, output=_sums(wanted, np.hstack([K.C, K.D]), given),
+                        held=f"\n    double v[{n_u}], q[{n_u}];" if limits else "", limit=_limit(limits),
                         state=_sums("next", np.hstack([K.A, K.B]), given))
-    about = _ABOUT.format(p=p, n=n, h=K.dt, y=comment(", ".join(controller.input_labels)),
-                          u=comment(", ".join(controller.output_labels)))
+    about = _ABOUT.format(p=p, n=n, h=K.dt, y=comment(", ".join(controller.input_labels[:n_y])),
+                          u=comment(", ".join(controller.output_labels)), outcome=outcome,
+                          limited=_LIMITED if limits else "")
     call = f"        {p}_step(&state, in, out);"
-    return Program(p, "CONTROLLER_TEST", about, body, list(_vector(K)), n_y, f"    {p}_state state = {{{{0}}}};", call)
+    return Program(p, "CONTROLLER_TEST", about, body, list(_vector(K, limits)), n_y,
+                   f"    {p}_state state = {{{{0}}}};", call)
+
+
+def _limit(limits: Sequence[float]) -> str:
+    """Controls inside their limits, and what was cut off."""
+    lines = [f"\n    u[{k}] = fmin(fmax(v[{k}], {number(-one)}), {number(one)});\n    q[{k}] = v[{k}] - u[{k}];"
+             for k, one in enumerate(limits)]
+    return "".join(lines)
 
 
 def _sums(target: str, matrix: Array, names: Sequence[str]) -> str:
@@ -99,16 +126,18 @@ def _sums(target: str, matrix: Array, names: Sequence[str]) -> str:
     return "\n".join(lines)
 
 
-def _vector(K: Plant) -> Iterator[list[float]]:
+def _vector(K: Plant, limits: Sequence[float]) -> Iterator[list[float]]:
     """Measurements, and the controls that follow, summed in the order of the source."""
     rng = np.random.default_rng(0)
     x: list[float] = [0.0] * len(K.A)
     output: list[list[float]] = np.hstack([K.C, K.D]).tolist()
     state: list[list[float]] = np.hstack([K.A, K.B]).tolist()
     for _ in range(_TEST_SAMPLES):
-        y = [float(value) for value in rng.standard_normal((K.D.shape[1],))]
-        both = [*x, *y]
-        yield [*y, *(_dot(row, both) for row in output)]
+        y = [float(value) for value in rng.standard_normal((K.D.shape[1] - len(limits),))]
+        v = [_dot(row, [*x, *y, *limits]) for row in output]  # no direct path from what is cut off
+        u = [min(max(one, -most), most) for one, most in zip(v, limits, strict=True)] if limits else v
+        yield [*y, *u]
+        both = [*x, *y, *(one - used for one, used in zip(v, u, strict=True))] if limits else [*x, *y]
         x = [_dot(row, both) for row in state]
 
 

@@ -7,6 +7,8 @@ certificate of a closed loop bounds the rest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,8 @@ from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant
 from ..verification import Certificate
 from ._arguments import held
 from ._design import as_system
+from ._export import document, export_design, said
+from ._hybrid_source import hybrid_program
 from ._outcomes import SynthesisCode
 
 _AT_ONE = 1e-9  # distance of an eigenvalue from 1 below which the linear part integrates
@@ -69,6 +73,29 @@ class HybridIntegratorGain:
 
     def __str__(self) -> str:
         return self.outcome.text
+
+    def export(self, path: str | Path, name: str = "controller") -> None:
+        """Write element and linear controller for other programs.
+
+        Parameters
+        ----------
+        path : str or path
+            A file ending in .c, .h, .mat or .json, or a folder, which gets design.json, the certificate, controller.c
+            and controller.h.
+        name : str
+            Name of the controller; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, or a file that cannot be written.
+        """
+        content = document(self.linear, name) | {
+            "element": {"gain": self.gain, "rate": self.rate},
+            "outcome": {"ok": self.outcome.ok, "code": self.outcome.code, "text": self.outcome.text}}
+        export_design(content, [self.certificate] if self.holds else [], path, partial(
+            hybrid_program, read_plant(self.linear), self.gain, self.rate * self.sample_time, name,
+            said(self.outcome.text)), "")
 
     def element(self, output: float, error: float) -> float:
         """Next output of the element: it integrates, and is cut off at the sector.

@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .._arrays import Array
 from .._control import control
-from ..errors import InputError
+from ..export import Program
 from ..linear import Plant, close, read_plant, responder
 from ._design import Design, as_system
-from ._export import export_design
+from ._lpv_source import scheduled_program
 from ._margins import Margins, margins
 from ._plant import read_generalized
-from ._schedule import read_schedule
+from ._schedule import Schedule, read_schedule
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ class LpvDesign(Design):
         InputError
             For other names, or a point outside of the hull of the vertices.
         """
-        weights = read_schedule(self.scheduling, len(self.controllers)).weights(scheduling)
+        weights = self._schedule.weights(scheduling)
         K = average([read_plant(one) for one in self.controllers], weights)
         return as_system(K, list(self.controller.input_labels), list(self.controller.output_labels))
 
@@ -119,26 +118,23 @@ class LpvDesign(Design):
         ax.legend(loc="best")
         return ax
 
-    def export(self, path: str | Path, name: str = "controller") -> None:
-        """Write the controllers at the vertices for other programs.
+    @property
+    def has_source(self) -> bool:
+        """Whether `export` writes C source: of sampled plants, on a grid or in simplices."""
+        return bool(self.controller.dt) and (bool(self._schedule.axes) or len(self._schedule.simplices[0]) > 0)
 
-        Parameters
-        ----------
-        path : str or path
-            A file ending in .json or .mat, or a folder, which gets design.json and the certificates. There is no C
-            source: it would hold one controller of the hull.
-        name : str
-            Name of the design.
+    @property
+    def _no_source(self) -> str:
+        if not self.controller.dt:
+            return "C source needs sampled plants: control.c2d, then design again."
+        return "The points of the plants lie on a line or a plane: leave out quantities that depend on the others."
 
-        Raises
-        ------
-        InputError
-            For another ending, or a file that cannot be written.
-        """
-        if Path(path).suffix in (".c", ".h"):
-            raise InputError("a scheduled controller has no C source", where=ascii(str(path)),
-                             expected="design.json, with the controllers at the vertices and where they lie")
-        export_design(self.controller, self._facts(), self.certificates, path, name, source=False)
+    @cached_property
+    def _schedule(self) -> Schedule:
+        return read_schedule(self.scheduling, len(self.controllers))
+
+    def _source(self, name: str) -> Program:
+        return scheduled_program(self.controllers, self._schedule, name, self._said)
 
     def _facts(self) -> dict[str, Any]:
         matrices = [{key: getattr(K, key) for key in "ABCD"} for K in self.controllers]

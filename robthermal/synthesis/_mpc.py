@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,12 @@ from .._checks import quoted, whole_number
 from .._control import control
 from .._drawing import axes_for
 from ..errors import InputError, Outcome
+from ..export import Program as Source
 from ..linear import Plant, read_plant
 from ._arguments import held
 from ._design import Design, RobustAgainst, as_system
 from ._ellipsoid import shadow
+from ._mpc_export import fallback, source
 from ._mpc_limits import Limits, read_limits
 from ._mpc_step import MpcStep, Prediction, Program
 from ._mpc_terminal import Terminal, optimal, terminal
@@ -95,6 +96,11 @@ class MpcDesign(Design):
         InputError
             A state of another size, or that is not finite; no terminal set.
         """
+        program, state = self._read(x)
+        return program.step(state)
+
+    def _read(self, x: ArrayLike) -> tuple[Program, Array]:
+        """The program and a state of its size."""
         if self.program is None:
             raise InputError("no terminal set was found", where="design", expected="a design that has one",
                              remedy=self.outcome.text)
@@ -105,34 +111,50 @@ class MpcDesign(Design):
             state = np.zeros(0)
         if state.shape != (n,) or not np.isfinite(state).all():
             raise InputError(f"x = {quoted(x)}", where="argument x", expected=f"{n} finite numbers")
-        return self.program.step(state)
+        return self.program, state
 
-    def export(self, path: str | Path, name: str = "controller") -> None:
-        """Write terminal cost, law and set, the numbers of the quadratic program, and steps to test a solver with.
+    @property
+    def has_source(self) -> bool:
+        """Whether `export` writes C source: not of bounds by a Python function, and not without a terminal set."""
+        return self.program is not None and self.program.limits.function is None
 
-        No solver is written: ``program`` holds A, B, Q, R and the rows G x + H u <= g, ``reference`` states on the
-        boundary of the terminal set and twice as far, with the first control and the cost that `step` finds.
+    @property
+    def _no_source(self) -> str:
+        if self.program is None:
+            return "There is no terminal set, and so no program to write."
+        return 'Bounds by a Python function cannot be written in C: state them as "rows": (G, H, g).'
+
+    def _source(self, name: str) -> Source:
+        if self.program is None:
+            raise ValueError("has_source says so")
+        return source(self.program, name, self.controller.input_labels, self.controller.output_labels,
+                      self._said)
+
+    def fallback(self, x: ArrayLike) -> Array:
+        """What the C source applies where it finds no plan that keeps every limit: u = K x, moved to the limits.
+
+        The limits of this sample are met in turn, those of the controls alone in the end. Nothing is proven of it.
 
         Parameters
         ----------
-        path : str or path
-            A file ending in .json or .mat, or a folder, which gets design.json and the certificates.
-        name : str
-            Name of the design.
+        x : array_like, shape (n,)
+            Measured state in deviations from the operating point [state units].
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            Control in deviations from the operating point [control units].
 
         Raises
         ------
         InputError
-            A path that ends in .c or .h: a quadratic program is no list of matrices.
+            A state of another size, or that is not finite; no terminal set; bounds by a function.
         """
-        if Path(path).suffix in (".c", ".h"):
-            raise InputError("a predictive controller has no C source here", where=ascii(str(path)),
-                             expected=".json, .mat or a folder",
-                             remedy="Give program and terminal of the JSON to a solver, and test it with reference.")
-        # without a sample time no program is written: the terminal law alone would run beyond its set
-        still = replace(self, controller=control.ss([], [], [], self.controller.D, inputs=self.controller.input_labels,
-                                                    outputs=self.controller.output_labels))
-        Design.export(still, path, name)
+        program, state = self._read(x)
+        if program.limits.function is not None:
+            raise InputError("the bounds of the controls are a function", where="design",
+                             expected="limits that are numbers", remedy=self._no_source)
+        return fallback(program, state)
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the shadow of the terminal set on the first two states.

@@ -19,7 +19,8 @@ from ._outcomes import SynthesisCode
 
 _ROUNDS = 10  # programs with bounds of the controls by a function, taken along the last prediction
 _SETTLED = 1e-6  # of the bounds, relative: then the prediction obeys them
-_KEPT = 1e-5  # of the limits: what the solver's result may miss
+KEPT = 1e-5  # of the limits: what the solver's result may miss
+_TOLERANCES = (1e-11, 1e-8)  # of the solver, in turn
 
 
 @dataclass(frozen=True)
@@ -138,10 +139,15 @@ class Program:
         P = self.terminal.P
         cost = float(np.einsum("ki,ij,kj->", states[:-1], self.Q, states[:-1])
                      + np.einsum("ki,ij,kj->", controls, self.R, controls) + states[-1] @ P @ states[-1])
-        if short > _KEPT:
+        already, missed = self._already(x)
+        if short > KEPT:
             outcome = SynthesisCode.NO_STEP.outcome(
                 f"No controls keep every limit over the horizon from this state: at best {worst} is missed by "
                 f"{100 * short:.3g} % of its size. The control returned misses least.")
+        elif already > 0:
+            outcome = SynthesisCode.NO_STEP.outcome(
+                f"The measured state misses {missed} by {100 * already:.3g} % of its size, which no control changes. "
+                "The control returned keeps every other limit over the horizon.")
         elif not settled:
             outcome = SynthesisCode.NO_STEP.outcome(
                 f"The bounds of the controls along the prediction did not settle in {_ROUNDS} programs; the control "
@@ -151,17 +157,36 @@ class Program:
                                                  "set, as far as the solver tells.")
         return MpcStep(controls[0], controls, states, cost, outcome, self.dt)
 
+    def missed(self, x: Array) -> float:
+        """Largest relative miss of what a control can change, by the plan that misses least; constant bounds only."""
+        return float(self._solved(x, *self._rows(x, np.repeat(x[None], len(self.prediction.law), axis=0)))[1])
+
+    def _already(self, x: Array) -> tuple[float, str]:
+        """The largest miss of a limit of the states alone by the measured state, relative, and which one."""
+        limits = self.limits
+        alone = np.flatnonzero(~limits.H.any(axis=1))
+        short = limits.G[alone] @ x / limits.g[alone] - 1.0
+        if not (short > KEPT).any():
+            return 0.0, ""
+        worst = int(np.argmax(short))
+        return float(short[worst]), f"{limits.words[alone[worst]]} at sample 0"
+
     def _rows(self, x: Array, path: Array) -> tuple[Array, Array, Array, list[str]]:
-        """Rows over c of every limit at every sample, divided by its size; which of them the controls alone decide."""
+        """Rows over c of every limit at every sample, divided by its size; which of them the controls alone decide.
+
+        Of the measured state only limits with a control: no control changes the others.
+        """
         p, limits = self.prediction, self.limits
         rows, bounds, words, own = [], [], [], []
         for k in range(len(path)):
             now = limits if limits.function is None else limits.with_controls(*limits.bounds(path[k]))
-            size = np.where(now.g != 0, np.abs(now.g), 1.0)
-            rows.append((now.G @ p.driven[k] + now.H @ p.moved[k]) / size[:, None])
-            bounds.append((now.g - now.G @ p.free[k] @ x - now.H @ p.law[k] @ x) / size)
-            words += [f"{one} at sample {k}" for one in now.words]
-            own.append(now.H.any(axis=1) if k == 0 else ~now.G.any(axis=1))
+            kept = np.flatnonzero(now.H.any(axis=1)) if k == 0 else np.arange(len(now.g))
+            G, H, g = now.G[kept], now.H[kept], now.g[kept]
+            size = np.where(g != 0, np.abs(g), 1.0)
+            rows.append((G @ p.driven[k] + H @ p.moved[k]) / size[:, None])
+            bounds.append((g - G @ p.free[k] @ x - H @ p.law[k] @ x) / size)
+            words += [f"{now.words[j]} at sample {k}" for j in kept]
+            own.append(H.any(axis=1) if k == 0 else ~G.any(axis=1))
         return np.vstack(rows), np.concatenate(bounds), np.concatenate(own), words
 
     def _solved(self, x: Array, rows: Array, bounds: Array, own: Array, words: list[str]) -> tuple[Array, float, str]:
@@ -170,10 +195,11 @@ class Program:
         root = cholesky(P) / np.sqrt(self.terminal.level)  # the end: |root x_N| <= 1
         end = Ball(root @ p.driven[-1], root @ p.free[-1] @ x, 1.0)
         quadratic, linear = self._cost(x)
-        found = least_quadratic(quadratic, linear, rows, bounds, ball=end)
-        missed = _missed(found.x, rows, bounds, end, words) if found.solved else (np.inf, "")
-        if missed[0] <= _KEPT:
-            return found.x, *missed
+        for tolerance in _TOLERANCES:
+            found = least_quadratic(quadratic, linear, rows, bounds, ball=end, tolerance=tolerance)
+            missed = _missed(found.x, rows, bounds, end, words) if found.solved else (np.inf, "")
+            if missed[0] <= KEPT:
+                return found.x, *missed
         for hard in (own, np.zeros(len(own), bool)):  # what the controls alone decide is kept where that is possible
             least = _least_miss(rows, bounds, hard, end)
             if least is not None:

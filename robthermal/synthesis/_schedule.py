@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -15,6 +16,7 @@ from .._checks import quoted
 from ..errors import InputError
 
 _OUTSIDE = 1e-9  # of the range of a quantity: rounding
+_FLAT = 1e-9  # of the ranges: thickness below which a simplex has no inside
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,60 @@ class Schedule:
             found[k] = min(max(float(own), low), high)
         return found
 
+    def moved_inside(self, point: Array) -> tuple[Array, bool]:
+        """Weights at any point, moved to those of the vertices where it lies outside, as the C source does it.
+
+        Only for a grid, or vertices that have simplices; every sum in the order of the source.
+        """
+        if self.axes:
+            own = np.array([min(max(float(value), float(axis[0])), float(axis[-1]))
+                            for axis, value in zip(self.axes, point, strict=True)])
+            return self._on_grid(own), not np.array_equal(own, point)
+        corners, shares = self.simplices
+        best, most, found = np.zeros(0), -np.inf, corners[0]
+        for own, table in zip(corners, shares, strict=True):
+            share = table[:, -1]
+            for column, value in zip(table.T, point, strict=False):
+                share = share + column * value
+            if share.min() > most:
+                best, most, found = share, float(share.min()), own
+        best = np.maximum(best, 0.0)
+        weights = np.zeros(len(self.points))
+        total = 0.0
+        for one in best.tolist():
+            total += one
+        weights[found] = best / total
+        return weights, most < -_OUTSIDE
+
+    @cached_property
+    def simplices(self) -> tuple[Array, Array]:
+        """Delaunay's: vertices (k, d + 1), and their shares at a point, table @ (point, 1).
+
+        None of vertices on a plane. In quantities scaled to their ranges.
+        """
+        d = self.points.shape[1]
+        nothing = np.zeros((0, d + 1), int), np.zeros((0, d + 1, d + 1))
+        low, unit = self._scale()
+        scaled = (self.points - low) / unit
+        try:
+            corners = scipy.spatial.Delaunay(scaled).simplices
+        except (scipy.spatial.QhullError, ValueError):
+            return nothing
+        full = [one for one in corners
+                if np.linalg.matrix_rank(scaled[one][1:] - scaled[one][0], tol=_FLAT) == d]
+        if not full:
+            return nothing
+        tables = []
+        for one in full:
+            share = np.linalg.inv(np.vstack([scaled[one].T, np.ones(d + 1)]))
+            tables.append(np.hstack([share[:, :d] / unit, (share[:, d] - share[:, :d] @ (low / unit))[:, None]]))
+        return np.array(full), np.array(tables)
+
+    def _scale(self) -> tuple[Array, Array]:
+        """Least values and ranges of the quantities."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        return low, np.where(high > low, high - low, 1.0)
+
     def _on_grid(self, point: Array) -> Array:
         shares = [{float(axis[0]): 1.0} if len(axis) == 1 else _between(axis, value)
                   for axis, value in zip(self.axes, point, strict=True)]
@@ -60,9 +116,12 @@ class Schedule:
                          for row in self.points])
 
     def _among(self, point: Array) -> Array:
-        """Least sum of w |vertex|²: the simplex of a Delaunay triangulation, in quantities scaled to their ranges."""
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        unit = np.where(high > low, high - low, 1.0)
+        """Those of the simplex; of vertices on a plane those of the least sum of w |vertex|², which is the same."""
+        if len(self.simplices[0]):
+            inside, outside = self.moved_inside(point)
+            if not outside:
+                return inside
+        low, unit = self._scale()
         scaled, own = (self.points - low) / unit, (point - low) / unit
         found = scipy.optimize.linprog(((scaled - 0.5) ** 2).sum(axis=1), b_eq=[*own, 1.0], bounds=(0, None),
                                        A_eq=np.vstack([scaled.T, np.ones(len(scaled))]), method="highs")

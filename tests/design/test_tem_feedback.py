@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
+import subprocess
 from dataclasses import replace
 
 import certificate_truth as truth
@@ -16,6 +19,7 @@ from robthermal.design._tem_hull import control_points
 from robthermal.errors import InputError
 from robthermal.verification import Certificate, establish, verify
 
+GCC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 BOX = {"temperature": (265.0, 335.0), "current": (0.2, 1.8)}
 
 
@@ -236,6 +240,27 @@ def test_the_law_is_limited_and_takes_names(designed):
     for wrong in ({"plate": 300.0}, [300.0], "warm"):
         with pytest.raises(InputError, match="temperatures"):
             designed.current(wrong)
+
+
+@pytest.mark.skipif(GCC is None, reason="no C compiler on this machine")
+def test_the_law_in_c_is_limited_too_and_only_there_for_samples(designed, tmp_path):
+    d = rt.design.tem_feedback(stage(), **BOX, operating=1.0, rate=0.009, sample_time=2.0)
+    d.export(tmp_path / "out", "law")
+    source = tmp_path / "out" / "controller.c"
+    subprocess.run([str(GCC), "-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off",
+                    "-DCONTROLLER_TEST", str(source), "-o", str(tmp_path / "run"), "-lm"], check=True)
+    assert subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True).stdout.strip() == "0"
+    d.export(tmp_path / "law.json")
+    rows = np.array(json.loads((tmp_path / "law.json").read_text())["test_vector"]["rows"])
+    assert rows[:, 3] == pytest.approx(d.current(rows[:, :3])[:, 0], rel=1e-12) and {0.2, 1.8} <= set(rows[:, 3])
+    assert "Certified for the nonlinear network" in " ".join(source.read_text().split(" * ")).replace("\n", "")
+    driver = tmp_path / "driver.c"
+    driver.write_text(source.read_text() + "int main(void) { double x[] = {NAN, 290.0, 300.0}, i[1];\n"
+                                           "return law_step(x, i) == 1 && i[0] == 1.0 ? 0 : 1; }\n")
+    subprocess.run([str(GCC), "-std=c99", str(driver), "-o", str(tmp_path / "run"), "-lm"], check=True)
+    assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
+    with pytest.raises(InputError, match="samples, which this proof does not cover"):
+        designed.export(tmp_path / "law.c")
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

@@ -119,11 +119,14 @@ def test_sampled_plants(tmp_path):
     d = rt.design.lpv(plants, {"k": [-1.0, 3.0]}, 1, 1)
     assert d.holds and proven(d) and worst(d, 8) <= d.value and d.gain({"k": 0.0}).dt == 0.1
     d.export(tmp_path / "out")
-    assert not (tmp_path / "out" / "controller.c").exists()
+    assert "Controllers of 2 points" in (tmp_path / "out" / "controller.c").read_text()
     content = json.loads((tmp_path / "out" / "design.json").read_text())
     assert content["scheduling"] == {"k": [-1.0, 3.0]} and len(content["controllers"]) == 2
-    with pytest.raises(InputError, match="no C source"):
-        d.export(tmp_path / "controller.c")
+
+
+def test_continuous_plants_have_no_c_source(spring, tmp_path):
+    with pytest.raises(InputError, match="needs sampled plants"):
+        spring.export(tmp_path / "controller.c")
 
 
 def test_a_smaller_gain_is_asked_for_by_a_larger_gamma(spring):

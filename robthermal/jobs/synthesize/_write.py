@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..._pandas import pd
-from ...design import AntiWindupDesign, Design, FeedbackDesign, LpvDesign, MpcDesign
+from ...design import AntiWindupDesign, FeedbackDesign, MpcDesign
 from ...export import plain
 from ...report import Claim, Reason, Report, Section, Table
 from ..claims import ARITHMETIC, GateCode, claim_of, kind_assumptions, machine_assumptions
@@ -71,14 +71,9 @@ def write_synthesis(result: Synthesis, out: str | Path) -> Report:
                     gate=tuple(_remarks(result)), gates=(GateCode.AT_THE_BINS.code,), data=data)
     with output_folder(out) as folder:
         report = write_certification(result.checked, report, folder)
-        for name in ("design.json", *(("controller.c", "controller.h") if _programmed(design) else ())):
+        for name in ("design.json", *(("controller.c", "controller.h") if design.has_source else ())):
             design.export(folder / name)
     return report
-
-
-def _programmed(design: Design) -> bool:
-    """Whether there is C source: of one sampled controller, not of a scheduled one or of a quadratic program."""
-    return bool(design.controller.dt) and not isinstance(design, (LpvDesign, MpcDesign))
 
 
 def _assumed(result: Synthesis) -> tuple[str, ...]:
