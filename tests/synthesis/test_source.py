@@ -311,7 +311,8 @@ def test_a_hybrid_element_in_c_runs_as_it_is_simulated(tmp_path):
     run = d.simulate(1.0, samples=30)
     driver = tmp_path / "driver.c"
     errors = ", ".join(f"{one:.17g}" for one in run["error"])
-    driver.write_text((tmp_path / "law.c").read_text() + "#include <stdio.h>\nint main(void)\n{ law_state s = {{0}};\n"
+    driver.write_text((tmp_path / "law.c").read_text() + "#include <stdio.h>\nint main(void) {\n"
+                      " law_state s = {{0}, 0};\n"
                       f"const double e[] = {{{errors}}};\n"
                       'for (int k = 0; k < 30; k++) printf("%.17g\\n", law_step(&s, e[k]));\nreturn 0; }\n')
     subprocess.run([str(GCC), *FLAGS, str(driver), "-o", str(tmp_path / "driver"), "-lm"], check=True)
