@@ -16,7 +16,7 @@ from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
 from ..fit import Point, Refit, Structure, Whitened, descend, filters
-from ..path import Linearized, LinearizedRecord, White, gathered, linearized_records
+from ..path import Linearized, LinearizedRecord, White, heat_spread, linearized_records
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -381,11 +381,4 @@ def expected_squares(fit: Refit, path: LinearizedRecord) -> Array:
     """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²]."""
     noise, disturbance = fit.levels.of(path, fit.floor)
     slow = fit.levels.slow(path, fit.floor)
-    A, P = path.steps[0], np.zeros(path.M.shape[1:])
-    total = np.zeros(noise.size)
-    if disturbance.any():
-        Q = gathered(path, disturbance)
-        for k in range(len(A)):
-            total += np.einsum("si,ij,sj->s", path.C[k], P, path.C[k])
-            P = A[k] @ P @ A[k].T + Q[k]
-    return np.asarray(total / len(A) + noise**2 + (0.0 if slow is None else slow.std**2), np.float64)
+    return np.asarray(heat_spread(path, disturbance) + noise**2 + (0.0 if slow is None else slow.std**2), np.float64)

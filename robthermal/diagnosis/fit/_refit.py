@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -58,6 +58,25 @@ class Refit:
     whiteners: tuple[White, ...]
     z: Array
     outcome: Outcome
+    _others: dict[str, Refit] = field(default_factory=dict, init=False, repr=False)
+
+    def kept(self, name: str, made: Callable[[], Refit]) -> Refit:
+        """Another fit that follows from this one, made when it is first asked for.
+
+        Parameters
+        ----------
+        name : str
+            Name of the other fit.
+        made : callable
+            Makes the other fit.
+
+        Returns
+        -------
+        Refit
+        """
+        if name not in self._others:
+            self._others[name] = made()
+        return self._others[name]
 
     @cached_property
     def J(self) -> Array:

@@ -127,6 +127,10 @@ def coarsened(fit: Refit) -> Refit:
 
 def exact(fit: Refit) -> Refit:
     """The same structure refitted with the network taken to be right, and noise no larger than declared."""
+    return fit.kept("exact", lambda: _exact(fit))
+
+
+def _exact(fit: Refit) -> Refit:
     structure = replace(fit.structure, coarse=())
     n = structure.n_common
     v = np.concatenate([fit.v[:n], fit.v[fit.structure.n_common:]])

@@ -1,23 +1,24 @@
 """The system linearized along a record, or beside a frequency response, and the filters that whiten residuals."""
 
 from ._coarseness import coarse_names as coarse_names
+from ._heat_splines import N_SPLINES as N_SPLINES
+from ._heat_splines import heat_splines as heat_splines
 from ._linearize import linearize as linearize
 from ._linearize import linearized_records as linearized_records
 from ._linearized import Linearized as Linearized
 from ._linearized import Unknowns as Unknowns
 from ._linearized import White as White
-from ._linearized_record import N_SPLINES as N_SPLINES
 from ._linearized_record import LinearizedRecord as LinearizedRecord
-from ._linearized_record import heat_splines as heat_splines
 from ._linearized_record import linearized_record as linearized_record
 from ._linearized_response import LinearizedResponse as LinearizedResponse
 from ._linearized_response import linearized_response as linearized_response
 from ._whitening import SlowNoise as SlowNoise
 from ._whitening import Whitener as Whitener
 from ._whitening import gathered as gathered
+from ._whitening import heat_spread as heat_spread
 from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
 __all__ = ["Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise", "Unknowns", "White",
-           "Whitener", "coarse_names", "gathered", "heat_splines", "linearize", "linearized_record",
+           "Whitener", "coarse_names", "gathered", "heat_splines", "heat_spread", "linearize", "linearized_record",
            "linearized_records", "linearized_response", "settled_cost", "whitener"]

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
@@ -24,12 +23,12 @@ from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response
 from ._coarseness import coarse_responses
 from ._draw_residuals import draw_residuals
+from ._heat_splines import heat_splines
 from ._linearized import Unknowns
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-N_SPLINES = 16
 _BLOCK = 32  # signatures at once, over so many samples: they stay in the cache
 _SAMPLES = 512
 _SAME = 1e-4  # change of a rate times the sample time [-]
@@ -292,6 +291,11 @@ class LinearizedRecord:
             C[:, i, state] = sensor.gain
         return C
 
+    @cached_property
+    def mean(self) -> tuple[Array, Array, Array]:
+        """A, C and M of the middle: their means over the samples."""
+        return self.steps[0].mean(axis=0), self.C.mean(axis=0), self.M.mean(axis=0)
+
     def heat_of(self, system: System) -> tuple[Array, Array]:
         """Extra heat of a changed system, at the start and at the end of every sample.
 
@@ -365,15 +369,6 @@ class LinearizedRecord:
             np.matmul(self.C[some], states[:-1], out=out[some])
             state = states[-1]
         return out
-
-
-def heat_splines(time: Array, count: int = N_SPLINES) -> Array:
-    """Cubic B-splines on even knots over the record, (n, count)."""
-    t = (time - time[0]) / (time[-1] - time[0])
-    inner = np.linspace(0.0, 1.0, count - 2)
-    knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
-    basis = scipy.interpolate.BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3)
-    return np.asarray(basis.toarray(), np.float64)
 
 
 def linearized_record(system: System, one: RecordData, run: Trajectory | None = None) -> LinearizedRecord:

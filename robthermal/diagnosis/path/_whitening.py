@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm, solve_discrete_are
 
 from ...thermal import Equations
+from ._riccati import filtered, spread
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -50,6 +51,10 @@ class LinearSteps(Protocol):
     @property
     def kinds(self) -> tuple[Array, Places]:
         """Rates that differ, and which of them every sample has."""
+
+    @property
+    def mean(self) -> tuple[Array, Array, Array]:
+        """Transition, readings by deviations, and rates of the deviations, each the mean over the samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,24 +170,13 @@ def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNois
     n, R = len(A), np.broadcast_to(np.diag(noise**2), (len(A), noise.size, noise.size))
     if path.one.missing is not None:
         R = R + _IGNORED**2 * path.one.missing[:, :, None] * np.eye(noise.size)
-    n_sensors = C.shape[1]
-    roots = np.zeros((n, n_sensors, n_sensors))
     if slow is None and not disturbance.any():
-        roots[:] = np.linalg.inv(np.linalg.cholesky(R))
-        return Whitener(A, C, np.zeros((n, A.shape[1], n_sensors)), roots)
+        return Whitener(A, C, np.zeros((n, A.shape[1], C.shape[1])), np.linalg.inv(np.linalg.cholesky(R)))
     Q, P = gathered(path, disturbance), np.zeros(A.shape[1:])
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
         P = block_diag(P, slow.covariance)
-    gains = np.zeros((n, A.shape[1], n_sensors))
-    for k in range(n):
-        S = C[k] @ P @ C[k].T + R[k]
-        root = np.linalg.inv(np.linalg.cholesky(S))
-        gain = P @ C[k].T @ (root.T @ root)
-        gains[k], roots[k] = gain, root
-        P = A[k] @ (P - gain @ S @ gain.T) @ A[k].T + Q[k]
-        P = 0.5 * (P + P.T)
-    return Whitener(A, C, gains, roots)
+    return Whitener(A, C, *filtered(A, C, R, Q, P))
 
 
 def gathered(path: LinearSteps, disturbance: Array, M: Array | None = None) -> Array:
@@ -200,22 +194,40 @@ def gathered(path: LinearSteps, disturbance: Array, M: Array | None = None) -> A
     return Q[kind] if one_by_one else Q
 
 
+def heat_spread(path: LinearSteps, disturbance: Array) -> Array:
+    """Mean squares (n_sensors,) of what random heat alone does to the readings of a free run [K²].
+
+    Parameters
+    ----------
+    path : LinearSteps
+        Linearization along the simulated record.
+    disturbance : ndarray, shape (n_lumps,)
+        Random heat of every lump [W/√Hz].
+    """
+    if not disturbance.any():
+        return np.zeros(path.C.shape[1])
+    P = spread(path.steps[0], gathered(path, disturbance))
+    return np.asarray(np.einsum("ksi,ksi->s", path.C @ P, path.C) / len(P), np.float64)
+
+
 def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None
                  ) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
     Good enough for noise levels, and a hundred times faster than the time-varying filter.
     """
-    A, C, R = path.steps[0].mean(axis=0), path.C.mean(axis=0), np.diag(noise**2)
-    Q = gathered(path, disturbance, path.M.mean(axis=0))
+    A, C, M = path.mean
+    Q, R = gathered(path, disturbance, M), np.diag(noise**2)
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
     P = solve_discrete_are(A.T, C.T, Q, R)
     S = C @ P @ C.T + R
     gain = P @ C.T @ np.linalg.inv(S)
     poles, V = np.linalg.eig(A - A @ gain @ C)  # x(k+1) = (A - A K C) x + A K r, mode by mode
-    push = r @ (np.linalg.solve(V, (A @ gain).astype(complex))).T
-    modes = np.column_stack([scipy.signal.lfilter([0.0, 1.0], [1.0, -pole], column)
-                             for pole, column in zip(poles, push.T, strict=True)])
-    e = r - (modes @ (C @ V).T).real
+    if not np.iscomplexobj(poles) or not poles.imag.any():  # no rounding has made a pair: real numbers are faster
+        poles, V = poles.real, V.real
+    push = np.ascontiguousarray(np.linalg.solve(V, A @ gain) @ r.T)
+    modes = np.array([scipy.signal.lfilter([0.0, 1.0], [1.0, -pole], own) for pole, own in
+                      zip(poles, push, strict=True)])
+    e = r - (C @ V @ modes).real.T
     return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])

@@ -42,7 +42,7 @@ class NextExperiment:
         Expected ΔBIC between the closest two candidates that any input separates, from this record with the present
         ones, everything refitted.
     present : float
-        The same if the present inputs were repeated.
+        The same if the present inputs were repeated, those of the first 2000 samples of a longer record.
     pairs : dict
         Expected ΔBIC of every pair, by labels.
     inseparable : tuple of (str, str)
