@@ -30,6 +30,7 @@ def test_gains_by_blocks_are_those_of_the_loop_over_the_samples(n: int) -> None:
     A, C, R, Q = steps(n, 4, 2)
     start = np.diag([0.0, 1.0, 0.0, 0.5])
     gains, roots = filtered(A, C, R, Q, start)
+    assert len(gains) == len(roots) == n
     P = start
     for k in range(n):
         S = C[k] @ P @ C[k].T + R[k]
@@ -43,6 +44,7 @@ def test_gains_by_blocks_are_those_of_the_loop_over_the_samples(n: int) -> None:
 def test_spread_of_random_heat_is_that_of_the_sums_over_all_steps_before(n: int) -> None:
     A, _, _, Q = steps(n, 3, 1)
     found, P = spread(A, Q), np.zeros((3, 3))
+    assert len(found) == n
     for k in range(n):
         assert found[k] == pytest.approx(P, rel=1e-9, abs=1e-15)
         P = A[k] @ P @ A[k].T + Q[k]
