@@ -1,11 +1,16 @@
-"""Write docs/explanations/outcomes.md from the enums of the packages: python docs/table_of_outcomes.py"""
+"""Write docs/explanations/outcomes.md from the enums of the packages, and the file that `robthermal explain` reads.
+
+    python docs/table_of_outcomes.py
+"""
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 from robthermal.errors import OutcomeCode
-from robthermal.jobs.explanations import outcome_codes, package_of
+from robthermal.jobs.explanations import KNOWN, collected, outcome_codes, package_of
 
 PAGE = Path(__file__).resolve().parent / "explanations" / "outcomes.md"
 ANSWER = {True: "yes", False: "no", None: "depends"}
@@ -32,5 +37,11 @@ def page() -> str:
     return "\n".join(lines)
 
 
+def known() -> str:
+    """The file of explanations as it has to be, one to a line."""
+    return "[\n" + ",\n".join(json.dumps(asdict(one), ensure_ascii=False) for one in collected()) + "\n]\n"
+
+
 if __name__ == "__main__":
+    KNOWN.write_text(known(), encoding="utf-8")
     PAGE.write_text(page(), encoding="utf-8")

@@ -3,58 +3,22 @@
 from __future__ import annotations
 
 import inspect
+import json
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
 
 from ... import errors
-from ...diagnosis import Effect, Quantity, effects
-from ...errors import InputError, OutcomeCode
-from ...verification import KINDS
-from ..claims import ARITHMETIC, GateCode, kind_assumptions
-from ._codes import outcome_codes, package_of
+from ..._first_use import OnFirstUse
+from ...errors import InputError
+from ._explanation import Explanation
 from ._glossary import GLOSSARY, WORDS_PAGE
 
-_PAGES = {"loop": "loops", **dict.fromkeys(("stability", "hinf", "peak", "frequency", "closed_loop",
-                                            "polytope", "ellipsoid"),
-                                           "linear_certificates")}
+KNOWN = Path(__file__).with_name("known.json")  # what `collected` says; docs/table_of_outcomes.py writes it
+_effect_words = OnFirstUse(f"{__package__}._effect_words")  # imports the network and scipy
 _ERRORS = {cls.__name__: cls for cls in (errors.InputError, errors.Diverged)}
-_REASONS = {code.code: code for code in GateCode}
-_ANSWER = {True: "the answer is yes", False: "the answer is no", None: "the answer depends"}
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """What one name means.
-
-    Parameters
-    ----------
-    name : str
-        As it stands in files, tables and messages.
-    what : str
-        "effect", "certificate", "outcome", "reason", "error" or "word".
-    meaning : tuple of str
-        Paragraphs that say what it means.
-    details : dict of str to tuple of str
-        By heading: assumptions, confusable partners, what separates them.
-    page : str
-        Page of the documentation; of a word its list, and the page that derives it.
-    """
-
-    name: str
-    what: str
-    meaning: tuple[str, ...]
-    details: dict[str, tuple[str, ...]]
-    page: str
-
-    def __str__(self) -> str:
-        lines = [f"{self.name}: {self.what}", *self.meaning]
-        for heading, texts in self.details.items():
-            lines += [f"{heading}:", *(f"  - {text}" for text in texts)]
-        return "\n".join([*lines, f"Documentation: {self.page}"])
-
-
 _CHANGE = Explanation("parameter_change", "effect",
                       ("A parameter of [fit] has another value on the new records than on the reference records, by "
                        "more than healthy records scatter.",),
@@ -69,6 +33,7 @@ _DRIFT = Explanation("ambient_drift", "effect",
                       "Confused with": ("periodic_load",), "Told apart by": ("a record of the ambient",)},
                      "docs/explanations/diagnosis_data.md")
 _OTHERS = {one.name: one for one in (_CHANGE, _DRIFT)}  # effects of a diagnosis that are not in the catalog
+_KEPT = ("effect", "certificate", "outcome", "reason")  # kinds of names in the file
 
 
 def explainable() -> dict[str, tuple[str, ...]]:
@@ -84,8 +49,9 @@ def explainable() -> dict[str, tuple[str, ...]]:
     >>> "sensor_lag" in rt.jobs.explainable()["effect"]
     True
     """
-    return {"effect": (*effects(), *_OTHERS), "certificate": tuple(KINDS), "outcome": tuple(outcome_codes()),
-            "reason": tuple(_REASONS), "error": tuple(_ERRORS), "word": tuple(GLOSSARY)}
+    known = _known()
+    return {"effect": (*known["effect"], *_OTHERS), **{what: tuple(known[what]) for what in _KEPT[1:]},
+            "error": tuple(_ERRORS), "word": tuple(GLOSSARY)}
 
 
 def explain(name: str) -> tuple[Explanation, ...]:
@@ -124,17 +90,14 @@ def explain(name: str) -> tuple[Explanation, ...]:
 
 
 def _all(name: str) -> Iterator[Explanation]:
-    if name in effects():
-        yield _effect(effects()[name])
+    known = _known()
+    if name in known["effect"]:
+        yield known["effect"][name]
     if name in _OTHERS:
         yield _OTHERS[name]
-    if name in KINDS:
-        yield _certificate(name)
-    if name in outcome_codes():
-        yield _outcome(name, outcome_codes()[name])
-    if name in _REASONS:
-        yield Explanation(name, "reason", (_REASONS[name].meaning,), {"What to do": (_REASONS[name].remedy,)},
-                          "docs/explanations/report.md")
+    for what in _KEPT[1:]:
+        if name in known[what]:
+            yield known[what][name]
     if name in _ERRORS:
         text = inspect.getdoc(_ERRORS[name]) or ""
         yield Explanation(name, "error", (text.split("\n\n")[0],), {}, "docs/api/errors.md")
@@ -144,32 +107,18 @@ def _all(name: str) -> Iterator[Explanation]:
         yield Explanation(word, "word", (meaning,), {}, f"{WORDS_PAGE} docs/explanations/{page}.md")
 
 
-def _effect(effect: Effect) -> Explanation:
-    details = {"Acts on": effect.where, "Quantities": tuple(map(_quantity, effect.quantities)),
-               "Confused with": tuple(f"{name}, at another place" if name == effect.name else name
-                                      for name in effect.confused_with),
-               "Told apart by": (effect.separated_by,) if effect.separated_by else ()}
-    return Explanation(effect.name, "effect", (effect.meaning,),
-                       {heading: texts for heading, texts in details.items() if texts},
-                       "docs/explanations/effects.md")
+def _known() -> dict[str, dict[str, Explanation]]:
+    """By what they are and by name; effects as they are registered now, which they can only be in a loaded catalog."""
+    if "robthermal.thermal.effects" not in sys.modules:
+        return _read()
+    return {**_read(), "effect": _effect_words.explained_effects()}
 
 
-def _quantity(quantity: Quantity) -> str:
-    limits = (f"known, {quantity.lower:g}" if quantity.lower == quantity.upper else
-              f"{quantity.lower:g} to {quantity.upper:g}")
-    return f"{quantity.name} [{quantity.unit}], {limits}"
-
-
-def _certificate(name: str) -> Explanation:
-    text = inspect.cleandoc(sys.modules[KINDS[name].claim.__module__].__doc__ or "")
-    paragraphs = [" ".join(part.split()) for part in text.split("\n\n")]
-    first = paragraphs[0].removeprefix(f'Kind "{name}": ')
-    return Explanation(name, "certificate", (first[0].upper() + first[1:], *paragraphs[1:]),
-                       {"Assumed, not proven": (*kind_assumptions(name), ARITHMETIC)},
-                       f"docs/explanations/{_PAGES.get(name, 'certificates')}.md")
-
-
-def _outcome(name: str, codes: tuple[OutcomeCode, ...]) -> Explanation:
-    told = tuple(f"{package_of(code)}, {_ANSWER[code.ok]}: {code.meaning} {code.remedy}".rstrip() for code in codes)
-    return Explanation(name, "outcome", ("How a computation ended; its text has the numbers.",), {"Said by": told},
-                       "docs/explanations/outcomes.md")
+@cache
+def _read() -> dict[str, dict[str, Explanation]]:
+    found: dict[str, dict[str, Explanation]] = {what: {} for what in _KEPT}
+    for one in json.loads(KNOWN.read_text(encoding="utf-8")):
+        details = {heading: tuple(texts) for heading, texts in one["details"].items()}
+        found[one["what"]][one["name"]] = Explanation(one["name"], one["what"], tuple(one["meaning"]), details,
+                                                      one["page"])
+    return found
