@@ -1,6 +1,7 @@
 """What a name means: an effect, a kind of certificate, the code of an outcome, a word of a report.
 
-What asks every package (`collected`, `outcome_codes`, `package_of`) loads on first use (PEP 562): `explain` reads a file.
+What asks every package (`collected`, `outcome_codes`, `package_of`) loads on first use (PEP 562): `explain` reads a
+file.
 """
 
 from importlib import import_module
