@@ -36,6 +36,29 @@ def line_of(number: int) -> dict[str, str]:
     return {"color": color, "linestyle": _DASHES[rounds % len(_DASHES)]}
 
 
+def size_of(height: float) -> tuple[float, float]:
+    """Size of a new figure of this height: as wide as the style in force says, so that its letters are as large as any.
+
+    Parameters
+    ----------
+    height : float
+        Height of the figure [inch].
+
+    Returns
+    -------
+    tuple of float
+        Width and height [inch].
+
+    Examples
+    --------
+    >>> size_of(2.0)
+    (6.4, 2.0)
+    """
+    from matplotlib import rcParams  # here: as in `axes_for`
+
+    return float(rcParams["figure.figsize"][0]), height
+
+
 def axes_for(ax: Any, **figure: Any) -> Any:
     """`ax`, or the axes of a new figure.
 

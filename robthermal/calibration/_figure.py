@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..signals import Record
 from ._score import Score
 
 Column = tuple[Record, dict[str, NDArray[np.float64]], Score]
+_ABREAST = 3  # names of sensors in one line of the legend
 _SHOWN = {"K": ("temperature [°C]", ZERO_CELSIUS), "V": ("voltage [V]", 0.0)}
 
 
@@ -24,24 +26,24 @@ def draw(columns: list[Column], n_fitted: int, units: Mapping[str, str]) -> NDAr
 
     present = {units.get(name, "K") for _, residuals, _ in columns for name in residuals}
     kinds = [unit for unit in _SHOWN if unit in present] or ["K"]
-    size = (3.0 + 5.0 * len(columns), 5.0 * len(kinds))
+    legend = 0.2 * ceil(max((len(residuals) for _, residuals, _ in columns), default=0) / _ABREAST)
+    size = (max(6.4, 4.4 * len(columns)), (4.6 + legend) * len(kinds))  # inch
     _, axes = plt.subplots(2 * len(kinds), len(columns), sharex="col", squeeze=False, layout="constrained",
                            figsize=size, height_ratios=(2, 1) * len(kinds))
     for place, (record, residuals, score) in enumerate(columns):
         for row, unit in enumerate(kinds):
             above, below = axes[2 * row:2 * row + 2, place]
             own = {name: residual for name, residual in residuals.items() if units.get(name, "K") == unit}
-            _pair(above, below, record, own, score, unit)
-        title = f"{'fitted' if place < n_fitted else 'validation'}: {score.record}"
-        axes[0, place].set(title=title)
+            title = f"{'fitted' if place < n_fitted else 'validation'}: {score.record}" if row == 0 else ""
+            _pair(above, below, record, own, score, unit, title)
         axes[-1, place].set(xlabel="time [s]")
     grid: NDArray[Any] = axes
     return grid
 
 
 def _pair(above: Any, below: Any, record: Record, residuals: Mapping[str, NDArray[np.float64]], score: Score,
-          unit: str) -> None:
-    """Readings of one unit, and their residuals below."""
+          unit: str, title: str) -> None:
+    """Readings of one unit under their title and legend, and their residuals below."""
     label, zero = _SHOWN[unit]
     for i, (name, residual) in enumerate(residuals.items()):
         line = line_of(i)
@@ -51,7 +53,10 @@ def _pair(above: Any, below: Any, record: Record, residuals: Mapping[str, NDArra
         below.plot(record.time, residual, color=line["color"], linewidth=0.7)
     above.set(ylabel=label)
     if residuals:
-        above.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small",
-                     title="model, RMSE")  # beside the curves, on none of them
+        above.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize="small", borderaxespad=0.2,
+                     ncols=min(len(residuals), _ABREAST), columnspacing=1.0, handlelength=1.4, alignment="left",
+                     title=f"{title}\nmodel, RMSE" if title else "model, RMSE")  # above the curves, on none of them
+    else:
+        above.set(title=title)
     below.set(ylabel=f"measured − model [{unit}]")
     below.axhline(0.0, color="black", linewidth=0.5)

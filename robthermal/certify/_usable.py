@@ -120,8 +120,9 @@ def box_bound(question: Question) -> CurrentBound:
     """Largest current with an invariant box inside the stated one, in which the network contracts."""
     c, (_, stays) = _largest_proven(largest_box_current(question), question.certified_box)
     if stays.holds:
-        return CurrentBound(c, stays, "proven", "Up to it a box inside the stated one is never left, for all ambients "
-                            "and heats.")
+        where = ("a box inside the stated one is never left" if question.lower == "inside" else
+                 "a box is never left whose upper ends are inside the stated one (its lower ends may be below)")
+        return CurrentBound(c, stays, "proven", f"Up to it {where}, for all ambients and heats.")
     return CurrentBound(0.0, stays, "proven", "Not even without current is a box inside the stated one proven.")
 
 

@@ -111,7 +111,10 @@ def contraction_bound(question: Question) -> CurrentBound:
     q = question
     limit = largest_current(q.system, temperature=q.temperature, direction=q.direction, method=q.method,
                             parameters=q.parameters)
-    return CurrentBound(limit.current, limit.certificate, "proven", limit.outcome.text)
+    text = ("Up to it any two temperature histories inside the stated box approach each other (norm of method "
+            f"{q.method!r}); that they stay inside is not part of it.")
+    return CurrentBound(limit.current, limit.certificate, "proven", text if limit.certificate.holds else
+                        limit.outcome.text)
 
 
 def largest_box_current(question: Question) -> float:

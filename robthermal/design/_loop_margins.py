@@ -161,7 +161,7 @@ class LoopMargins:
         loop : str
             Name of the module.
         """
-        return plot_bode(self.frequency, *self._curves(loop), self.nominal.margins[loop])
+        return plot_bode(self.frequency, *self._curves(loop), self.nominal.margins[loop], self._color(loop))
 
     def plot_nyquist(self, loop: str, ax: Any = None) -> Any:
         """Plot a loop in the complex plane with the circle of its modulus margin, all corners behind; one axes.
@@ -173,11 +173,14 @@ class LoopMargins:
         ax : matplotlib axes, optional
             Axes to draw into; default new ones.
         """
-        return plot_nyquist(*self._curves(loop), self.worst(loop).modulus, ax)
+        return plot_nyquist(*self._curves(loop), self.worst(loop).modulus, ax, self._color(loop))
 
     def plot(self) -> NDArray[Any]:
         """Plot gain and phase of the first loop; returns two matplotlib axes."""
         return self.plot_bode(self.loops[0])
+
+    def _color(self, loop: str) -> str:
+        return f"C{self.loops.index(loop)}"
 
     def _curves(self, loop: str) -> tuple[np.ndarray, list[np.ndarray]]:
         if loop not in self.loops:

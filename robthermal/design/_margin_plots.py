@@ -15,7 +15,8 @@ from ._modules import Array
 _BEHIND: dict[str, Any] = {"color": "0.75", "linewidth": 0.7, "zorder": 1}
 
 
-def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarray], found: Margins) -> NDArray[Any]:
+def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarray], found: Margins,
+              color: str = "C0") -> NDArray[Any]:
     """Gain and phase, corner plants in gray behind; two matplotlib axes.
 
     Parameters
@@ -28,6 +29,8 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
         Loop transfers of the corner plants.
     found : Margins
         Margins of the nominal plant.
+    color : str, optional
+        Color of the nominal plant, that of its module in other figures.
     """
     from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
@@ -35,8 +38,8 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
     for curve in corners:
         axes[0].loglog(frequency, np.abs(curve), **_BEHIND)
         axes[1].semilogx(frequency, _phase(curve), **_BEHIND)
-    axes[0].loglog(frequency, np.abs(nominal), zorder=2)
-    axes[1].semilogx(frequency, _phase(nominal), zorder=2)
+    axes[0].loglog(frequency, np.abs(nominal), color=color, zorder=2)
+    axes[1].semilogx(frequency, _phase(nominal), color=color, zorder=2)
     axes[0].axhline(1.0, color="k", linewidth=0.8)
     axes[1].axhline(-180.0, color="k", linewidth=0.8)
     if np.isfinite(found.crossover):
@@ -55,7 +58,8 @@ def plot_bode(frequency: Array, nominal: np.ndarray, corners: Sequence[np.ndarra
     return axes
 
 
-def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: float, ax: Any = None) -> Any:
+def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: float, ax: Any = None,
+                 color: str = "C0") -> Any:
     """Loop transfers in the complex plane near -1, with the circle none of them enters; one matplotlib axes.
 
     Parameters
@@ -68,17 +72,19 @@ def plot_nyquist(nominal: np.ndarray, corners: Sequence[np.ndarray], modulus: fl
         Smallest modulus margin, the radius of the circle.
     ax : matplotlib axes, optional
         Axes to draw into; default new ones.
+    color : str, optional
+        Color of the nominal plant, that of its module in other figures.
     """
     ax = axes_for(ax)
     for curve in corners:
         ax.plot(curve.real, curve.imag, **_BEHIND)
-    ax.plot(nominal.real, nominal.imag, zorder=2)
+    ax.plot(nominal.real, nominal.imag, color=color, zorder=2)
     turn = np.linspace(0.0, 2 * np.pi, 200)
     ax.plot(-1 + modulus * np.cos(turn), modulus * np.sin(turn), "k--", linewidth=0.8,
             label=f"modulus margin {modulus:.3g}")
     ax.plot(-1, 0, "k+")
     ax.set(xlim=(-3.0, 1.5), ylim=(-3.0, 1.0), xlabel="Re L [-]", ylabel="Im L [-]", aspect="equal")
-    ax.legend(loc="lower right")
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)  # above the curves, on none of them
     return ax
 
 

@@ -68,7 +68,7 @@ class StepResponseLinearity:
         _, axes = plt.subplots(1, 2, sharey=True, layout="constrained")
         for ax, family, title in zip(axes, (self.plain, self.linearized), ("constant gain", "linearized"), strict=True):
             for step, response in zip(self.steps, family, strict=True):
-                ax.plot(self.time, response[:, 0], label=f"{step:+g} K")
+                ax.plot(self.time, response[:, 0], label=f"{step:+.3g} K")
             ax.set(xlabel="time [s]", title=title)
             ax.legend(title="step")
         axes[0].set_ylabel("normalized response [-]")

@@ -14,11 +14,20 @@ def provenance(files: tuple[Path, ...]) -> Mapping[str, str]:
     return {**versions(), **{f"SHA-256 of {file.name}": file_hash(file) for file in files}}
 
 
-def subtitle(system: System) -> str:
-    """What a machine consists of."""
+def subtitle(system: System, title: str = "") -> str:
+    """What a machine consists of, after its name where the title of the page does not hold it.
+
+    Parameters
+    ----------
+    system : System
+        The machine.
+    title : str, optional
+        Title above it.
+    """
     counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
               "sensor": len(system.sensors)}
-    return f"{system.name}: " + ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
+    parts = ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
+    return parts if system.name in title else f"{system.name}: {parts}"
 
 
 def simulated_label(names: Iterable[str]) -> str:

@@ -15,7 +15,7 @@ from ._traces import thin, time_unit
 
 def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
                            noise: float = 0.0, title: str = "", unit: str = "K", order: Sequence[str] = ()) -> Any:
-    """Draw residuals of the same readings for two models, one below the other and on one scale.
+    """Draw residuals of the same readings for two models, one below the other and on one scale; equal ones once.
 
     Parameters
     ----------
@@ -52,8 +52,9 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
     _check(t, before, after, "residuals_before_after", "sensors")
     scale, shown = time_unit(t)
     with house_style():
-        figure, axes = canvas(4.4, 2, sharex=True, sharey=True)
-        for ax, residuals, what in zip(axes, (before, after), ("before", "after"), strict=True):
+        pairs = _panels(before, after)
+        figure, axes = canvas(0.6 + 1.9 * len(pairs), len(pairs), sharex=True, sharey=True, squeeze=False)
+        for ax, (what, residuals) in zip(axes[:, 0], pairs, strict=True):
             for name, values in residuals.items():
                 color, dashes = look(name, list(residuals), order)
                 ax.plot(*thin(t / scale, np.asarray(values, dtype=float)), color=color, linestyle=dashes, linewidth=0.8,
@@ -62,14 +63,14 @@ def residuals_before_after(time: ArrayLike, before: Mapping[str, ArrayLike], aft
                 ax.axhspan(-2 * noise, 2 * noise, color="#888888", alpha=0.25, linewidth=0)
             ax.set(ylabel=f"measured −\nmodel [{unit}]", title=what)
             ax.margins(x=0.01)
-        legend_above(figure, axes[0].get_lines(), title)
-        axes[-1].set(xlabel=f"time [{shown}]")
+        legend_above(figure, axes[0, 0].get_lines(), title)
+        axes[-1, 0].set(xlabel=f"time [{shown}]")
     return figure
 
 
 def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], *,
                          unit: str, title: str = "", order: Sequence[str] = ()) -> Any:
-    """Draw the size of residuals over frequency for two models, one below the other and on one scale.
+    """Draw the size of residuals over frequency for two models, one below the other and on one scale; equal ones once.
 
     Parameters
     ----------
@@ -103,16 +104,25 @@ def spectra_before_after(frequency: ArrayLike, before: Mapping[str, ArrayLike], 
     f = np.asarray(frequency, dtype=float)
     _check(f, before, after, "spectra_before_after", "channels")
     with house_style():
-        figure, axes = canvas(4.8, 2, sharex=True, sharey=True)
-        for ax, sizes, what in zip(axes, (before, after), ("before", "after"), strict=True):
+        pairs = _panels(before, after)
+        figure, axes = canvas(0.6 + 2.1 * len(pairs), len(pairs), sharex=True, sharey=True, squeeze=False)
+        for ax, (what, sizes) in zip(axes[:, 0], pairs, strict=True):
             for name, values in sizes.items():
                 color, dashes = look(name, list(sizes), order)
                 ax.loglog(f, np.asarray(values, dtype=float), color=color, linestyle=dashes, linewidth=0.8,
                           label=plain(name))
             ax.set(ylabel=f"|measured −\nmodel| [{unit}]", title=what)
-        legend_above(figure, axes[0].get_lines(), title)
-        axes[-1].set(xlabel="frequency [Hz]")
+        legend_above(figure, axes[0, 0].get_lines(), title)
+        axes[-1, 0].set(xlabel="frequency [Hz]")
     return figure
+
+
+def _panels(before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike]
+            ) -> list[tuple[str, Mapping[str, ArrayLike]]]:
+    """Titles and curves of the panels: one, without a title, where the model did not change."""
+    if all(np.array_equal(np.asarray(before[name]), np.asarray(after[name])) for name in before):
+        return [("", before)]
+    return [("before", before), ("after", after)]
 
 
 def _check(x: Any, before: Mapping[str, ArrayLike], after: Mapping[str, ArrayLike], where: str, what: str) -> None:

@@ -13,7 +13,7 @@ from ..errors import InputError
 BOUNDS = ("contraction", "invariance", "runaway", "rating")
 MEANINGS = {
     "contraction": "contraction limit inside the box; not a limit for use",
-    "invariance": "largest current with a certified box, inside the stated one, that is never left",
+    "invariance": "largest current with a certified box that is never left",
     "runaway": "runaway limit I* of the network",
     "rating": "declared rating",
 }
@@ -133,6 +133,18 @@ class UsableRange:
             return "nothing is certified"
         size = rounded_down(self.current)
         return {"cooling": f"0 to {size} A", "heating": f"-{size} to 0 A"}.get(self.direction, f"-{size} to {size} A")
+
+    @property
+    def how_sure(self) -> str:
+        """What of it is proven, and what is computed or declared; empty where no bound applies or nothing is certified.
+        """
+        limit = self.bound(self.limited_by) if self.limited_by else None
+        if limit is None or not self.current:
+            return ""
+        kept = "Certified for this model: no lump leaves its range in the box" if self.certified else ""
+        beyond = {"computed": "the limit itself is computed, not proven", "declared": "the limit itself is declared"}
+        parts = [part for part in (kept, beyond.get(limit.basis, "")) if part]
+        return f"{parts[0][0].upper()}{'; '.join(parts)[1:]}." if parts else ""
 
     def bound(self, name: str) -> Bound | None:
         """The bound of this name.

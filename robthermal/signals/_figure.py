@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from .._drawing import line_of
+from .._drawing import line_of, size_of
 
 if TYPE_CHECKING:
     from ._record import Record
@@ -21,7 +21,7 @@ def draw(record: Record) -> NDArray[Any]:
 
     panels = _panels(record)
     figure, grid = plt.subplots(len(panels), 1, sharex=True, layout="constrained", squeeze=False,
-                                figsize=(6.4, max(4.8, 2.0 * len(panels))))
+                                figsize=size_of(max(4.8, 2.0 * len(panels))))
     axes: NDArray[Any] = grid[:, 0]
     for axis, (kind, unit, names) in zip(axes, panels, strict=True):
         own = record.input_names if kind == "inputs" else record.output_names

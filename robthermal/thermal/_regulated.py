@@ -60,7 +60,9 @@ class LoadCurve:
         stable = self.slowest < 0
         for name, current, load in zip(self.setpoint, self.current.T, self.load.T, strict=True):
             line = ax.plot(current, np.where(stable, load, np.nan), label=f"{name}, stable")[0]
-            ax.plot(current, np.where(stable, np.nan, load), "--", color=line.get_color(), label=f"{name}, runs away")
+            if not stable[:-1].all():  # up to its last point, the fold, a curve may be stable
+                ax.plot(current, np.where(stable, np.nan, load), "--", color=line.get_color(),
+                        label=f"{name}, runs away")
         ax.set(xlabel="current [A]", ylabel="load taken at the set-point [W]", title="load curve")
         ax.legend()
         return ax

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ..._control import control
+from ..._drawing import size_of
 from ...errors import InputError
 from ...signals import Record
 from ..evaluation import Filters
@@ -91,7 +92,7 @@ class Simulation:
         if self.samples:
             rows += [("moving\naverage [nm]", self.ma_before, self.ma_after),
                      ("moving standard\ndeviation [nm]", self.msd_before, self.msd_after)]
-        axes: Any = plt.subplots(len(rows), 1, sharex=True, squeeze=False, figsize=(7, 2 * len(rows)),
+        axes: Any = plt.subplots(len(rows), 1, sharex=True, squeeze=False, figsize=size_of(2.0 * len(rows)),
                                  layout="constrained")[1][:, 0]
         switched = self.time[1:][self.on[1:] != self.on[:-1]]
         for ax, (name, before, after) in zip(axes, rows, strict=True):

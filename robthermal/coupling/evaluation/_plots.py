@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._drawing import size_of
 from ...errors import InputError
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def draw(found: Spectra, panels: Sequence[str]) -> Any:
     unknown = [name for name in panels if name not in _PANELS]
     if unknown or not panels:
         raise InputError(f"panels = {list(panels)!r}", where="plot", expected=f"some of {', '.join(_PANELS)}")
-    axes: Any = plt.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=(7, 2.6 * len(panels)),
+    axes: Any = plt.subplots(len(panels), 1, sharex=True, squeeze=False, figsize=size_of(2.6 * len(panels)),
                              layout="constrained")[1][:, 0]
     for ax, name in zip(axes, panels, strict=True):
         _PANELS[name](ax, found)

@@ -125,11 +125,10 @@ class Uncertainty:
             if np.any(self.envelope[row, column]):
                 ax.loglog(self.omega / (2 * np.pi), np.abs(self.samples[:, row, column]).T, color="0.7", linewidth=0.8)
                 ax.loglog(self.omega / (2 * np.pi), self.envelope[row, column], color="k")
-            else:
+                ax.set(xlabel="frequency [Hz]", ylabel="magnitude [-]", title=f"Δp {row + 1}{column + 1}")
+            else:  # the entry is zero in every sample: no curve
                 ax.set_axis_off()
-            ax.set_title(f"Δp {row + 1}{column + 1}")
-            ax.set_ylabel("magnitude [-]")
-            ax.set_xlabel("frequency [Hz]")
+                ax.text(0.5, 0.5, f"Δp {row + 1}{column + 1} = 0", transform=ax.transAxes, ha="center", va="center")
         return axes
 
 

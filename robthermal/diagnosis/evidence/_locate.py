@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._celsius import ZERO_CELSIUS
+from ..._digits import in_table
 from ..._drawing import axes_for
+from ...thermal import System
 from ..fit import Refit
 from ._adequacy import adequacy, spline_tests
 
@@ -100,17 +103,30 @@ def _conditions(fit: Refit) -> tuple[str, ...]:
         return ()
     sizes = [np.mean(z**2, axis=1) for z, _ in fit.record_innovations]
     out = [_worst("time [s]", [path.time for path in paths], sizes)]
-    for column, name in enumerate(fit.system.exogenous_names):
+    for column, (name, unit) in enumerate(_driving_units(fit.system).items()):
         values = [path.u[:, column] for path in paths]
         if np.ptp(np.concatenate(values)) > 0:
-            out.append(_worst(name, values, sizes))
+            out.append(_worst(*_shown(fit.system, name, unit, values), sizes))
     for name in dict.fromkeys(name for path in paths for name in path.one.sensors):
         kept = [(path.one.readings[:, path.one.sensors.index(name)], size) for path, size in
                 zip(paths, sizes, strict=True) if name in path.one.sensors]
-        unit = fit.system.sensors[name].unit
-        out.append(_worst(f"{name} [{unit}]", [value for value, _ in kept], [size for _, size in kept]))
+        read = _shown(fit.system, name, fit.system.sensors[name].unit, [value for value, _ in kept])
+        out.append(_worst(*read, [size for _, size in kept]))
     out.append(_frequency(fit))
     return tuple(out)
+
+
+def _driving_units(system: System) -> dict[str, str]:
+    """Unit of everything that drives the system."""
+    return {name: system.input_units.get(name) or "W" if name in system.inputs else "A" if name in system.modules else
+            "K" for name in system.exogenous_names}
+
+
+def _shown(system: System, name: str, unit: str, values: list[Array]) -> tuple[str, list[Array]]:
+    """Name with its unit, and the values in it: temperatures as in the file of the system."""
+    if unit == "K" and system.temperature_unit == "degC":
+        return f"{name} [°C]", [value - ZERO_CELSIUS for value in values]
+    return f"{name} [{unit}]", values
 
 
 def _bands(fit: Refit) -> list[str]:
@@ -125,7 +141,7 @@ def _worst(what: str, values: list[Array], sizes: list[Array]) -> str:
     means = [float(size[place == b].mean()) if np.any(place == b) else 0.0 for b in range(max(len(edges) - 1, 1))]
     worst = int(np.argmax(means))
     return (f"{what}: largest between {edges[worst]:.5g} and {edges[min(worst + 1, len(edges) - 1)]:.5g}, "
-            f"{means[worst]:.3g} times the noise power there")
+            f"{in_table(means[worst], 3)} times the noise power there")
 
 
 def _frequency(fit: Refit) -> str:
@@ -139,4 +155,4 @@ def _frequency(fit: Refit) -> str:
             if inside.any():
                 power.append((float(spectrum[inside].mean()), float(low), float(high)))
     most, low, high = max(power)
-    return f"frequency [Hz]: largest between {low:.3g} and {high:.3g}, {most:.3g} times the noise power there"
+    return f"frequency [Hz]: largest between {low:.3g} and {high:.3g}, {in_table(most, 3)} times the noise power there"

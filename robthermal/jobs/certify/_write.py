@@ -55,7 +55,7 @@ def certification_report(result: Certification, files: tuple[Path, ...]) -> Repo
     files : tuple of Path
         Input files, for their hashes.
     """
-    return Report(title=result.system.name, subtitle=subtitle(result.system),
+    return Report(title=result.system.name, subtitle=subtitle(result.system, result.system.name),
                   label=simulated_label([result.system.name, *(file.name for file in files)]),
                   claims=required_claims(result.checked, stays_usable(result)),
                   sections=tuple(certification_sections(result)), first=(network_section(result.system),),

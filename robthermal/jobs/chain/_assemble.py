@@ -49,7 +49,7 @@ def assemble(context: Context, stages: Sequence[Stage], system: System) -> Repor
     data = _data(context, facts)
     certified = context.finished.get("certify")
     return Report(
-        title=project.name, subtitle=subtitle(system), label=project.label,
+        title=project.name, subtitle=subtitle(system, project.name), label=project.label,
         claims=tuple(claim for _, report in parts for claim in report.claims),
         sections=(input_section(project, data["imports"]), replace(network_section(system), chapter="Inputs"),
                   *_sections(context.finished, stages)),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from math import log
 from typing import Any
 
@@ -36,6 +37,7 @@ _WITHOUT_MODULES = {
            "within theirs.",
 }
 NO_RUNAWAY = " Together with the claim that the box is never left: no thermal runaway from there."
+_ROW_OF_MAP = re.compile(r"map_(\d+)_(never_left|contraction)")
 _HOW = {
     "contraction": "One norm in which the Jacobian contracts everywhere in the box; re-derived in ball arithmetic.",
     "invariance": "On every face of the box the heat flows inwards (Nagumo); re-derived in ball arithmetic.",
@@ -70,7 +72,11 @@ def claim_of(file: str, certificate: Certificate, verdict: Verdict | None, *, ti
         return _of_synthesis(file, certificate, verdict, seconds)
     ranges = stem.endswith(_ENDING)
     key = stem.removesuffix(_ENDING)
+    row = _ROW_OF_MAP.fullmatch(key)
     titles = _TITLES.get(key, (key.replace("_", " ").capitalize(),))
+    if row:
+        key = "box" if row[2] == "never_left" else "box_contraction"
+        titles = (f"Condition {row[1]}: {_TITLES[key][0][0].lower()}{_TITLES[key][0][1:]}",)
     good = certificate.holds and verdict is not None and verdict.valid
     reason = certificate.reason if not certificate.holds else "" if good else verdict.reason if verdict else (
         "not verified")
@@ -110,7 +116,7 @@ def box_of(certificate: Certificate) -> str:
     """Ranges of a claim, separated by semicolons: never wider than they are, of a box that is kept never narrower.
     """
     region = certificate.region
-    parts = [f"{name}: {inward(*pair)} A" for name, pair in _pairs(region, "current")]
+    parts = [f"{name}: {_range(pair)} A" for name, pair in _pairs(region, "current")]
     box = region.get("temperature")
     if isinstance(box, Mapping):
         ends = [float(value) - ZERO_CELSIUS for pair in box.values() for value in pair]
@@ -119,17 +125,23 @@ def box_of(certificate: Certificate) -> str:
     elif isinstance(box, (list, tuple)):
         parts.append(f"all lumps {_celsius(box)} °C")
     parts += [f"{name}: {_celsius(pair)} °C" for name, pair in _pairs(region, "ambient")]
-    parts += [f"heat into {name}: {inward(*pair)} W" for name, pair in _pairs(region, "heat")]
-    uncertain = [f"{name} {inward(*pair)}" for name, pair in _pairs(region, "parameters")]
+    parts += [f"heat into {name}: {_range(pair)} W" for name, pair in _pairs(region, "heat")]
+    uncertain = [f"{name} {_range(pair)}" for name, pair in _pairs(region, "parameters")]
     if uncertain:
         listed = f": {', '.join(uncertain)}" if len(uncertain) <= _LISTED else ", as the file states them"
-        parts.append(f"{len(uncertain)} parameter{'s' * (len(uncertain) > 1)} in their ranges{listed}")
+        parts.append(f"{len(uncertain)} parameters in their ranges{listed}" if len(uncertain) > 1 else
+                     f"1 parameter in its range{listed}")
     return "; ".join(parts)
 
 
 def _celsius(pair: Any) -> str:
-    low, high = (float(end) - ZERO_CELSIUS for end in pair)
-    return inward(low, high)
+    return _range([float(end) - ZERO_CELSIUS for end in pair])
+
+
+def _range(pair: Sequence[float]) -> str:
+    """Ends rounded inward; one number to the nearest where they are equal."""
+    low, high = pair
+    return f"{float(low):.6g}" if low == high else inward(low, high)
 
 
 def _pairs(region: Mapping[str, Any], key: str) -> list[tuple[str, Any]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._drawing import size_of
 from ...coupling import Simulation, Spectra, Uncertainty
 from ...report import Figure, house_style
 
@@ -65,7 +66,8 @@ def envelope_figure(uncertainty: Uncertainty) -> Figure:
     entries.sort()
     hertz = uncertainty.omega / (2 * np.pi)
     with house_style():
-        axes: Any = plt.subplots(len(entries), 1, sharex=True, squeeze=False, figsize=(7, 2.2 * len(entries)))[1][:, 0]
+        axes: Any = plt.subplots(len(entries), 1, sharex=True, squeeze=False,
+                                 figsize=size_of(2.2 * len(entries)))[1][:, 0]
         for ax, (row, column) in zip(axes, entries, strict=True):
             lines = ax.plot(hertz, np.abs(uncertainty.samples[:, row, column]).T, color="#888888", linewidth=0.8)
             lines[0].set_label("measured plants")

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._pandas import pd
 from ...report import Figure, Section, Table, house_style
+from ...thermal import parameter_label
 from ._design import ControllerDesign
 
 
@@ -39,7 +40,8 @@ def _worst(result: ControllerDesign) -> tuple[Table, ...]:
     """Parameters of the plant with the smallest modulus margin of every loop."""
     if not result.margins.corners:
         return ()
-    rows: list[dict[str, Any]] = [{"loop": loop, "parameter": name, "value": value} for loop in result.margins.loops
+    rows: list[dict[str, Any]] = [{"loop": loop, "parameter": name, "quantity": parameter_label(name),
+                                   "value": value} for loop in result.margins.loops
                                   for name, value in result.margins.worst_plant(loop).corner.items()]
     return (Table(pd.DataFrame(rows), "Plant with the smallest modulus margin."),) if rows else ()
 
@@ -48,7 +50,11 @@ def _bode(result: ControllerDesign, loop: str) -> Figure:
     with house_style():
         axes = result.margins.plot_bode(loop)
         return Figure.draw(axes[0].figure, alt=f"Gain and phase of the loop of {loop} over frequency, with margins.",
-                           caption=f"Loop of {loop}: nominal plant, with its margins; corner plants gray.")
+                           caption=f"Loop of {loop}: nominal plant, with its margins{_behind(result)}.")
+
+
+def _behind(result: ControllerDesign) -> str:
+    return "; corner plants gray, behind it" if result.margins.corners else ""
 
 
 def _nyquist(result: ControllerDesign, loop: str) -> Figure:

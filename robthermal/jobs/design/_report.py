@@ -86,7 +86,7 @@ def design_report(result: ControllerDesign, files: tuple[Path, ...]) -> Report:
         Input files, for their hashes.
     """
     system = result.certification.system
-    return Report(title=f"Controller for {system.name}", subtitle=subtitle(system),
+    return Report(title=f"Controller for {system.name}", subtitle=subtitle(system, system.name),
                   label=simulated_label([system.name, *(file.name for file in files)]),
                   kind="Controller design report",
                   claims=required_claims(result.certification.checked), sections=tuple(_sections(result)),

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..._drawing import size_of
 from ..._pandas import pd
 from ...diagnosis import Compared, Diagnosis
 from ...report import Figure, Section, Table, house_style
@@ -42,7 +43,7 @@ def _drawn(compared: Compared) -> Any:
     from matplotlib import pyplot as plt  # heavy, only when a picture is wanted
 
     names = list(compared.scatter)
-    _, ax = plt.subplots(figsize=(7.0, 1.2 + 0.35 * len(names)), layout="constrained")
+    _, ax = plt.subplots(figsize=size_of(1.2 + 0.35 * len(names)), layout="constrained")
     place = np.arange(len(names))
     ax.barh(place, [400 * compared.scatter[name] for name in names], left=[-200 * compared.scatter[name] for name in
                                                                          names], color="0.85", height=0.6)

@@ -81,7 +81,7 @@ def diagnosis_report(result: Diagnosed) -> Report:
     """
     found = result.diagnosis
     remarks = tuple(_remarks(found))
-    return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system),
+    return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system, found.system.name),
                   label=simulated_label([found.system.name, *(one.name for one in result.residuals),
                                          *(file.name for file in result.files)]),
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
@@ -209,6 +209,9 @@ def _gap_section(result: Diagnosed) -> Section:
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
             "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
             "records have gains of their own, those, from the whole record).")
+    if not (found.effects or found.provisional):
+        text = text.replace("After: with the effects. Both models run free",
+                            "After: the same, for no effect was added. It runs free")
     if found.reference is not None:
         text = ("Before: the model fitted to the reference records. After: with the change. Initial temperatures, and "
                 "ambients that a record does not hold, are refitted in both.")

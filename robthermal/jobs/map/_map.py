@@ -183,7 +183,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
         for key, title, certificate in (("never_left", f"Box with {box.current:.4g} A is never left", box.invariance),
                                         ("contraction", f"Contraction with {box.current:.4g} A", box.contraction)))
     data = in_unit(result.data, system.temperature_unit)
-    report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system),
+    report = Report(title=f"Current limits of {system.name}", subtitle=subtitle(system, system.name),
                     label=simulated_label([system.name, *(file.name for file in files)]),
                     claims=required_claims(checked), sections=(), first=(_section(result, data),),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),

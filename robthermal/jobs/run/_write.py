@@ -62,7 +62,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
         sections.append(parameter_section(result.fit, certified.parameters))
     sections.extend(certification_sections(certified))
     first = (first_section(result.comparisons, result.misfits, order),) if result.misfits else ()
-    report = Report(title=project.name, subtitle=subtitle(result.system), label=project.label,
+    report = Report(title=project.name, subtitle=subtitle(result.system, project.name), label=project.label,
                     claims=required_claims(certified.checked, stays_usable(certified)), sections=tuple(sections),
                     provenance=provenance(project.files), generated=now(),
                     assumptions=machine_assumptions(result.system, certified.parameters is not None),
