@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import takewhile
 from pathlib import Path
 
 from ..report import file_hash, versions
 from ..thermal import System
+from .request import Project
+
+_HEAD = 8192  # bytes in which a comment is looked for
 
 
 def provenance(files: tuple[Path, ...]) -> Mapping[str, str]:
@@ -30,18 +34,46 @@ def subtitle(system: System, title: str = "") -> str:
     return parts if system.name in title else f"{system.name}: {parts}"
 
 
-def simulated_label(names: Iterable[str]) -> str:
-    """Banner of a report whose system, records or files are called simulated; empty for any other.
+def simulated_label(names: Iterable[str], files: Iterable[Path] = ()) -> str:
+    """Banner of a report whose system, records or files are called simulated, or say so; empty for any other.
 
     Parameters
     ----------
     names : iterable of str
         What the system, its records and the files are called.
+    files : iterable of Path, optional
+        Measured files. A comment before the header of a text file that begins with "simulated" says that it is.
 
     Examples
     --------
     >>> simulated_label(["plate", "simulated.csv"]), simulated_label(["plate", "friday.csv"])
     ('SIMULATED DATA: simulated.csv', '')
     """
-    said = [name for name in dict.fromkeys(names) if "simulated" in name.lower()]
-    return f"SIMULATED DATA: {', '.join(said)}" if said else ""
+    said = [name for name in names if "simulated" in name.lower()]
+    said += [file.name for file in files if _says_simulated(file)]
+    return f"SIMULATED DATA: {', '.join(dict.fromkeys(said))}" if said else ""
+
+
+def _says_simulated(file: Path) -> bool:
+    """Whether a comment in the head of a text file begins with the word."""
+    if file.suffix.lower() == ".toml" or not file.is_file():
+        return False
+    with file.open("rb") as stream:
+        head = stream.read(_HEAD)
+    lines = [line.strip() for line in head.decode("latin-1").splitlines()]
+    comments = takewhile(lambda line: not line or line.startswith("#"), lines)
+    return any(line.strip("#;,\"' \t").lower().startswith("simulated") for line in comments)
+
+
+def project_label(project: Project) -> str:
+    """Banner of a project: its label, and that its records are simulated where a name or a file says so.
+
+    Parameters
+    ----------
+    project : Project
+        What is asked for.
+    """
+    records = [*project.train, *project.validation, *(path for one in project.identify for path in one.records)]
+    said = "" if "simulated" in project.label.lower() else simulated_label(
+        [project.name, project.system.name, *(path.name for path in records)], records)
+    return "; ".join(filter(None, (project.label, said)))

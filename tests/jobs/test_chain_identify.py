@@ -53,6 +53,18 @@ def write_loop(folder: Path, excitation: np.ndarray, extra: str = "", reference:
     return folder / "project.toml"
 
 
+@pytest.mark.filterwarnings("ignore:.*split")
+def test_the_import_report_says_that_the_reference_is_read(tmp_path: Path) -> None:
+    project = rt.jobs.read_project(write_loop(tmp_path, 4.0 * np.random.default_rng(8).standard_normal(N)))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        report = rt.jobs.run_project(project, tmp_path / "out", only=["identify"])
+    assert not [one for one in said if "not read" in str(one.message)]
+    (imported,) = report.data["imports"]
+    roles = {column["column"]: (column["role"], column["name"]) for column in imported["columns"]}
+    assert roles["dither [%]"] == ("input", "dither") and roles["T [°C]"] == ("sensor", "T")
+
+
 def identified(project: Path) -> rt.identify.FrequencyResponse:
     rt.jobs.run_project(rt.jobs.read_project(project), project.parent / "out", only=["identify"])
     return rt.identify.read_response(project.parent / "out" / "responses" / "loop.json")

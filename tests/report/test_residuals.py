@@ -17,6 +17,13 @@ def test_both_panels_show_their_own_residuals_on_one_scale() -> None:
     assert before.get_ylim() == after.get_ylim()
 
 
+def test_a_model_that_did_not_change_is_drawn_once() -> None:
+    same = {"T": [1.0, 2.0]}
+    assert len(rt.report.residuals_before_after([0.0, 1.0], same, {"T": [1.0, 2.0]}).axes) == 1
+    assert len(rt.report.residuals_before_after([0.0, 1.0], same, {"T": [1.0, 2.1]}).axes) == 2
+    assert len(rt.report.spectra_before_after([0.1, 0.2], same, same, unit="K").axes) == 1
+
+
 @pytest.mark.parametrize(("before", "after"), [({}, {}), ({"T": [1.0, 2.0]}, {"U": [1.0, 2.0]}),
                                                ({"T": [1.0, 2.0]}, {"T": [1.0]})])
 def test_what_does_not_fit_together_is_refused(before: dict, after: dict) -> None:

@@ -111,6 +111,20 @@ def test_usable_current_is_the_smallest_bound_rounded_down(tmp_path: Path) -> No
     assert "0 to 1.211\u00a0A" in first and "5.267" not in first and "not a limit for use" in rest
 
 
+def test_the_first_screen_says_what_of_the_usable_current_is_proven(tmp_path: Path) -> None:
+    runaway, box = Bound("runaway", 1.4, "computed"), Bound("invariance", 1.2, "proven", file="certificates/box.json")
+    kept = "Certified for this model: no lump leaves its range in the box"
+    rows = {f"{kept}; the limit itself is computed, not proven.": ([runaway], 1.4),
+            f"{kept}; the limit itself is declared.": ([Bound("rating", 1.1, "declared"), box], 1.1),
+            f"{kept}.": ([box, runaway], 1.2), "The limit itself is computed, not proven.": ([runaway], None),
+            "": ([box], 0.0)}
+    for said, (bounds, certified) in rows.items():
+        row = UsableRange("cooling", "nominal", ("m1",), bounds, certified)
+        assert row.how_sure == said
+        page = write_html(replace(BARE, usable=(row,)), tmp_path / "r.html").read_text(encoding="utf-8")
+        assert (f'<p class="sure">{said}</p>' in page.partition('id="contents"')[0]) == bool(said)
+
+
 @pytest.mark.parametrize("bad", [{"name": "luck"}, {"current": -1.0}, {"current": float("nan")},
                                  {"current": float("inf")}])
 def test_bounds_are_checked(bad: dict[str, object]) -> None:

@@ -27,6 +27,14 @@ def test_fold_of_one_module_is_the_root_of_the_cubic(g, published):
     assert (curve.current[-1, 0], curve.load[-1, 0]) == pytest.approx(published, rel=0.02, abs=0.02)
 
 
+def test_only_a_part_that_is_drawn_has_a_name():
+    """Up to its fold a load curve is stable: the legend names nothing else."""
+    drawn = rt.thermal.fold(single(), {"m": 278.0}).plot()
+    assert [text.get_text() for text in drawn.get_legend().get_texts()] == ["m, stable"]
+    beyond = rt.thermal.load_curve(single(), {"m": 278.0}, np.linspace(0.0, 6.0, 40)[:, None]).plot()
+    assert [text.get_text() for text in beyond.get_legend().get_texts()] == ["m, stable", "m, runs away"]
+
+
 def test_load_is_stationary_at_the_fold():
     curve = rt.thermal.load_curve(single(), {"m": 278.0}, np.linspace(1.2, 1.8, 601))
     top = curve.load[:, 0].argmax()

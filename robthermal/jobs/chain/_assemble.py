@@ -12,7 +12,7 @@ from ..claims import ARITHMETIC, GateCode
 from ..evidence import checker
 from ..network import NETWORK, network_section
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import project_label, provenance, subtitle
 from ..request import Project
 from ..run import DataFacts, applied, data_reasons, misfit_table, residual_table
 from ._context import Context, Finished
@@ -42,14 +42,14 @@ def assemble(context: Context, stages: Sequence[Stage], system: System) -> Repor
         The certified system, or the nominal one.
     """
     project, parts = context.project, [(name, one.report) for name, one in context.finished.items()]
-    facts = _judged(facts_of(context), project)
-    reasons = [*data_reasons(facts, diagnosis_of(context), f"{project.label} {project.name}"),
+    facts, label = _judged(facts_of(context), project), project_label(project)
+    reasons = [*data_reasons(facts, diagnosis_of(context), f"{label} {project.name}"),
                *(reason for _, report in parts for reason in report.gate)]
     common = _common([report for _, report in parts])
     data = _data(context, facts)
     certified = context.finished.get("certify")
     return Report(
-        title=project.name, subtitle=subtitle(system, project.name), label=project.label,
+        title=project.name, subtitle=subtitle(system, project.name), label=label,
         claims=tuple(claim for _, report in parts for claim in report.claims),
         sections=(input_section(project, data["imports"]), replace(network_section(system), chapter="Inputs"),
                   *_sections(context.finished, stages)),

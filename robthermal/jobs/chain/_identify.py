@@ -14,7 +14,7 @@ from ...identify import FrequencyResponse, IdentifyCode
 from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
 from .._outcomes import JobsCode
-from ..measured import estimate_response, import_reports
+from ..measured import estimate_response, import_report_beside
 from ..request import Identification, Project
 from ._context import Context, StageJob, read_files_key
 from ._measured import RESPONSES
@@ -47,8 +47,10 @@ def _run(context: Context, folder: Path) -> Report:
         reasons += [Reason("remark", remark.code, "identify", one.name, f"{one.name}: {remark.text}")
                     for remark in found.remarks]
         reasons += _left_out(one.name, found)
-        imports += [report.to_dict() for path in one.records
-                    for report in import_reports([path], model, tables=project.reading.get(path, ()))]
+        beside = list(one.options.instruments.values()) or one.reference
+        imports += [import_report_beside(path, model, project.reading.get(path, ()), inputs=one.options.inputs,
+                                         outputs=one.options.outputs, beside=beside).to_dict()
+                    for path in one.records]
     return part("identify", sections, gate=reasons, data={"identify": tables, "imports": imports})
 
 

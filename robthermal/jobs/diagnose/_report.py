@@ -83,7 +83,7 @@ def diagnosis_report(result: Diagnosed) -> Report:
     remarks = tuple(_remarks(found))
     return Report(title=f"Diagnosis of {found.system.name}", subtitle=subtitle(found.system, found.system.name),
                   label=simulated_label([found.system.name, *(one.name for one in result.residuals),
-                                         *(file.name for file in result.files)]),
+                                         *(file.name for file in result.files)], result.files),
                   claims=tuple(diagnosis_claims(result)), sections=tuple(_sections(result)), first=(_first(result),),
                   provenance=provenance(result.files), assumptions=tuple(diagnosis_assumptions(found)),
                   generated=now(), answer=found.verdict.upper(), headline=answer_sentence(found),

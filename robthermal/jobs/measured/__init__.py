@@ -9,9 +9,10 @@ from ._import import ReadTable as ReadTable
 from ._import import import_reports as import_reports
 from ._import import read_files as read_files
 from ._import import reading_from_text as reading_from_text
+from ._reference import import_report_beside as import_report_beside
 from ._reference import instruments_from_text as instruments_from_text
 from ._reference import noise_from_text as noise_from_text
 
-__all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_reports",
-           "instruments_from_text", "noise_from_text", "read_files", "read_measured", "reading_from_text",
-           "write_excitation"]
+__all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_report_beside",
+           "import_reports", "instruments_from_text", "noise_from_text", "read_files", "read_measured",
+           "reading_from_text", "write_excitation"]

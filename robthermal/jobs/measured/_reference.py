@@ -6,15 +6,17 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...identify import FrequencyResponse, closed_loop, errors_in_variables
-from ...signals import Record, read_records
+from ...signals import Import, Record, read_records
+from ...thermal import System
 from ._import import ReadTable
 
 Array = NDArray[np.float64]
@@ -46,6 +48,55 @@ def _without(note: str, names: Sequence[str]) -> str:
         return note
     left = [one for one in columns.split(", ") if re.sub(r"\s*[\[(].*", "", one.strip("'\"")) not in names]
     return f"{file}{unknown}{', '.join(left)}" if left else ""
+
+
+def import_report_beside(path: Path, system: System | None, tables: Sequence[ReadTable], *, inputs: Sequence[str],
+                         outputs: Sequence[str], beside: Sequence[str]) -> Import:
+    """How a file of a response was read: the columns of the plant, and those that are read beside it.
+
+    Parameters
+    ----------
+    path : Path
+        Measured file.
+    system : System or None
+        Names the columns of the plant; None: `inputs` and `outputs` are all of them.
+    tables : sequence
+        How the file is read.
+    inputs, outputs : sequence of str
+        Columns of the plant, where there is no system.
+    beside : sequence of str
+        Columns of a reference, or of second instruments.
+
+    Returns
+    -------
+    Import
+
+    Raises
+    ------
+    InputError
+        As `rt.read_records`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import robthermal as rt
+    >>> _ = Path("loop.csv").write_text("time,u,y,r\\n0,1,20,1\\n1,2,21,2\\n2,3,22,3\\n3,3,22,2\\n4,2,23,1\\n")
+    >>> found = import_report_beside(Path("loop.csv"), None, (), inputs=["u"], outputs=["y"], beside=["r"])
+    >>> [(column.column, column.role) for column in found.columns]
+    [('time', 'time'), ('u', 'input'), ('y', 'sensor'), ('r', 'input')]
+    """
+    plant: dict[str, Any] = {"system": system} if system is not None else {"inputs": inputs, "outputs": outputs}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # estimating the response has said all of it
+        report = _import_of(read_records(path, tables=tables, **plant))
+        also = {one.column: one for one in _import_of(read_records(path, inputs=list(beside), tables=tables)).columns
+                if one.name in beside} if beside else {}
+    return replace(report, columns=tuple(also.get(one.column, one) if one.role == "unused" else one
+                                         for one in report.columns))
+
+
+def _import_of(parts: Sequence[Record]) -> Import:
+    return cast(Import, parts[0].imported)  # of a file there always is one
 
 
 def with_reference(path: Path, records: Sequence[Record], names: Sequence[str],

@@ -11,6 +11,7 @@ from ..._celsius import ZERO_CELSIUS
 from ...report import Reason
 from ..certify import certification_reasons, remark
 from ..claims import Certification, GateCode
+from ..provenance import project_label
 from ..request import Gate
 from ._facts import DataFacts, DiagnosisFacts, data_facts, diagnosis_facts
 from ._misfit import Misfit
@@ -31,7 +32,7 @@ def gate_reasons(result: JobResult) -> tuple[Reason, ...]:
     """
     facts = data_facts(result.system, result.comparisons, result.misfits, fit=result.fit)
     diagnosed = diagnosis_facts(result.diagnosis.diagnosis) if result.diagnosis else None
-    label = f"{result.project.label} {result.project.name}"
+    label = f"{project_label(result.project)} {result.project.name}"
     found = [*data_reasons(facts, diagnosed, label), *claim_reasons(result.certification, result.doubted, facts)]
     return applied(found, result.project.gate)
 

@@ -12,7 +12,7 @@ from ..evidence import write_certification
 from ..folder import output_folder
 from ..network import network_section
 from ..now import now
-from ..provenance import provenance, subtitle
+from ..provenance import project_label, provenance, subtitle
 from ..request import write_calibrated
 from ._gate import GATES
 from ._result import JobResult
@@ -62,7 +62,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
         sections.append(parameter_section(result.fit, certified.parameters))
     sections.extend(certification_sections(certified))
     first = (first_section(result.comparisons, result.misfits, order),) if result.misfits else ()
-    report = Report(title=project.name, subtitle=subtitle(result.system, project.name), label=project.label,
+    report = Report(title=project.name, subtitle=subtitle(result.system, project.name), label=project_label(project),
                     claims=required_claims(certified.checked, stays_usable(certified)), sections=tuple(sections),
                     provenance=provenance(project.files), generated=now(),
                     assumptions=machine_assumptions(result.system, certified.parameters is not None),
