@@ -17,6 +17,7 @@ except metadata.PackageNotFoundError:  # built straight from a checkout
 extensions = [
     "sphinx.ext.autodoc",
     "mathml",
+    "corners",
     "sphinx.ext.viewcode",
     "numpydoc",
     "myst_nb",
@@ -46,6 +47,7 @@ numpydoc_show_class_members = False  # autodoc lists them; tests/test_project.py
 html_theme = "pydata_sphinx_theme"
 html_title = "robthermal"
 html_show_sourcelink = False
+templates_path = ["_templates"]
 html_static_path = ["_static"]
 html_css_files = ["robthermal.css"]
 html_theme_options = {

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from axe import needs_axe, violations
+from browser import browser
 from sphinx.util.inventory import InventoryFile
 
 import robthermal as rt
@@ -46,6 +48,21 @@ def test_every_public_name_is_on_a_page(built: Path) -> None:
         for name in getattr(import_module(f"robthermal.{package}"), "__all__", ["InputError", "Diverged", "Outcome"])
     }
     assert not public - on_a_page
+
+
+@pytest.mark.exhaustive
+@needs_axe
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (1280, True), (390, False)])
+def test_axe_finds_nothing_on_any_kind_of_page(built: Path, width: int, dark: bool) -> None:
+    kinds = ("index", "start", "command_line", "comparison", "genindex", "search", "api/index", "api/thermal",
+             "tutorials/index", f"tutorials/{SHOWN}", "explanations/limits", "explanations/steady_state",
+             "reference/certificate_format", "_modules/index")
+    with browser() as page:
+        found = {}
+        for kind in kinds:
+            page.show(built / f"{kind}.html", width=width, dark=dark)
+            found[kind] = violations(page)
+    assert found == dict.fromkeys(kinds, [])
 
 
 @pytest.mark.exhaustive

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ..report import file_hash, versions
 from ..thermal import System
-from .request import Project
 
 _HEAD = 8192  # bytes in which a comment is looked for
 
@@ -24,7 +23,7 @@ def subtitle(system: System, title: str = "") -> str:
     Parameters
     ----------
     system : System
-        The machine.
+        Machine of the report.
     title : str, optional
         Title above it.
     """
@@ -63,17 +62,3 @@ def _says_simulated(file: Path) -> bool:
     lines = [line.strip() for line in head.decode("latin-1").splitlines()]
     comments = takewhile(lambda line: not line or line.startswith("#"), lines)
     return any(line.strip("#;,\"' \t").lower().startswith("simulated") for line in comments)
-
-
-def project_label(project: Project) -> str:
-    """Banner of a project: its label, and that its records are simulated where a name or a file says so.
-
-    Parameters
-    ----------
-    project : Project
-        What is asked for.
-    """
-    records = [*project.train, *project.validation, *(path for one in project.identify for path in one.records)]
-    said = "" if "simulated" in project.label.lower() else simulated_label(
-        [project.name, project.system.name, *(path.name for path in records)], records)
-    return "; ".join(filter(None, (project.label, said)))

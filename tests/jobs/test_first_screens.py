@@ -14,7 +14,8 @@ import robthermal as rt
 from robthermal._digits import chance
 from robthermal.jobs.claims._words import claim_of
 from robthermal.jobs.diagnose._effect_words import WORDS, in_words, labels_in_words
-from robthermal.jobs.provenance import project_label, simulated_label
+from robthermal.jobs.provenance import simulated_label
+from robthermal.jobs.run import project_label
 from robthermal.verification import not_certified
 
 BAR = """

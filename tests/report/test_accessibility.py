@@ -8,16 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from browser import CHROMIUM, Page, browser
+from axe import needs_axe, needs_chromium, violations
+from browser import Page, browser
 
 from robthermal.report import Bound, Reason, Report, UsableRange, write_html
 
-ROOT = Path(__file__).resolve().parents[2]
-AXE = ROOT / "build" / "axe" / "package" / "axe.min.js"  # .ci/run fetches it
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine (Debian: apt install chromium)")
-needs_axe = pytest.mark.skipif(not AXE.is_file(), reason="no axe-core in build/axe (.ci/run fetches it with npm)")
+pytestmark = needs_chromium
 LOOKS = ("proven", "failed", "answer")  # of the head
-RULES = "axe.run(document).then(found => JSON.stringify(found.violations.map(one => [one.id, one.nodes[0].html])))"
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +33,6 @@ def files(report: Report, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
                      claims=[replace(one, verified=None, tested=True, file="") for one in report.claims])
     return {name: write_html(one, folder / f"{name}.html")
             for name, one in zip(LOOKS, (report, failed, answer), strict=True)}
-
-
-def violations(page: Page) -> list[list[str]]:
-    page.evaluate(f"{AXE.read_text(encoding='utf-8')};0")
-    found: list[list[str]] = json.loads(page.evaluate(RULES))
-    return found
 
 
 @pytest.mark.exhaustive

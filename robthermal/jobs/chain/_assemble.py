@@ -12,9 +12,9 @@ from ..claims import ARITHMETIC, GateCode
 from ..evidence import checker
 from ..network import NETWORK, network_section
 from ..now import now
-from ..provenance import project_label, provenance, subtitle
+from ..provenance import provenance, subtitle
 from ..request import Project
-from ..run import DataFacts, applied, data_reasons, misfit_table, residual_table
+from ..run import DataFacts, applied, data_reasons, misfit_table, project_label, residual_table
 from ._context import Context, Finished
 from ._inputs import input_section
 from ._parts import diagnosis_of, facts_of

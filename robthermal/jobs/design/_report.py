@@ -165,9 +165,10 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
                      "set-points, or narrow ambients and heats.", high, top)
     for one in result.certification.checked:
         if one.key == OBSERVER_RANGES and not one.required:
+            why = one.certificate.reason.removeprefix("region.parameters: ").partition(". Expected")[0]
             yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "observer", "That the error of the observer "
                          "shrinks is claimed for exactly the parameters of the model, not for their ranges: "
-                         f"{one.certificate.reason}", "The margins are computed with it for all corner plants.")
+                         f"{why}.", "The margins are computed with it for all corner plants.")
     if not result.request.parameters:
         yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
                      "Give --parameters with the calibrated.json of a calibration, or with ranges.")

@@ -57,7 +57,7 @@ def import_report_beside(path: Path, system: System | None, tables: Sequence[Rea
     Parameters
     ----------
     path : Path
-        Measured file.
+        Measured file of the response.
     system : System or None
         Names the columns of the plant; None: `inputs` and `outputs` are all of them.
     tables : sequence

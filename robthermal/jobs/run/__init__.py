@@ -11,6 +11,7 @@ from ._job import calibrated as calibrated
 from ._job import doubted_claims as doubted_claims
 from ._job import job_records as job_records
 from ._job import run_job as run_job
+from ._label import project_label as project_label
 from ._misfit import Misfit as Misfit
 from ._result import Calibrated as Calibrated
 from ._result import Comparison as Comparison
@@ -28,4 +29,4 @@ from ._write import write_job as write_job
 __all__ = ["Calibrated", "Comparison", "DataFacts", "DiagnosisFacts", "JobResult", "Misfit", "applied", "calibrated",
            "claim_reasons", "comparison_section", "data_facts", "data_reasons", "diagnosis_facts", "doubted_claims",
            "first_section", "import_table", "job_records", "misfit_table", "parameter_section", "parameter_table",
-           "residual_table", "response_sections", "run_job", "write_job"]
+           "project_label", "residual_table", "response_sections", "run_job", "write_job"]

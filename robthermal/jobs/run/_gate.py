@@ -11,9 +11,9 @@ from ..._celsius import ZERO_CELSIUS
 from ...report import Reason
 from ..certify import certification_reasons, remark
 from ..claims import Certification, GateCode
-from ..provenance import project_label
 from ..request import Gate
 from ._facts import DataFacts, DiagnosisFacts, data_facts, diagnosis_facts
+from ._label import project_label
 from ._misfit import Misfit
 from ._result import Doubted, JobResult
 

@@ -12,9 +12,10 @@ from ..evidence import write_certification
 from ..folder import output_folder
 from ..network import network_section
 from ..now import now
-from ..provenance import project_label, provenance, subtitle
+from ..provenance import provenance, subtitle
 from ..request import write_calibrated
 from ._gate import GATES
+from ._label import project_label
 from ._result import JobResult
 from ._sections import comparison_section, first_section, parameter_section
 from ._tables import summary_tables
