@@ -18,6 +18,7 @@ SPEC = f"""
 [coupling]
 name = "two by two"
 sample_time = 0.01
+export = ["c"]
 
 [subsystems.1]
 plant = {{ A = {A.tolist()}, B = [[1.0, 0.0], [0.0, 1.0]], C = {C.tolist()}, D = [[0.0, 0.0], [0.0, 0.0]] }}
@@ -70,13 +71,14 @@ def test_from_a_file_to_a_controller_that_stabilizes_the_measured_machine(run: A
     assert found["norms"]["robust"] <= 0.9 and found["norms"]["h2"] < 0.95 * found["norms"]["h2_uncoupled"]
     assert found["sections"] == {} and np.shape(found["filters"]["X"]["D"]) == (2, 2)
     assert run("verify", out)[0] == 0
+    assert "two_by_two_step" in (out / "coupling.c").read_text() and "Over time" in (out / "report.html").read_text()
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("order = 3", "window = 0.1", ["[design]", "window beside subsystems of several inputs and outputs"]),
     ("order = 3", "X_hat = [[1.0]]", ["design.X_hat"]),
     ("order = 3", "X_hat = { A = [], B = [], C = [], D = [[0.5, 0.0]] }", ["X_hat", "1 outputs and 2 inputs"]),
-    ('sample_time = 0.01\n', 'sample_time = 0.01\nexport = ["c"]\n', ["[coupling] export", "coupling.json only"]),
+    ('export = ["c"]', 'export = ["pdf"]', ["export"]),
     ('frf = ["machine.json"]', 'frf_1 = ["machine.json"]\nfrf_2 = ["machine.json"]', ["all 4 outputs and 4 inputs"]),
     (f"controller = {LAW}", "controller = 0.2", ["C1 has 1 outputs and 1 inputs", "2 outputs and 2 inputs"]),
 ])

@@ -289,3 +289,52 @@ def test_result_prints_draws_and_saves(given: rt.coupling.MatrixFilters, tmp_pat
     content = json.loads((tmp_path / "coupling.json").read_text())
     np.testing.assert_array_equal(content["filters"]["controller"]["A"], given.controller.A)
     assert content["sections"] == {} and content["verdict"] == "nominal"
+
+
+def test_the_simulation_is_the_loop_of_python_control(given: rt.coupling.MatrixFilters,
+                                                      pair: tuple[control.StateSpace, ...]) -> None:
+    v = np.random.default_rng(6).normal(size=(2, 300, 2))
+    run = rt.coupling.simulate(given, disturbances=v)
+    stacked, time = np.concatenate([v[0].T, v[1].T]), DT * np.arange(300)
+    for controller, e12 in ((given.controller, run.after), (control.append(*pair[2:]), run.before)):
+        S = control.feedback(control.ss([], [], [], np.eye(4), DT), control.append(*pair[:2]) * controller)
+        y = control.forced_response(S, time, stacked).outputs
+        np.testing.assert_allclose(e12, (y[2:] - y[:2]).T, atol=1e-9)
+    S1 = control.feedback(control.ss([], [], [], np.eye(2), DT), pair[0] * pair[2])
+    np.testing.assert_allclose(run.e1_seen, -control.forced_response(S1, time, v[0].T).outputs.T, atol=1e-9)
+
+
+def test_a_coupling_that_is_cut_rings_out_and_the_loops_see_nothing(given: rt.coupling.MatrixFilters) -> None:
+    v = np.random.default_rng(7).normal(size=(2, 900, 2))
+    always, switched = (rt.coupling.simulate(given, disturbances=v, on=on) for on in (None, (100, 400)))
+    np.testing.assert_allclose(switched.e2_seen, always.e2_seen, atol=1e-9)
+    np.testing.assert_allclose(switched.after[:100], switched.before[:100], atol=1e-12)
+    np.testing.assert_allclose(switched.after[-50:], switched.before[-50:], atol=1e-6)
+    assert np.abs(switched.after - switched.before)[100:400].max() > 0.1
+    assert switched.plot().shape == (2,)
+
+
+def test_one_channel_as_matrices_runs_like_one_channel() -> None:
+    one = make_random_pair(0)
+    arguments = one.P1, one.P2, one.C1, one.C2
+    filters = rt.coupling.evaluate(*arguments, X_hat=-0.5, Y_hat=0.2)
+    matrices = rt.coupling.evaluate_matrix(*(control.ss(part) for part in arguments), X_hat=filters.X_hat,
+                                           Y_hat=filters.Y_hat)
+    v = np.random.default_rng(8).normal(size=(2, 200))
+    runs = [rt.coupling.simulate(each, disturbances=v) for each in (filters, matrices)]
+    np.testing.assert_allclose(runs[1].before, runs[0].before, atol=1e-9)
+    factor = values(matrices.Z1)[:, 0, 0] / values(filters.Z1)[:, 0, 0]  # Z may differ by its sign
+    assert np.allclose(factor, factor[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 50)), np.zeros((2, 50, 3)), [np.zeros((50, 2)), np.zeros((40, 2))],
+                                   np.full((2, 50, 2), np.nan)])
+def test_disturbances_of_another_shape_are_refused(given: rt.coupling.MatrixFilters, wrong: Any) -> None:
+    with pytest.raises(rt.InputError, match=r"shape \(n, 2\) each"):
+        rt.coupling.simulate(given, disturbances=wrong)
+
+
+def test_noise_of_the_design_has_its_variance(given: rt.coupling.MatrixFilters) -> None:
+    run = rt.coupling.simulate(given, samples=4000, seed=1)
+    assert np.sqrt(np.mean(np.sum(run.after**2, axis=1))) == pytest.approx(given.norms["h2"], rel=0.1)
+    assert np.sqrt(np.mean(np.sum(run.before**2, axis=1))) == pytest.approx(given.norms["h2_uncoupled"], rel=0.1)

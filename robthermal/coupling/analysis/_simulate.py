@@ -13,9 +13,8 @@ from ..._control import control
 from ..._drawing import size_of
 from ...errors import InputError
 from ...signals import Record
-from ..evaluation import Filters
-from ..problem import Performance, Problem, drivers
-from ..systems import apart, realize
+from ..evaluation import CouplingResult
+from ..problem import Performance, RunningLoops
 
 _SAMPLES = 2500
 
@@ -28,16 +27,16 @@ class Simulation:
     ----------
     time : ndarray, shape (n,)
         Time of every sample [s].
-    before, after : ndarray, shape (n,)
-        Synchronization error e12 without and with coupling [m].
+    before, after : ndarray, shape (n,) or (n, p)
+        Synchronization error e12 without and with coupling [m]; of p channels where the subsystems have several.
     samples : int
         In the exposure window; 0 without one.
     ma_before, ma_after, msd_before, msd_after : ndarray, shape (n - samples + 1,)
         Mean and standard deviation of e12 over each window [m]; empty without a window. Value k belongs to the window
         that begins at time k.
-    e1, e2 : ndarray, shape (n,)
+    e1, e2 : ndarray, shape (n,) or (n, p)
         Tracking errors with coupling [m].
-    e1_seen, e2_seen : ndarray, shape (n,)
+    e1_seen, e2_seen : ndarray, shape (n,) or (n, p)
         e1+, e2+: what C1 and C2 act on [m]. They are the errors without coupling.
     on : ndarray of bool, shape (n,)
         Where the coupling is switched on.
@@ -84,11 +83,14 @@ class Simulation:
 
         Returns
         -------
-        ndarray of matplotlib axes, shape (1,) or (3,)
+        ndarray of matplotlib axes, shape (1,), (3,) or (p,)
         """
         import matplotlib.pyplot as plt
 
         rows: list[tuple[str, Array, Array]] = [("e12 [nm]", self.before, self.after)]
+        if self.before.ndim == 2:
+            rows = [(f"e12,\nchannel {k + 1} [nm]", *pair)
+                    for k, pair in enumerate(zip(self.before.T, self.after.T, strict=True))]
         if self.samples:
             rows += [("moving\naverage [nm]", self.ma_before, self.ma_after),
                      ("moving standard\ndeviation [nm]", self.msd_before, self.msd_after)]
@@ -111,7 +113,7 @@ class Simulation:
         return f"{text}\n{self.performance}" if self.samples else text
 
 
-def simulate(filters: Filters, samples: int | None = None, seed: int = 0, *, disturbances: Any = None,
+def simulate(filters: CouplingResult, samples: int | None = None, seed: int = 0, *, disturbances: Any = None,
              on: int | tuple[int, int] | None = None) -> Simulation:
     """Simulate the model's loops with the coupling controller and without it, under the same disturbances.
 
@@ -121,15 +123,15 @@ def simulate(filters: Filters, samples: int | None = None, seed: int = 0, *, dis
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         In discrete time.
     samples : int, optional
         Samples that are returned, of noise; 2500 when nothing is said. Not together with `disturbances`.
     seed : int
         Of the white noise behind the disturbances of the design.
-    disturbances : Record or pair of array_like, shape (n,), optional
-        v1, v2 at the outputs of the plants [m], one value per sample of the loop; of a record its columns "v1" and
-        "v2". None: noise of the design. A reference r acts as the disturbance -r.
+    disturbances : Record or pair of array_like, shape (n,) or (n, p), optional
+        v1, v2 at the outputs of the plants [m], one value per sample of the loop and channel; of a record, for one
+        channel each, its columns "v1" and "v2". None: noise of the design. A reference r acts as the disturbance -r.
     on : int or pair of int, optional
         First sample with coupling, or first with and first again without, counted in what is returned. None: always.
 
@@ -154,43 +156,49 @@ def simulate(filters: Filters, samples: int | None = None, seed: int = 0, *, dis
     >>> bool(abs(run.after[-1]) < 1e-12)
     True
     """
-    problem = filters.problem
-    if not problem.dt:
+    loops = filters.running_loops()
+    dt = float(loops.plants.dt)
+    if not dt:
         raise InputError("continuous-time filters", where="simulate", expected="discrete time (dt > 0)",
                          remedy="Discretize plants and controllers first.")
-    v, dropped = _disturbances(problem, samples, seed, disturbances)
-    n = v.shape[1] - dropped
-    if n < max(problem.samples, 1):
-        raise InputError(f"{n} samples", where="simulate", expected=f"at least {max(problem.samples, 1)}")
+    v, dropped = _disturbances(loops, samples, seed, disturbances)
+    n, p = v.shape[1] - dropped, len(v) // 2
+    if n < max(loops.samples, 1):
+        raise InputError(f"{n} samples", where="simulate", expected=f"at least {max(loops.samples, 1)}")
     gate = _gate(on, n)
-    coupled, idle = drivers(problem, filters.X_hat, filters.Y_hat)
-    alone = _loops(problem, (_alone(problem),), np.zeros(v.shape[1], dtype=bool), v)[0][:, dropped:]
+    alone = _loops(loops.plants, (loops.alone,), np.zeros(v.shape[1], dtype=bool), v)[0][:, dropped:]
     # Before what is returned the coupling is as in the first sample of it, so that nothing is switched at time zero.
     whole = np.concatenate([np.full(dropped, gate[0]), gate])
-    e, seen = (part[:, dropped:] for part in _loops(problem, (idle, coupled), whole, v))
-    before, after = alone[0] - alone[1], e[0] - e[1]
-    moving = [part for trace in (before, after) for part in _moving(trace, problem.samples)]
-    return Simulation(problem.dt * np.arange(n), before, after, problem.samples, ma_before=moving[0],
-                      ma_after=moving[2], msd_before=moving[1], msd_after=moving[3], e1=e[0], e2=e[1],
-                      e1_seen=seen[0], e2_seen=seen[1], on=gate)
+    e, seen = (part[:, dropped:] for part in _loops(loops.plants, (loops.cut, loops.coupled), whole, v))
+    before, after = _trace(alone[:p] - alone[p:]), _trace(e[:p] - e[p:])
+    moving = [part for trace in (before, after) for part in _moving(trace, loops.samples)]
+    return Simulation(dt * np.arange(n), before, after, loops.samples, ma_before=moving[0], ma_after=moving[2],
+                      msd_before=moving[1], msd_after=moving[3], e1=_trace(e[:p]), e2=_trace(e[p:]),
+                      e1_seen=_trace(seen[:p]), e2_seen=_trace(seen[p:]), on=gate)
 
 
-def _disturbances(problem: Problem, samples: int | None, seed: int, given: Any) -> tuple[Array, int]:
-    """v (2, n) and how many samples at its beginning are there to settle only."""
+def _trace(channels: Array) -> Array:
+    """(n,) of one channel, (n, p) of several."""
+    return channels[0] if len(channels) == 1 else channels.T
+
+
+def _disturbances(loops: RunningLoops, samples: int | None, seed: int, given: Any) -> tuple[Array, int]:
+    """v (2p, n) and how many samples at its beginning are there to settle only."""
     if given is not None:
         if samples is not None:
             raise InputError(f"samples = {samples} and disturbances", where="simulate", expected="one of the two",
                              remedy="Cut the record to length instead.")
-        return _given(given, problem.dt), 0
+        return _given(given, float(loops.plants.dt), loops.plants.noutputs // 2), 0
     n = _SAMPLES if samples is None else samples
     if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
         raise InputError(f"samples = {n!r}", where="simulate", expected="a positive number of samples")
-    white = np.random.default_rng(seed).standard_normal((2, 2 * n))
-    return _run(apart(realize(problem.one.W), realize(problem.two.W)), white), n
+    white = np.random.default_rng(seed).standard_normal((loops.shaping.ninputs, 2 * n))
+    return _run(loops.shaping, white), n
 
 
-def _given(disturbances: Any, dt: float) -> Array:
-    if isinstance(disturbances, Record):
+def _given(disturbances: Any, dt: float, channels: int) -> Array:
+    shape = "(n,)" if channels == 1 else f"(n, {channels})"
+    if isinstance(disturbances, Record) and channels == 1:
         if not np.isclose(disturbances.sample_time, dt, rtol=1e-6, atol=0.0):
             raise InputError(f"sample time {disturbances.sample_time:g} s, the loop has {dt:g} s",
                              where="simulate, argument disturbances", expected=f"{dt:g} s",
@@ -204,10 +212,11 @@ def _given(disturbances: Any, dt: float) -> Array:
         v = np.array([np.asarray(part, dtype=float) for part in disturbances])
     except (TypeError, ValueError):
         v = np.empty(0)
-    if v.ndim != 2 or len(v) != 2 or not np.all(np.isfinite(v)):
+    if v.shape[:1] + v.shape[2:] != (2,) + (channels,) * (channels > 1) or v.ndim < 2 or not np.all(np.isfinite(v)):
+        record = ', or a record with columns "v1" and "v2"' if channels == 1 else ""
         raise InputError("not two traces of finite numbers and of one length", where="simulate, argument disturbances",
-                         expected='a pair (v1, v2), shape (n,) each [m], or a record with columns "v1" and "v2"')
-    return v
+                         expected=f"a pair (v1, v2), shape {shape} each [m]{record}")
+    return v if channels == 1 else np.concatenate([v[0].T, v[1].T])
 
 
 def _gate(on: Any, n: int) -> Array:
@@ -224,27 +233,19 @@ def _gate(on: Any, n: int) -> Array:
     return (pair[0] <= t) & (t < pair[1])
 
 
-def _alone(problem: Problem) -> control.StateSpace:
-    """C1 and C2 apart: e to (u, e)."""
-    own = apart(realize(problem.one.C), realize(problem.two.C))
-    return control.StateSpace(own.A, own.B, np.vstack([own.C, np.zeros(own.C.shape)]), np.vstack([own.D, np.eye(2)]),
-                              problem.dt, remove_useless_states=False)
-
-
-def _loops(problem: Problem, controllers: tuple[control.StateSpace, ...], gate: Array, v: Array
+def _loops(P: control.StateSpace, controllers: tuple[control.StateSpace, ...], gate: Array, v: Array
            ) -> tuple[Array, Array]:
-    """e and e+ (2, n) of u = K e, e = -y, y = v + P u, with the second controller where the gate is on."""
-    P = apart(realize(problem.one.P), realize(problem.two.P))
-    x, k = np.zeros(P.nstates), np.zeros(controllers[0].nstates)
-    direct = [np.linalg.inv(np.eye(2) + P.D @ K.D[:2]) for K in controllers]
+    """e and e+ (2p, n) of u = K e, e = -y, y = v + P u, with the second controller where the gate is on."""
+    m, x, k = P.ninputs, np.zeros(P.nstates), np.zeros(controllers[0].nstates)
+    direct = [np.linalg.inv(np.eye(len(v)) + P.D @ K.D[:m]) for K in controllers]
     e, seen = np.empty(v.shape), np.empty(v.shape)
     for t, state in enumerate(gate.astype(int)):
         K = controllers[state]
         rest = K.C @ k
-        e[:, t] = -direct[state] @ (v[:, t] + P.C @ x + P.D @ rest[:2])
+        e[:, t] = -direct[state] @ (v[:, t] + P.C @ x + P.D @ rest[:m])
         out = rest + K.D @ e[:, t]
-        x, k = P.A @ x + P.B @ out[:2], K.A @ k + K.B @ e[:, t]
-        seen[:, t] = out[2:]
+        x, k = P.A @ x + P.B @ out[:m], K.A @ k + K.B @ e[:, t]
+        seen[:, t] = out[m:]
     return e, seen
 
 

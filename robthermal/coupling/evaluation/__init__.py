@@ -7,10 +7,11 @@ from ._evaluate import verdict as verdict
 from ._filters import Filters as Filters
 from ._joint import Joint as Joint
 from ._joint import joint as joint
+from ._result import CouplingResult as CouplingResult
 from ._sampled import discretize as discretize
 from ._spectra import Spectra as Spectra
 from ._spectra import cumulative as cumulative
 from ._spectra import spectra as spectra
 
-__all__ = ["Filters", "Joint", "Spectra", "cumulative", "discretize", "evaluate", "finish", "joint", "refused",
-           "spectra", "verdict"]
+__all__ = ["CouplingResult", "Filters", "Joint", "Spectra", "cumulative", "discretize", "evaluate", "finish", "joint",
+           "refused", "spectra", "verdict"]

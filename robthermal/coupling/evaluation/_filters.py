@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,14 @@ from ..._control import control
 from ...errors import Outcome
 from ...verification import Certificate
 from ..implementation import FixedPoint, export, fixed_point, save_filters, sections
-from ..problem import NORMS, Performance, Problem
+from ..problem import NORMS, Performance, Problem, RunningLoops, running_loops
 from ._reduce import reduce
+from ._result import CouplingResult
 from ._spectra import spectra
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Filters:
+class Filters(CouplingResult):
     """Coupling filters X, Y between two controlled subsystems, with verdict and certificates.
 
     e1+ = e1 + X e2+, e2+ = e2 + Y e1+, u1 = C1 e1+ + (P1⁻¹X) e2+, u2 = C2 e2+ + (P2⁻¹Y) e1+.
@@ -119,33 +120,14 @@ class Filters:
     asked: dict[str, float]
     again: Callable[..., Filters]
 
-    @property
-    def certificates(self) -> tuple[Certificate, ...]:
-        """Everything that is proven."""
-        return tuple(self.proofs.values())
-
-    @property
-    def verdict(self) -> str:
-        """ "robust", "nominal" or "none"; robust only where an uncertainty was given, none for a refused design."""
-        if not self.holds and self.norms["X"] == self.norms["Y"] == 0.0:  # refused: there is no coupling
-            return "none"
-        if self.problem.uncertainty is not None and self.robustly_stable:
-            return "robust"
-        return "nominal" if self.nominally_stable else "none"
-
-    def with_outcome(self, outcome: Outcome) -> Filters:
-        """The same filters with another outcome.
-
-        Parameters
-        ----------
-        outcome : Outcome
-            What is said of them.
+    def running_loops(self) -> RunningLoops:
+        """Plants, disturbances and controllers as state spaces, for a simulation of the model.
 
         Returns
         -------
-        Filters
+        RunningLoops
         """
-        return replace(self, outcome=outcome, holds=outcome.ok)
+        return running_loops(self.problem, self.X_hat, self.Y_hat)
 
     def reduce(self, order: int | None = None, tolerance: float = 0.01) -> Filters:
         """Shorter X_hat and Y_hat with nearly the same objective, verified again.

@@ -9,18 +9,20 @@ import numpy as np
 
 from ...export import by_suffix, matlab_bytes
 from ._c_source import program
-from ._files import document
+from ._files import document, of_matrices
+from ._matrix_c_source import matrix_program
 
 if TYPE_CHECKING:
     from ..evaluation import Filters
+    from ..matrix import MatrixFilters
 
 
-def export(filters: Filters, path: str | Path, name: str) -> None:
+def export(filters: Filters | MatrixFilters, path: str | Path, name: str) -> None:
     """Write a .mat, .c or .h file.
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         What is written.
     path : str or path
         File to write.
@@ -31,7 +33,7 @@ def export(filters: Filters, path: str | Path, name: str) -> None:
               remedy="JSON is written by save().")
 
 
-def _mat(filters: Filters, name: str) -> bytes:
+def _mat(filters: Filters | MatrixFilters, name: str) -> bytes:
     """One struct per filter with A, B, C, D; sections as (n, 6) matrices; numbers that are not finite are NaN."""
     content: dict[str, Any] = {key: value for key, value in document(filters, name).items()
                                if key not in ("filters", "remarks")}
@@ -44,5 +46,6 @@ def _mat(filters: Filters, name: str) -> bytes:
     return matlab_bytes(content)
 
 
-def _c(filters: Filters, name: str) -> bytes:
-    return program(filters, name).text().encode("ascii")
+def _c(filters: Filters | MatrixFilters, name: str) -> bytes:
+    written = matrix_program if of_matrices(filters) else program
+    return written(filters, name).text().encode("ascii")  # type: ignore[arg-type]  # as was just asked

@@ -64,6 +64,17 @@ def save_filters(filters: Filters | MatrixFilters, path: str | Path, name: str, 
     write(path, json_bytes(document(filters, name, remarks)))
 
 
+def of_matrices(filters: Filters | MatrixFilters) -> bool:
+    """Whether the subsystems were given as matrices: state spaces, without zeros and poles one by one.
+
+    Parameters
+    ----------
+    filters : Filters or MatrixFilters
+        What is written.
+    """
+    return isinstance(filters.problem.one.Q, control.StateSpace)
+
+
 def _left_out(filters: Filters | MatrixFilters) -> list[float]:
     """Measured frequencies that are not in the envelope [Hz]."""
     uncertainty = filters.problem.uncertainty
@@ -71,8 +82,8 @@ def _left_out(filters: Filters | MatrixFilters) -> list[float]:
 
 
 def _sections(filters: Filters | MatrixFilters) -> dict[str, Any]:
-    """Empty in continuous time, for filters of several channels, and for those that have to be reduced first."""
-    if filters.X.D.size > 1:
+    """Empty in continuous time, for subsystems given as matrices, and for filters that have to be reduced first."""
+    if of_matrices(filters):
         return {}
     try:
         return {key: rows.tolist() for key, rows in sections(filters).items()}  # type: ignore[arg-type]  # one channel

@@ -12,11 +12,11 @@ from ..._control import control
 from ...errors import Outcome
 from ..evaluation import verdict
 from ..factors import intervals_of
-from ..problem import NORMS, Proofs
+from ..problem import NORMS, Proofs, Realization
 from ..systems import series
 from ._filters import MatrixFilters
 from ._problem import MatrixProblem, prepare_matrix, sized
-from ._realization import MatrixRealization, realize_matrix, youla_matrix
+from ._realization import realize_matrix, youla_matrix
 
 
 def evaluate_matrix(P1: Any, P2: Any, C1: Any, C2: Any, *, X_hat: Any = 0, Y_hat: Any = 0, uncertainty: Any = None,
@@ -132,7 +132,7 @@ def refused_matrix(problem: MatrixProblem, outcome: Outcome, *, basis: str, orde
     return finish_matrix(problem, *nothing, basis=basis, order=order).with_outcome(outcome)
 
 
-def _norms(problem: MatrixProblem, parts: MatrixRealization, proofs: Proofs) -> dict[str, float]:
+def _norms(problem: MatrixProblem, parts: Realization, proofs: Proofs) -> dict[str, float]:
     first, second = (series(problem.weight, noise) for noise in problem.disturbed)
     with_Y, with_X = (series(problem.weight, _plus_identity(part), noise)
                       for part, noise in zip((parts.Y, parts.X), problem.disturbed, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from ..._control import control
 from ...errors import Outcome
 from ...verification import Certificate
-from ..evaluation import Spectra
-from ..implementation import save_filters
-from ..problem import NORMS, Performance
+from ..evaluation import CouplingResult, Spectra
+from ..implementation import export, save_filters
+from ..problem import NORMS, Performance, RunningLoops
 from ._problem import MatrixProblem
+from ._realization import running_matrix_loops
 from ._spectra import matrix_spectra
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MatrixFilters:
+class MatrixFilters(CouplingResult):
     """Coupling filters X, Y between two subsystems of several inputs and outputs, with verdict and certificates.
 
     e1+ = e1 + X e2+, e2+ = e2 + Y e1+, u1 = C1 e1+ + X_input e2+, u2 = C2 e2+ + Y_input e1+, with P1 X_input = X and
@@ -99,37 +100,18 @@ class MatrixFilters:
     requested: dict[str, float]
 
     @property
-    def certificates(self) -> tuple[Certificate, ...]:
-        """Everything that is proven."""
-        return tuple(self.proofs.values())
-
-    @property
     def performance(self) -> Performance:
         """Moving average and moving standard deviation: nan, a window is for one channel each."""
         return Performance(*[float("nan")] * 4)
 
-    @property
-    def verdict(self) -> str:
-        """ "robust", "nominal" or "none"; robust only where an uncertainty was given, none for a refused design."""
-        if not self.holds and self.norms["X"] == self.norms["Y"] == 0.0:  # refused: there is no coupling
-            return "none"
-        if self.problem.uncertainty is not None and self.robustly_stable:
-            return "robust"
-        return "nominal" if self.nominally_stable else "none"
-
-    def with_outcome(self, outcome: Outcome) -> MatrixFilters:
-        """The same filters with another outcome.
-
-        Parameters
-        ----------
-        outcome : Outcome
-            What is said of them.
+    def running_loops(self) -> RunningLoops:
+        """Plants, disturbances and controllers as state spaces, for a simulation of the model.
 
         Returns
         -------
-        MatrixFilters
+        RunningLoops
         """
-        return replace(self, outcome=outcome, holds=outcome.ok)
+        return running_matrix_loops(self.problem, self.X_hat, self.Y_hat)
 
     def spectra(self, points: int = 400) -> Spectra:
         """Largest singular values of sensitivities and improvement, density of e12, robust number over frequency.
@@ -163,6 +145,26 @@ class MatrixFilters:
             If the file cannot be written.
         """
         save_filters(self, path, name, remarks)
+
+    def export(self, path: str | Path, name: str = "coupling") -> None:
+        """Write the filters for another program: MATLAB (.mat) or C99 (.c, .h).
+
+        MATLAB gets what coupling.json holds. C gets state spaces and a step function in double that makes e+ and what
+        is added to the outputs of C1 and C2, with a test vector; see the page on coupling.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, replaced in one step; its ending says which.
+        name : str
+            Name of the design; in C the prefix of every identifier.
+
+        Raises
+        ------
+        InputError
+            For another ending, or when the file cannot be written. In C also in continuous time.
+        """
+        export(self, path, name)
 
     def plot(self) -> NDArray[Any]:
         """Improvement factors, e12 before and after, and the robust number over frequency [Hz].

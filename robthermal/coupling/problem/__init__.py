@@ -12,9 +12,13 @@ from ._problem import Subsystem as Subsystem
 from ._problem import prepare as prepare
 from ._radius import radius as radius
 from ._realization import Realization as Realization
-from ._realization import drivers as drivers
+from ._realization import RunningLoops as RunningLoops
+from ._realization import assembled as assembled
+from ._realization import coupling_controller as coupling_controller
 from ._realization import realization as realization
+from ._realization import running_loops as running_loops
 from ._realization import youla_parameter as youla_parameter
 
-__all__ = ["NORMS", "Norm", "Performance", "Problem", "Proofs", "Realization", "Subsystem", "coupled", "drivers", "h2",
-           "prepare", "radius", "realization", "variances", "youla_parameter"]
+__all__ = ["NORMS", "Norm", "Performance", "Problem", "Proofs", "Realization", "RunningLoops", "Subsystem", "assembled",
+           "coupled", "coupling_controller", "h2", "prepare", "radius", "realization", "running_loops", "variances",
+           "youla_parameter"]

@@ -110,7 +110,9 @@ def couple_subsystems(job: CouplingJob, progress: Callable[[str], None] = lambda
     checked = tuple(_checked(filters))
     progress("computing spectra")
     if isinstance(filters, MatrixFilters):
-        return Coupling(job, filters, checked, filters.spectra(), None, None)
+        curves = filters.spectra()
+        progress("simulating")
+        return Coupling(job, filters, checked, curves, None, _simulation(filters))
     curves = coupling.spectra(filters)
     worst = coupling.worst_case(filters) if filters.problem.uncertainty is not None else None
     progress("simulating")
@@ -168,7 +170,7 @@ def _checked(filters: Filters | MatrixFilters) -> Iterator[Checked]:
         yield Checked(key, what[0].upper() + what[1:], certificate, verify(certificate), key in required)
 
 
-def _simulation(filters: Filters) -> Simulation | None:
+def _simulation(filters: Filters | MatrixFilters) -> Simulation | None:
     if not filters.problem.dt or not filters.nominally_stable:
         return None
     window = filters.problem.samples

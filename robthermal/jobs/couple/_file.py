@@ -220,7 +220,7 @@ def _job(data: _File, path: Path) -> CouplingJob:
         (plants[0], plants[1]), (controllers[0], controllers[1]), _disturbances(halves, dt, path), measured,
         tuple(", ".join(file.name for file in group) for group in groups), manual,
         dict(_options(data.design, manual, dt, path, shape != (2, 2))), files,
-        _exports(data.coupling.export, dt, path, shape != (2, 2)),
+        _exports(data.coupling.export, dt, path),
         **_options_of(data.uncertainty))
 
 
@@ -229,10 +229,7 @@ def _options_of(table: UncertaintyTable | None) -> dict[str, Any]:
     return {} if table is None else {key: getattr(table, key) for key in keys}
 
 
-def _exports(endings: Sequence[str], dt: float, path: Path, matrices: bool) -> tuple[str, ...]:
-    if matrices and endings:
-        raise InputError("filters of several inputs and outputs are written as coupling.json only",
-                         where=f"{path} [coupling] export", expected="no export", remedy="Leave export out.")
+def _exports(endings: Sequence[str], dt: float, path: Path) -> tuple[str, ...]:
     if not dt and {"c", "h"} & set(endings):
         raise InputError("a continuous-time coupling has no C source", where=f"{path} [coupling] export",
                          expected='["mat"]', remedy="Give a sample_time.")

@@ -106,7 +106,6 @@ def save_coupling(result: Coupling, folder: Path) -> None:
     job = result.job
     result.filters.save(folder / "coupling.json", job.name, remarks=result.remarks)
     for ending in job.exports:
-        assert isinstance(result.filters, Filters)  # a job of matrices has no exports
         result.filters.export(folder / f"coupling.{ending}", job.name)
 
 
@@ -236,5 +235,6 @@ def _filter_section(filters: Filters | MatrixFilters) -> Section:
     if isinstance(filters, MatrixFilters):
         text = ("coupling.json holds the state space of every filter. e1⁺ = e1 + X e2⁺, e2⁺ = e2 + Y e1⁺ with vectors; "
                 "X_input and Y_input go from e2⁺ to u1 and from e1⁺ to u2, with P1 X_input = X and P2 Y_input = Y. "
-                "controller is the same as one system, from (e1, e2) to (u1, u2).")
+                "controller is the same as one system, from (e1, e2) to (u1, u2). The key export of the coupling file "
+                "writes them as C source with a test vector, too.")
     return Section("Filters", text, tables=(Table(frame, "Sizes."),), anchor="filters")
