@@ -30,7 +30,7 @@ diagnosis.Effect diagnosis.diagnose diagnosis.next_experiment diagnosis.refit_sh
 diagnosis.select_jointly
 diagnosis.score diagnosis.unknown_heat identify.lpm jobs.DesignRequest jobs.run_job jobs.certify_system
 jobs.write_job report.Claim report.UsableRange signals.declared signals.design_check signals.inspect_file
-identify.pole_sensitivity
+identify.pole_sensitivity identify.Diffusion identify.FractionalPole
 signals.multisines systems.datasheets thermal.Assembly thermal.Material thermal.Stepper thermal.add_effect
 thermal.load_curve thermal.module_from_polynomials thermal.reduce thermal.steady_state thermal.system_from_matrices
 thermal.trajectory thermal.invert_datasheet thermal.size_sink design.tune_pi synthesis.hinf
