@@ -93,7 +93,7 @@ class MatrixRecursion:
     Parameters
     ----------
     filters : MatrixFilters
-        Discrete time.
+        What is programmed, in discrete time.
     """
 
     def __init__(self, filters: MatrixFilters):
@@ -143,7 +143,7 @@ def matrix_program(filters: MatrixFilters, name: str = "coupling") -> Program:
     Parameters
     ----------
     filters : MatrixFilters
-        Discrete time.
+        What is programmed, in discrete time.
     name : str
         Prefix of every identifier; characters that C does not allow become underscores.
     """
