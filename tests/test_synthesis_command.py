@@ -84,6 +84,37 @@ def test_bad_files_name_what_is_wrong(run, tmp_path, content, method, words):
     assert not (tmp_path / "out").exists()
 
 
+SMALL = """
+[plant]
+A = [[{A}]]
+B = [[1.0, {B2}]]
+C = [[{C1}], [1.0]]
+D = [[0.0, {D12}], [{D21}, {D22}]]
+n_meas = 1
+n_ctrl = 1
+"""
+
+
+@pytest.mark.parametrize(("changes", "method", "status", "words"), [
+    ({"A": 0.7, "B2": 0.0}, "hinf", 2, "[plant]: not stabilisable: the mode at +0.7 1/s"),
+    ({"A": 0.0, "B2": 0.0}, "h2", 2, "the mode at 0 rad/s (an integrator)"),
+    ({"A": 0.0, "B2": 0.0}, "h2", 2, "Of a weight: take a stable one"),
+    ({"B2": -1.0}, "hinf", 0, "not every control shows in the performance outputs at 0 rad/s"),  # 1 - 1/(s + 1)
+    ({"D12": 0.0}, "hinf", 0, "not every control shows in the performance outputs at infinite frequency"),
+    ({"D21": 0.0}, "h2", 0, "not every measurement is disturbed at infinite frequency"),
+    ({"D22": 0.5}, "hinf", 0, ""),
+    ({"n": "[design]\ngamma = -1.0"}, "hinf", 2, "plant.toml [design] gamma: gamma is -1")])
+def test_plants_with_a_flaw_get_the_mode_the_frequency_or_the_best(run, tmp_path, changes, method, status, words):
+    values = {"A": -1.0, "B2": 1.0, "C1": 1.0, "D12": 1.0, "D21": 1.0, "D22": 0.0, "n": ""} | changes
+    done = design_by(run, tmp_path, SMALL.format(**values) + values["n"] + "\n", method)
+    said = " ".join((done.out + done.err).split())
+    if status == 0:
+        facts = json.loads((tmp_path / "out" / "design.json").read_text())
+        said, lacking = facts["outcome"]["text"], "Weights are missing" in facts["outcome"]["text"]
+        assert facts["outcome"]["ok"] and lacking == bool(words)
+    assert done.status == status and words in said
+
+
 @pytest.mark.parametrize(("method", "more", "kinds"), [
     ("mixed", "[design]\nhinf_limit = 12.0\n", ["closed_loop", "closed_loop"]),
     ("output-feedback", "[design]\norder = 1\n", ["closed_loop"])])

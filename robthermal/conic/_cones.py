@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_matrix, vstack
 
-from ._solver import Array, Point, second_order, solved
+from ._inequalities import Inequality
+from ._solver import Array, Point, second_order, semidefinite, solved
+from ._stacked import stack
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class ConeBounds:
     bound: Array
 
 
-def least_cost(cost: Array, bounds: Sequence[ConeBounds]) -> Point:
-    """Find x with the least cost'x under bounds on norms: a second-order cone program.
+def least_cost(cost: Array, bounds: Sequence[ConeBounds], matrices: Sequence[Inequality] = ()) -> Point:
+    """Find x with the least cost'x under bounds on norms and matrix inequalities: a cone program.
 
     Parameters
     ----------
@@ -42,6 +44,8 @@ def least_cost(cost: Array, bounds: Sequence[ConeBounds]) -> Point:
         Coefficients of the cost.
     bounds : sequence of ConeBounds
         What x has to keep.
+    matrices : sequence of Inequality, optional
+        Matrices that have to be positive semidefinite; their margins do not count.
 
     Returns
     -------
@@ -61,7 +65,11 @@ def least_cost(cost: Array, bounds: Sequence[ConeBounds]) -> Point:
         rows.append(csc_matrix(block.reshape(-1, n)))
         offsets.append(np.column_stack([group.bound, group.offset]).ravel())
         cones += [second_order(d + 1)] * count
-    found = solved(cost, vstack(rows, format="csc"), np.concatenate(offsets), cones)
+    for one in matrices:
+        rows.append(csc_matrix(-stack(one.slopes).T))
+        offsets.append(stack(one.constant[None])[0])
+        cones.append(semidefinite(len(one.constant)))
+    found = solved(cost, vstack(rows, format="csc"), np.concatenate(offsets), cones, decompose=not matrices)
     if not found.solved:
         return Point(np.zeros(len(cost)), np.nan, found.status, False)
     return found

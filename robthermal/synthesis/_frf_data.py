@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
+from .._checks import positive_number
 from .._control import control
 from ..errors import InputError
 from ..identify import FrequencyResponse
@@ -133,3 +134,20 @@ def resonance_missed(one: Discs) -> str:
         return ""
     k = int(wide.argmax())
     return f"between {one.omega[k] / (2 * np.pi):.4g} and {one.omega[k + 1] / (2 * np.pi):.4g} Hz"
+
+
+def read_sample_time(models: Sequence[Plant | None], highest: float, value: object) -> float:
+    """Sample time of the controller [s], 0 of a continuous one; `highest`: last frequency of the responses [rad/s]."""
+    of_model = {one.dt for one in models if one is not None}
+    if value is None:
+        return of_model.pop() if len(of_model) == 1 else 0.0
+    found = positive_number(value, "sample_time", "s")
+    if of_model and of_model != {found}:
+        raise InputError(f"sample_time = {found:g} s of a controller for a model of another",
+                         where="argument sample_time", expected="a model with that sample time",
+                         remedy="Sample the model first: control.c2d.")
+    if highest > np.pi / found * (1 + 1e-9):
+        raise InputError(f"the response goes up to {highest / (2 * np.pi):.4g} Hz, beyond the Nyquist frequency of "
+                         f"sample_time = {found:g} s", where="argument sample_time",
+                         expected=f"at most {np.pi / highest:.4g} s", remedy="Cut the response with G.between.")
+    return found

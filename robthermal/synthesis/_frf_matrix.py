@@ -1,4 +1,4 @@
-"""PI and PID of two inputs and two outputs straight from frequency responses and their confidence circles."""
+"""PI and PID of several inputs and as many outputs straight from frequency responses and their confidence circles."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ..identify import FrequencyResponse
 from ..linear import Plant, close, plant_norm, prove_closed_loop, read_plant, responder
 from ..verification import Certificate
 from ._design import RobustAgainst, as_system
-from ._frf_data import model_grid
-from ._frf_matrix_design import ENTRIES, FrfMatrixDesign, MatrixResponse
+from ._frf_data import model_grid, read_sample_time
+from ._frf_matrix_design import FrfMatrixDesign, MatrixResponse, entries
 from ._frf_matrix_program import MatrixBins, ascend_matrix
 from ._outcomes import SynthesisCode
 from ._plant import split
@@ -25,6 +25,8 @@ from ._structure import Structure, read_structure
 
 _LARGEST_STEP = np.radians(75)  # of det(I + GK) between two bins: above it the loop is not followed
 _STATIC = np.radians(60)  # of an eigenvalue of G G(first)⁻¹ real part: the first bin shows the static gain
+MOST = 4  # inputs and outputs
+_ASIDE = np.radians(135)  # of the static eigenvalues at the first bin: further round they could have wrapped
 _TINY = 1e-3  # integral action of a start, relative
 _REFINED = 6  # rounds in which the margin of a model is raised at the bins, until it holds between them
 
@@ -44,8 +46,8 @@ def is_matrix(G: Any) -> bool:
 
 
 def frf_matrix(G: Any, structure: object, decentralized: bool, margin: float, probability: float,
-               initial: Mapping[str, float] | None, sample_time: float | None) -> FrfMatrixDesign:
-    """Design of `frf_pid` for two inputs and two outputs; arguments as there, checked.
+               initial: Mapping[str, float] | None, sample_time: object) -> FrfMatrixDesign:
+    """Design of `frf_pid` for two to four inputs and as many outputs; arguments as there, checked.
 
     Parameters
     ----------
@@ -67,12 +69,14 @@ def frf_matrix(G: Any, structure: object, decentralized: bool, margin: float, pr
     began = time.perf_counter()
     if structure not in ("pi", "pid"):
         raise InputError(f"structure = {quoted(structure)}", where="argument structure",
-                         expected='"pi" or "pid" for two inputs and two outputs')
+                         expected='"pi" or "pid" for several inputs and outputs')
     given = list(G) if isinstance(G, Sequence) else [G]
     found = [_read(one, probability, "argument G" if len(given) == 1 else f"argument G[{k}]")
              for k, one in enumerate(given)]
-    models = {one.model.dt for one in found if one.model is not None}
-    dt = sample_time if sample_time is not None else models.pop() if len(models) == 1 else 0.0
+    if len({one.center.shape[1] for one in found}) > 1:
+        raise InputError(f"responses with {' and '.join(str(one.center.shape[1]) for one in found)} inputs",
+                         where="argument G", expected="as many in each")
+    dt = read_sample_time([one.model for one in found], max(float(one.omega[-1]) for one in found), sample_time)
     own = read_structure(structure, found[0].omega, None, dt)
     bins = _bins(found, own, decentralized)
     start = _start(bins, own, initial, min(float(one.omega[0]) for one in found))
@@ -112,7 +116,7 @@ def _read(G: Any, probability: float, where: str) -> MatrixResponse:
         raise InputError(f"{len(omega)} bins above zero", where=where, expected="at least 3")
     radius = np.zeros(center.shape)
     if G.has_covariance:
-        radius = np.moveaxis(G.confidence_radius(1 - (1 - probability) / (4 * len(omega))), -1, 0)[inside]
+        radius = np.moveaxis(G.confidence_radius(1 - (1 - probability) / (radius[0].size * len(omega))), -1, 0)[inside]
     lost = ~np.isfinite(center).all(axis=(1, 2)) | ~np.isfinite(radius).all(axis=(1, 2))
     if lost.any():
         f = omega[lost][0] / (2 * np.pi)
@@ -122,14 +126,15 @@ def _read(G: Any, probability: float, where: str) -> MatrixResponse:
 
 
 def _expect_square(shape: tuple[int, ...], where: str) -> None:
-    if tuple(shape) != (2, 2):
+    if shape[0] != shape[1] or not 2 <= shape[0] <= MOST:
         raise InputError(f"a response with {shape[1]} inputs and {shape[0]} outputs", where=where,
-                         expected="one input and one output, or two of each")
+                         expected=f"one input and one output, or as many of each, at most {MOST}")
 
 
 def _bins(found: Sequence[MatrixResponse], structure: Structure, decentralized: bool) -> MatrixBins:
-    kinds, free = len(structure.names), [(0, 0), (1, 1)] if decentralized else [(0, 0), (0, 1), (1, 0), (1, 1)]
-    patterns = np.zeros((kinds * len(free), kinds, 2, 2))
+    kinds, m = len(structure.names), found[0].center.shape[1]
+    free = [(row, column) for row in range(m) for column in range(m) if row == column or not decentralized]
+    patterns = np.zeros((kinds * len(free), kinds, m, m))
     for k in range(kinds):
         for j, (row, column) in enumerate(free):
             patterns[k * len(free) + j, k, row, column] = 1.0
@@ -142,7 +147,8 @@ def _bins(found: Sequence[MatrixResponse], structure: Structure, decentralized: 
 def _start(bins: MatrixBins, structure: Structure, initial: Mapping[str, float] | None, lowest: float
            ) -> Array:
     """Free numbers of stabilizing gains: those given, or a little integral action of the right direction."""
-    names = [f"{name}{entry}" for name in structure.names for entry in ENTRIES]
+    m = bins.center.shape[1]
+    names = [f"{name}{entry}" for name in structure.names for entry in entries(m)]
     flat = bins.patterns.reshape(len(bins.patterns), -1)
     if initial is not None:
         allowed = [names[k] for k in np.flatnonzero(flat.any(axis=0))]
@@ -157,7 +163,7 @@ def _start(bins: MatrixBins, structure: Structure, initial: Mapping[str, float] 
         raise InputError("the first bin does not show an invertible static gain", where="argument G",
                          expected="bins down to where the response is its static gain, which is regular",
                          remedy="Measure longer, or give initial gains of a loop that is stable.")
-    gains = np.zeros((len(structure.names), 2, 2))
+    gains = np.zeros((len(structure.names), m, m))
     gains[bins.integral] = _TINY * lowest * np.linalg.inv(G)
     if not flat.any(axis=0).all():  # decentralized: signs of the diagonal of the inverse (relative gain array)
         gains[bins.integral] = np.diag(np.diag(gains[bins.integral]))
@@ -165,23 +171,26 @@ def _start(bins: MatrixBins, structure: Structure, initial: Mapping[str, float] 
 
 
 def _stable(one: MatrixResponse, structure: Structure, gains: Array) -> bool:
-    """Argument principle for a stable plant: from 0 to the end det(I + GK) turns by π, half a turn for two integrators.
+    """Argument principle for a stable plant: from 0 to the end det(I + GK) turns by π/2 for each of m integrators.
 
-    Near 0 it is det(G Ki)/s², of phase -π, with the eigenvalues of the static G Ki to the right. At the last bin the
-    gain of GK is below one, so that the phase there is the sum of those of the eigenvalues of I + GK, each within a
+    Near 0 it is det(G Ki)/s^m, of phase -mπ/2, with the eigenvalues of the static G Ki to the right. At the last bin
+    the gain of GK is below one, so that the phase there is the sum of those of the eigenvalues of I + GK, each within a
     quarter turn. The smallest singular value of I + GK is positive over all circles, which therefore wind alike.
     """
     K = np.einsum("fb,bij->fij", structure.basis(one.omega), gains)
     L = one.center @ K
-    phi, size = np.linalg.det(np.eye(2) + L), one.spread * np.linalg.norm(K, 2, axis=(1, 2))
-    left = np.linalg.svd(np.eye(2) + L, compute_uv=False)[:, -1] - size
+    eye = np.eye(L.shape[1])
+    phi, size = np.linalg.det(eye + L), one.spread * np.linalg.norm(K, 2, axis=(1, 2))
+    left = np.linalg.svd(eye + L, compute_uv=False)[:, -1] - size
     steps = np.angle(phi[1:] / phi[:-1])
     static = np.linalg.eigvals(one.center[0].real @ gains[structure.names.index("Ki")])
     if left.min() <= 0 or np.linalg.norm(L[-1], 2) + size[-1] >= 1 or abs(steps).max() > _LARGEST_STEP:
         return False
-    start = float(np.angle(-phi[0])) - np.pi
-    end = float(np.angle(np.linalg.eigvals(np.eye(2) + L[-1])).sum())
-    return abs(start + float(steps.sum()) - end) < 1e-6 and float(static.real.min()) > 0
+    aside = np.angle(1j * np.linalg.eigvals(eye + L[0]))
+    start = float(aside.sum()) - len(eye) * np.pi / 2
+    end = float(np.angle(np.linalg.eigvals(eye + L[-1])).sum())
+    followed = abs(start + float(steps.sum()) - end) < 1e-6 and abs(aside).max() < _ASIDE
+    return bool(followed and static.real.min() > 0)
 
 
 def _unmeasured(one: MatrixResponse, structure: Structure, gains: Array) -> str:
@@ -194,14 +203,15 @@ def _unmeasured(one: MatrixResponse, structure: Structure, gains: Array) -> str:
 
 
 def _realized(structure: Structure, gains: Array) -> Plant:
-    """Controller from (e1, e2) to (u1, u2): the states of the basis functions once for every error."""
+    """Controller from the errors to the controls: the states of the basis functions once for every error."""
     unit = [structure.realized(np.eye(len(structure.names))[k]) for k in range(len(structure.names))]
-    A = np.kron(np.eye(2), unit[0].A)
-    B = np.kron(np.eye(2), unit[0].B)
-    C, D = np.zeros((2, len(A))), np.zeros((2, 2))
+    m = gains.shape[1]
+    A = np.kron(np.eye(m), unit[0].A)
+    B = np.kron(np.eye(m), unit[0].B)
+    C, D = np.zeros((m, len(A))), np.zeros((m, m))
     n = len(unit[0].A)
     for k, one in enumerate(unit):
-        for column in range(2):
+        for column in range(m):
             C[:, column * n:(column + 1) * n] += gains[k][:, [column]] @ one.C
         D += gains[k] * one.D[0, 0]
     return Plant(A, B, C, D, structure.dt)
@@ -209,8 +219,8 @@ def _realized(structure: Structure, gains: Array) -> Plant:
 
 def _problem(model: Plant) -> Plant:
     """(w, u) to (S w, error): z = Gu + w, y = -z, so that u = +K y is negative feedback."""
-    n, one = len(model.A), np.eye(2)
-    return Plant(model.A, np.hstack([np.zeros((n, 2)), model.B]), np.vstack([model.C, -model.C]),
+    n, one = len(model.A), np.eye(len(model.D))
+    return Plant(model.A, np.hstack([np.zeros((n, len(one))), model.B]), np.vstack([model.C, -model.C]),
                  np.block([[one, model.D], [-one, -model.D]]), model.dt)
 
 
@@ -231,16 +241,18 @@ def _finished(found: Sequence[MatrixResponse], structure: Structure, bins: Matri
     value = 1 / robust if kept and not models else np.inf
     if models and kept and all(one.holds for one in certificates):
         value = max(float(one.region["bound"]) for one in certificates)
-    names = [f"{name}{entry}" for name in structure.names for entry in ENTRIES]
-    controller = as_system(K, ["error1", "error2"], ["control1", "control2"])
-    eye, at = np.eye(2), found[0].omega
+    m = gains.shape[1]
+    names = [f"{name}{entry}" for name in structure.names for entry in entries(m)]
+    error, control_, w, z = ([f"{word}{k}" for k in range(1, m + 1)] for word in ("error", "control", "w", "z"))
+    controller = as_system(K, error, control_)
+    eye, at = np.eye(m), found[0].omega
     L = found[0].center @ np.einsum("fb,bij->fij", structure.basis(at), gains)
     S = np.moveaxis(np.linalg.inv(eye + L), 0, -1)
-    loop = control.FRD(S, at) if not models else as_system(close(_problem(models[0]), K), ["w1", "w2"], ["z1", "z2"])
+    loop = control.FRD(S, at) if not models else as_system(close(_problem(models[0]), K), w, z)
     return FrfMatrixDesign(
         controller, value, 1.0, loop, certificates, _covers(found, probability),
         _judge(kept, robust, margin, certificates, unmeasured), "convex-concave program (Karimi and Kammer)",
-        "Clarabel", time.perf_counter() - began, count, split(_problem(models[0]), 2, 2) if models else None,
+        "Clarabel", time.perf_counter() - began, count, split(_problem(models[0]), m, m) if models else None,
         gains=dict(zip(names, gains.ravel().tolist(), strict=True)),
         modulus_margin={"stated": margin, "robust": robust}, structure=structure, responses=list(found))
 

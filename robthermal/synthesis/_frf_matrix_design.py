@@ -1,4 +1,4 @@
-"""The result of a design from frequency responses of two inputs and two outputs."""
+"""The result of a design from frequency responses of several inputs and as many outputs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,16 @@ from ._frf_design import FrfDesign
 from ._margins import Margins
 from ._structure import Structure
 
-ENTRIES = ("11", "12", "21", "22")
+
+def entries(m: int) -> list[str]:
+    """Names of the entries of a matrix, row by row: "11", "12", ...
+
+    Parameters
+    ----------
+    m : int
+        Rows and columns, at most 9.
+    """
+    return [f"{row}{column}" for row in range(1, m + 1) for column in range(1, m + 1)]
 
 
 @dataclass(frozen=True)
@@ -27,8 +36,8 @@ class MatrixResponse:
     ----------
     omega : ndarray, shape (n_f,)
         Frequencies of the bins [rad/s].
-    center : ndarray, shape (n_f, 2, 2)
-        Measured values of the four entries.
+    center : ndarray, shape (n_f, m, m)
+        Measured values of the entries.
     spread : ndarray, shape (n_f,)
         Norm of the matrix of radii: no plant in the circles differs by more.
     model : Plant or None
@@ -46,10 +55,10 @@ class MatrixResponse:
 
 @dataclass(frozen=True)
 class FrfMatrixDesign(FrfDesign):
-    """PI or PID matrices for two inputs and two outputs; negative feedback: u = K (r - y).
+    """PI or PID matrices for several inputs and as many outputs; negative feedback: u = K (r - y).
 
-    As `FrfDesign`. ``gains``: by name and entry, "Kp11" (first control, first measurement) to "Kd22"; ``value``: bound
-    of the largest singular value of the sensitivity (I + GK)⁻¹; ``modulus_margin``: smallest singular value of I + GK.
+    As `FrfDesign`. ``gains``: by name and entry, "Kp11" (first control, first measurement) to "Kd22" or so; ``value``:
+    bound of the largest singular value of the sensitivity (I + GK)⁻¹; ``modulus_margin``: smallest one of I + GK.
 
     Parameters
     ----------
@@ -107,15 +116,15 @@ class FrfMatrixDesign(FrfDesign):
             return {}
         found: Margins = {}
         X = gain_matrices(self.structure, self.gains)
+        loops = "both loops" if X.shape[1] == 2 else "all loops"
         for k, one in enumerate(self.responses):
             K = np.einsum("fb,bij->fij", self.structure.basis(one.omega), X)
             L = one.center @ K
-            eye = np.eye(2)
+            eye = np.eye(L.shape[1])
             modulus = float(np.linalg.svd(eye + L, compute_uv=False)[:, -1].min())
             alpha = 2 / float(np.linalg.norm((eye - L) @ np.linalg.inv(eye + L), 2, axis=(1, 2)).max())
-            found["both loops" if len(self.responses) == 1 else f"response {k}"] = {"disk": alpha, "modulus": modulus}
+            found[loops if len(self.responses) == 1 else f"response {k}"] = {"disk": alpha, "modulus": modulus}
         return found
-
 
     def plot(self, ax: Any = None) -> Any:
         """Draw the largest singular value of the sensitivity, of responses and of the worst plants in their circles.
@@ -134,8 +143,8 @@ class FrfMatrixDesign(FrfDesign):
             name = "response" if len(self.responses) == 1 else f"response {k}"
             basis = self.structure.basis(one.omega) if self.structure else np.zeros((len(one.omega), 0))
             K = np.einsum("fb,bij->fij", basis, gain_matrices(self.structure, self.gains) if self.structure
-                          else np.zeros((0, 2, 2)))
-            least = np.linalg.svd(np.eye(2) + one.center @ K, compute_uv=False)[:, -1]
+                          else np.zeros((0, *one.center.shape[1:])))
+            least = np.linalg.svd(np.eye(one.center.shape[1]) + one.center @ K, compute_uv=False)[:, -1]
             worst = least - one.spread * np.linalg.norm(K, 2, axis=(1, 2))
             ax.loglog(one.omega, 1 / least, **line_of(k), label=name)
             if one.spread.any():
@@ -149,7 +158,7 @@ class FrfMatrixDesign(FrfDesign):
 
 
 def gain_matrices(structure: Structure, gains: Mapping[str, float]) -> Array:
-    """Gain matrices of the basis functions, (n_basis, 2, 2).
+    """Gain matrices of the basis functions, (n_basis, m, m).
 
     Parameters
     ----------
@@ -158,5 +167,5 @@ def gain_matrices(structure: Structure, gains: Mapping[str, float]) -> Array:
     gains : mapping
         Gains by name and entry.
     """
-    return np.array([[gains.get(f"{name}{entry}", 0.0) for entry in ENTRIES] for name in structure.names]).reshape(
-        -1, 2, 2)
+    m = round((len(gains) / len(structure.names)) ** 0.5)
+    return np.array([[gains[f"{name}{entry}"] for entry in entries(m)] for name in structure.names]).reshape(-1, m, m)

@@ -16,7 +16,7 @@ from ..errors import InputError, Outcome
 from ..linear import Plant, close, plant_norm, prove_closed_loop
 from ..verification import Certificate
 from ._design import RobustAgainst, as_system
-from ._frf_data import Discs, direction, read_discs, resonance_missed, winding
+from ._frf_data import Discs, direction, read_discs, read_sample_time, resonance_missed, winding
 from ._frf_design import FrfDesign
 from ._frf_matrix import frf_matrix, is_matrix
 from ._frf_program import Bins, best_start
@@ -44,7 +44,8 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     G : FrequencyResponse, sequence of them, control.StateSpace or control.TransferFunction
         Response from control to measurement, one input and one output; several are served by one controller. A
         measured response of a sampled plant contains the hold. With a model the result is certified at every frequency.
-        Two inputs and two outputs: matrices of gains, "pi" or "pid", of stable plants, without bandwidth and weights.
+        Two to four inputs and as many outputs: matrices of gains, "pi" or "pid", of stable plants, without bandwidth
+        and weights.
     structure : {"pi", "pid", "pd"} or int
         Kp + Ki/s, the same with a filtered derivative (filter time 1/the highest frequency), Kp with derivative, or PI
         with so many lags (a/(s + a))^k at the bandwidth.
@@ -65,7 +66,7 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     sample_time : float, optional
         Sample time of a sampled controller [s]; by default a continuous one, of a sampled model that of the model.
     decentralized : bool
-        Of two inputs and two outputs, whether only the diagonal of every matrix of gains may differ from zero.
+        Of several inputs and outputs, whether only the diagonal of every matrix of gains may differ from zero.
 
     Returns
     -------
@@ -99,16 +100,15 @@ def frf_pid(G: Any, *, structure: str | int = "pi", modulus_margin: float = 0.5,
     if is_matrix(G):
         for name, value in (("bandwidth", bandwidth), ("weights", weights), ("unstable_poles", unstable_poles)):
             if value:
-                raise InputError(f"{name} beside two inputs and two outputs", where=f"argument {name}",
+                raise InputError(f"{name} beside several inputs and outputs", where=f"argument {name}",
                                  expected="modulus_margin, structure, decentralized, initial, sample_time",
                                  remedy="rt.design.hinf takes weights and unstable plants.")
-        time_given = None if sample_time is None else positive_number(sample_time, "sample_time", "s")
-        return frf_matrix(G, structure, decentralized, margin, _probability(probability), initial, time_given)
+        return frf_matrix(G, structure, decentralized, margin, _probability(probability), initial, sample_time)
     if decentralized:
         raise InputError("decentralized with one input and one output", where="argument decentralized",
-                         expected="False, or a plant of two inputs and two outputs")
+                         expected="False, or a plant of several inputs and outputs")
     discs = read_discs(G, _probability(probability))
-    dt = _sample_time(discs, sample_time)
+    dt = read_sample_time([one.model for one in discs], max(float(one.omega[-1]) for one in discs), sample_time)
     speed = None if bandwidth is None else positive_number(bandwidth, "bandwidth", "rad/s")
     own = read_structure(structure, discs[0].omega, speed, dt)
     bins = _bins(discs, own, margin, speed, weights)
@@ -141,23 +141,6 @@ def _probability(value: object) -> float:
     found = positive_number(value, "probability")
     if found >= 1:
         raise InputError(f"probability = {found:g}", where="argument probability", expected="between 0 and 1")
-    return found
-
-
-def _sample_time(discs: Sequence[Discs], value: object) -> float:
-    of_model = {one.model.dt for one in discs if one.model is not None}
-    if value is None:
-        return of_model.pop() if len(of_model) == 1 else 0.0
-    found = positive_number(value, "sample_time", "s")
-    if of_model and of_model != {found}:
-        raise InputError(f"sample_time = {found:g} s of a controller for a model of another",
-                         where="argument sample_time", expected="a model with that sample time",
-                         remedy="Sample the model first: control.c2d.")
-    highest = max(float(one.omega[-1]) for one in discs)
-    if highest > np.pi / found * (1 + 1e-9):
-        raise InputError(f"the response goes up to {highest / (2 * np.pi):.4g} Hz, beyond the Nyquist frequency of "
-                         f"sample_time = {found:g} s", where="argument sample_time",
-                         expected=f"at most {np.pi / highest:.4g} s", remedy="Cut the response with G.between.")
     return found
 
 

@@ -19,7 +19,7 @@ from ._arithmetic import Arithmetic, Balls, Floats, floats
 from ._design import Design, RobustAgainst, named, zero_controller
 from ._outcomes import SynthesisCode
 from ._plant import GeneralizedPlant, balanced, read_generalized, with_direct_path
-from ._regularize import lacks_control_weight, lacks_noise, with_channels
+from ._regularize import lacks_control_weight, lacks_noise, missing_weights, with_channels
 
 _SLACKS = (1e-5, 1e-4, 1e-3, 1e-2)  # of the bound above the norm in floats, in turn
 _CHANNELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -79,6 +79,7 @@ def h2(P: control.StateSpace, n_meas: int, n_ctrl: int, *, sample_time: float | 
     controller, loop = named(state_space(P), plant, K)
     method = "Riccati equations (H2)" + (f", channels of size {size:g} added" if size else "")
     said = f"Certified for the numbers of the controller as returned: H2 norm below {value:.7g}."
+    said += missing_weights(plant) if size else ""
     return Design(controller, value, lower, loop, [certificate], RobustAgainst("Proven for the plant as given, alone."),
                   SynthesisCode.CERTIFIED.outcome(said), method, precision, time.perf_counter() - start, count, plant)
 

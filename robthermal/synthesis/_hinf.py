@@ -22,7 +22,7 @@ from ._level import Candidate, candidates, central
 from ._outcomes import SynthesisCode
 from ._plant import GeneralizedPlant, balanced, read_generalized, to_continuous, to_sampled
 from ._reduce import shortened
-from ._regularize import lacks_control_weight, lacks_noise, with_channels
+from ._regularize import lacks_control_weight, lacks_noise, missing_weights, with_channels
 
 _CHANNELS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # sizes of the added channels, in turn, until they cease to help
 _ENOUGH = 0.3  # of the tolerance: a gain below it ends the search for smaller channels
@@ -116,7 +116,7 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     if found is None:
         return _design(P, plant, None, [], _nothing(best, max_gain), lower, start, best)
     K, certificates = found
-    outcome = _judge(certificates, asked, lower, poles)
+    outcome = _judge(certificates, asked, lower, poles, missing_weights(plant) if best and best.channels else "")
     if best is not None and poles and order is None and max_gain is None and not certificates[-1].holds:
         other = _by_inequalities(plant, best, asked, poles)
         if other is not None and (judged := _judge(other[1], asked, lower, poles)).ok:
@@ -280,7 +280,8 @@ def _finished(plant: GeneralizedPlant, best: Reached | None, order: int | None,
     return K, certificates
 
 
-def _judge(certificates: list[Certificate], asked: float | None, lower: float, poles: Mapping[str, float]) -> Outcome:
+def _judge(certificates: list[Certificate], asked: float | None, lower: float, poles: Mapping[str, float],
+           lacking: str = "") -> Outcome:
     value = float(certificates[0].region["bound"])
     if asked is not None and value > asked:
         return SynthesisCode.INFEASIBLE.outcome(f"gamma = {asked:g}: the best achievable is about {lower:#.4g}.")
@@ -289,7 +290,7 @@ def _judge(certificates: list[Certificate], asked: float | None, lower: float, p
             f"The closed-loop eigenvalues are not proven to lie in the region {dict(poles)}: "
             f"{certificates[-1].reason}.", remedy="Ask for decay (sampled: radius) alone, or for less.")
     found = f"H-infinity norm below {value:.6g}; the best possible is about {lower:.6g}, estimated."
-    return SynthesisCode.CERTIFIED.outcome(f"Certified for the numbers of the controller as returned: {found}")
+    return SynthesisCode.CERTIFIED.outcome(f"Certified for the numbers of the controller as returned: {found}{lacking}")
 
 
 def _design(P: Any, plant: GeneralizedPlant, K: Plant | None, certificates: list[Certificate], outcome: Outcome,

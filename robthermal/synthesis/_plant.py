@@ -66,14 +66,15 @@ def read_generalized(system: Any, n_meas: int, n_ctrl: int, where: str = "argume
 def check_modes(plant: GeneralizedPlant, where: str = "argument P") -> None:
     """Refuse a plant with an unstable mode that the controls do not reach or the measurements do not see."""
     own = balanced(plant)
-    for A, B, word, remedy in ((own.A, own.B2, "not stabilisable", "Add or move a control, or leave the mode out."),
-                               (own.A.T, own.C2.T, "not detectable", "Add or move a sensor, or leave the mode out.")):
+    weight = "Of a weight: take a stable one, 1/(s + 0.001) for 1/s."
+    for A, B, word, part in ((own.A, own.B2, "not stabilisable", "control"),
+                             (own.A.T, own.C2.T, "not detectable", "sensor")):
         mode = hidden_mode(A, B, plant.dt)
         if mode is not None:
             cause = "no control reaches it" if word == "not stabilisable" else "no measurement sees it"
             raise InputError(f"{word}: the mode at {say_mode(mode, plant.dt)}; {cause}", where=where,
                              expected="every unstable mode within reach of the controls and seen by the measurements",
-                             remedy=remedy)
+                             remedy=f"Add or move a {part}, or leave the mode out. {weight}")
 
 
 def hidden_mode(A: Array, B: Array, dt: float) -> complex | None:
@@ -86,7 +87,7 @@ def hidden_mode(A: Array, B: Array, dt: float) -> complex | None:
     edge = 1e-9 * (1.0 if dt else float(sizes.max()))
     for value in values[(abs(values) >= 1 - edge) if dt else (values.real >= -edge)]:
         gap = np.linalg.svd(np.hstack([A - value * np.eye(n), B]), compute_uv=False)[n - 1]
-        if gap < _HIDDEN * size:
+        if gap <= _HIDDEN * size:  # equal: no dynamics and no control
             return complex(value)
     return None
 

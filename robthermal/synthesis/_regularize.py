@@ -11,7 +11,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..linear import Plant, responder
-from ._plant import GeneralizedPlant
+from ._plant import GeneralizedPlant, to_continuous
 
 _RANK = 1e-9  # relative: a direct path smaller than this is none
 _AXIS = 1e-8  # relative distance of a zero from the axis that counts as on it
@@ -19,12 +19,34 @@ _AXIS = 1e-8  # relative distance of a zero from the axis that counts as on it
 
 def lacks_control_weight(plant: GeneralizedPlant) -> bool:
     """Whether some control does not appear in z, at infinite frequency or at a zero on the axis (continuous)."""
-    return _rank_lost(plant.D12) or _zero_on_axis(plant.A, plant.B2, plant.C1, plant.D12)
+    return _lost(plant.A, plant.B2, plant.C1, plant.D12) is not None
 
 
 def lacks_noise(plant: GeneralizedPlant) -> bool:
     """Whether some measurement is free of disturbance, at infinite frequency or at a zero on the axis (continuous)."""
-    return _rank_lost(plant.D21.T) or _zero_on_axis(plant.A.T, plant.C2.T, plant.B1.T, plant.D21.T)
+    return _lost(plant.A.T, plant.C2.T, plant.B1.T, plant.D21.T) is not None
+
+
+def missing_weights(plant: GeneralizedPlant) -> str:
+    """Which weights are missing, at which frequency, and what to add: sentences to follow others; empty: none."""
+    work, side = to_continuous(plant) if plant.dt else (plant, 1.0)
+    missing = {"control shows in the performance outputs": _lost(work.A, work.B2, work.C1, work.D12),
+               "measurement is disturbed": _lost(work.A.T, work.C2.T, work.B1.T, work.D21.T)}
+    parts = [f"not every {what} at {_frequency(where, side, plant.dt)}"
+             for what, where in missing.items() if where is not None]
+    if not parts:
+        return ""
+    return (f" Weights are missing: {'; '.join(parts)}. Only small channels, added for the design, keep the gains "
+            "finite: look at the margins, and add a small multiple of the controls to the performance outputs, or "
+            "noise to the measurements.")
+
+
+def _frequency(value: float, side: float, dt: float) -> str:
+    """A frequency on the axis in words; of a sampled plant from that of its continuous image."""
+    if not dt:
+        return f"{value:.4g} rad/s" if np.isfinite(value) else "infinite frequency (rank of the direct path)"
+    angle = 2 * np.arctan(value)
+    return f"{(angle if side > 0 else np.pi - angle) / dt:.4g} rad/s"
 
 
 def with_channels(plant: GeneralizedPlant, size: float, control_weight: bool, noise: bool) -> GeneralizedPlant:
@@ -54,11 +76,16 @@ def _rank_lost(D12: Array) -> bool:
     return len(D12) < D12.shape[1] or bool(values[-1] <= _RANK * values[0])
 
 
-def _zero_on_axis(A: Array, B: Array, C: Array, D: Array) -> bool:
-    """Invariant zeros of a tall system of full rank, from its zero pencil compressed by the range of D."""
+def _lost(A: Array, B: Array, C: Array, D: Array) -> float | None:
+    """Frequency at which a tall system loses rank [rad/s], infinity for its direct path; None where there is none.
+
+    Invariant zeros on the axis come from the zero pencil compressed by the range of D.
+    """
+    if _rank_lost(D):
+        return np.inf
     n = len(A)
-    if n == 0 or _rank_lost(D):
-        return False
+    if n == 0:
+        return None
     Q, R = np.linalg.qr(D, mode="complete")
     k = D.shape[1]
     feedback = np.linalg.solve(R[:k], Q[:, :k].T @ C)
@@ -68,8 +95,8 @@ def _zero_on_axis(A: Array, B: Array, C: Array, D: Array) -> bool:
     for value in values[abs(values.real) <= _AXIS * np.maximum(sizes, 1e-3 * float(sizes.max()))]:
         gap = np.linalg.svd(np.vstack([own - 1j * value.imag * np.eye(n), seen]), compute_uv=False)[-1]
         if gap <= _AXIS * max(float(np.linalg.norm(own, 2)), 1e-300):
-            return True
-    return False
+            return float(abs(value.imag))
+    return None
 
 
 def _typical(A: Array, B: Array, C: Array, D: Array) -> Array:

@@ -1,4 +1,4 @@
-"""PI of two inputs and two outputs from frequency responses: search over all gains, drawn plants, refusals."""
+"""PI of several inputs and outputs from frequency responses: search over all gains, drawn plants, refusals."""
 
 from __future__ import annotations
 
@@ -131,16 +131,112 @@ def test_circles_that_allow_no_loop_within_the_bins_are_a_result():
 @pytest.mark.parametrize(("plant", "more", "message"), [
     (control.ss(LAGS.A, LAGS.B[:, :1], LAGS.C, np.zeros((2, 1))), {}, "1 inputs and 2 outputs"),
     (LAGS, {"structure": "pd"}, '"pi" or "pid"'), (LAGS, {"structure": 3}, '"pi" or "pid"'),
-    (LAGS, {"weights": {"S": 1.0}}, "weights beside two inputs"), (LAGS, {"bandwidth": 1.0}, "bandwidth beside two"),
-    (LAGS, {"unstable_poles": 1}, "unstable_poles beside two"),
+    (LAGS, {"weights": {"S": 1.0}}, "weights beside several inputs"),
+    (LAGS, {"bandwidth": 1.0}, "bandwidth beside several"),
+    (LAGS, {"unstable_poles": 1}, "unstable_poles beside several"),
     (LAGS, {"initial": {"Kp": 1.0}}, "expected gains|Expected gains"),
-    (control.ss(-np.eye(2), np.eye(2), [[1, 2], [2, 1]], np.zeros((2, 2))), {"decentralized": True}, "not every plant"),
+    (control.ss(-np.eye(2), np.eye(2), [[1, 2], [2, 1]], np.zeros((2, 2))), {"decentralized": True},
+     "not every plant"),
     (control.ss(LAGS.A, LAGS.B[:, [0, 0]], LAGS.C, np.zeros((2, 2))), {}, "invertible static gain"),
     (control.tf([1], [1, 1]), {"decentralized": True}, "decentralized with one input"),
+    (control.ss(-np.eye(5), np.eye(5), np.eye(5), 0 * np.eye(5)), {}, "as many of each, at most 4"),
+    ([LAGS, control.ss(-np.eye(3), np.eye(3), np.eye(3), 0 * np.eye(3))], {}, "responses with 2 and 3 inputs"),
+    (LAGS, {"sample_time": 1.0}, "sample_time = 1 s of a controller for a model of another"),
 ])
 def test_bad_arguments_are_named(plant, more, message):
     with pytest.raises(InputError, match=message):
         rt.design.frf_pid(plant, **more)
+
+
+THREE = [control.tf([1.0], np.polymul([T, 1], [T / 3, 1])) for T in (0.5, 1.0, 1.5)]
+CROSS = np.array([[1.0, 0.2, -0.1], [-0.15, 0.9, 0.2], [0.1, -0.2, 1.1]])
+BINS = np.geomspace(1e-2, 100, 70)
+
+
+def recorded(response, noise=0.0):
+    """The response with a covariance of one size in every entry."""
+    size, count = len(response), len(BINS)
+    return FrequencyResponse(
+        frequencies=BINS / (2 * np.pi), response=response, degrees_of_freedom=np.full(count, 200),
+        noise_covariance=noise**2 * np.eye(size)[:, :, None] * np.ones(count),
+        covariance=noise**2 * np.eye(size**2)[:, :, None] * np.ones(count), input_names=[f"q{k}" for k in range(size)],
+        output_names=[f"T{k}" for k in range(size)], sample_time=0.01, n_samples=10_000, method="made for a test",
+        notes=())
+
+
+def three(cross, noise=0.0, seed=0):
+    """Response of three lags with inputs mixed, independent errors in every entry."""
+    rng = np.random.default_rng(seed)
+    truth = np.array([lag(1j * BINS) for lag in THREE])[:, None, :] * cross[:, :, None]
+    error = rng.standard_normal(truth.shape) + 1j * rng.standard_normal(truth.shape)
+    return recorded(truth + noise / np.sqrt(2) * error, noise)
+
+
+def gains_of_three(d):
+    return [np.array([[d.gains[f"{name}{r}{c}"] for c in "123"] for r in "123"]) for name in ("Kp", "Ki")]
+
+
+def margin_of_three(Kp, Ki, response):
+    K = Kp + Ki / (1j * BINS)[:, None, None]
+    return float(np.linalg.svd(np.eye(3) + np.moveaxis(response, -1, 0) @ K, compute_uv=False)[:, -1].min())
+
+
+def test_three_loops_that_do_not_interact_are_limited_by_the_slowest_alone():
+    """Its largest integral gain by brute force over PI gains: margin at the bins, stability by Routh's criterion."""
+    d = rt.design.frf_pid(three(np.eye(3)), modulus_margin=0.6, decentralized=True)
+    assert d.holds and d.outcome.code == "at_the_bins" and set(d.margins) == {"all loops"}
+    _, Ki = gains_of_three(d)
+    P, I = np.meshgrid(np.linspace(0, 8, 161), np.linspace(0.02, 6, 300), indexing="ij")  # noqa: E741
+    C = P[..., None] + I[..., None] / (1j * BINS)
+    inside = abs(1 + THREE[2](1j * BINS) * C).min(axis=-1) >= 0.6
+    stable = 4 * 1.5 / 3 * (1 + P) > 1.5**2 / 3 * I  # of 0.75 s³ + 2 s² + (1 + Kp) s + Ki
+    assert min(np.diag(Ki)) == pytest.approx(I[inside & stable].max(), rel=0.02)
+    assert np.count_nonzero(Ki) == 3 and d.controller.ninputs == d.controller.noutputs == 3
+
+
+def test_three_interacting_loops_keep_the_margin_over_the_circles():
+    measured_three = three(CROSS, 0.004)
+    d = rt.design.frf_pid(measured_three, modulus_margin=0.5, decentralized=True, probability=0.95)
+    assert d.holds and d.robust_against.data["probability"] == 0.95
+    Kp, Ki = gains_of_three(d)
+    truth = three(CROSS).response
+    kept = [margin_of_three(Kp, Ki, measured_three.response + three(CROSS, 0.004, 100 + seed).response - truth)
+            for seed in range(40)]
+    assert min(kept) >= 0.5 and margin_of_three(Kp, Ki, truth) > 0.5
+    blocks = control.ss(control.append(*(control.ss(one) for one in THREE)))
+    B = blocks.B @ CROSS
+    loop = np.block([[blocks.A - B @ Kp @ blocks.C, B @ Ki], [-blocks.C, np.zeros((3, 3))]])
+    assert np.linalg.eigvals(loop).real.max() < 0
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("decentralized", [True, False])
+def test_no_gains_of_a_search_over_three_loops_have_more_integral_action(decentralized):
+    response = three(CROSS)
+    d = rt.design.frf_pid(response, modulus_margin=0.6, decentralized=decentralized)
+    Kp, Ki = gains_of_three(d)
+    free = np.eye(3, dtype=bool) if decentralized else np.ones((3, 3), bool)
+    static = CROSS  # lags of static gain one
+
+    def cost(x):
+        P, I = np.zeros((3, 3)), np.zeros((3, 3))  # noqa: E741
+        P[free], I[free] = np.split(x, 2)
+        return 100 * max(0.0, 0.6 - margin_of_three(P, I, response.response)) - np.linalg.eigvalsh(
+            static @ I + (static @ I).T)[0] / 2
+
+    own = np.linalg.eigvalsh(static @ Ki + (static @ Ki).T)[0] / 2
+    x = np.r_[Kp[free], Ki[free]]
+    found = minimize(cost, x, method="Nelder-Mead", options={"maxfev": 6000, "adaptive": True})  # stays stable: near
+    assert own > 0.3 and -found.fun <= 1.02 * own
+
+
+@pytest.mark.exhaustive
+def test_three_loops_of_a_model_are_certified():
+    blocks = control.ss(control.append(*(control.ss(one) for one in THREE)))
+    plant = control.ss(blocks.A, blocks.B @ CROSS, blocks.C, np.zeros((3, 3)))
+    d = rt.design.frf_pid(plant, modulus_margin=0.6, decentralized=True)
+    assert d.holds and d.certificates[0].kind == "closed_loop" and rt.verify(d.certificates[0]).valid
+    assert d.value <= 1 / 0.6 * 1.001
 
 
 def test_initial_gains_that_do_not_stabilize_are_refused():

@@ -11,6 +11,7 @@ from plants import norm, random_plant
 
 import robthermal as rt
 from robthermal.errors import InputError
+from robthermal.linear import Plant, plant_norm
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data" / "compleib"
 # x' = x + w + u, z = (x, u): the norm of u = -k x is √(1 + k²)/(k - 1)
@@ -74,6 +75,24 @@ def test_published_static_gains(name, published):
     P, n_meas, n_ctrl = compleib(name)
     d = rt.design.output_feedback(P, n_meas, n_ctrl, gamma=1.01 * published)
     assert d.holds and rt.verify(d.certificates[0]).valid and d.lower * 0.999 < d.value <= 1.01 * published
+
+
+def test_a_pole_on_the_axis_to_rounding_has_an_infinite_norm():
+    """ROC7 of COMPleib met one in its search: its response at 0 is no number."""
+    with np.errstate(all="ignore"):
+        found, where = plant_norm(Plant(np.diag([0.0, -1.0]), np.eye(2), np.eye(2), np.zeros((2, 2)), 0.0))
+    assert found == np.inf and where == 0.0
+
+
+@pytest.mark.exhaustive
+@pytest.mark.skipif(not SHARED.exists(), reason="COMPleib is not beside this tree")
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", ["ROC7", "NN3", "REA1", "HF2D12"])
+def test_no_model_ends_in_an_exception_or_a_wrong_claim(name):
+    P, n_meas, n_ctrl = compleib(name)
+    d = rt.design.output_feedback(P, n_meas, n_ctrl)
+    assert d.holds == bool(d.certificates) == (name != "NN3")
+    assert not d.holds or (rt.verify(d.certificates[0]).valid and d.lower * 0.999 < norm(P, d.controller) < d.value)
 
 
 def test_gamma_below_the_full_order_optimum_is_infeasible():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -108,8 +109,23 @@ def synthesize_plant(job: SynthesisJob, method: str) -> Synthesis:
     if missing:
         raise InputError(f"key design.{missing[0]} is missing", where=f"{job.files[0]} [design]",
                          expected=f"arguments of {method}: {', '.join(allowed)}")
-    design = verb(*given, **job.arguments)
+    try:
+        design = verb(*given, **job.arguments)
+    except InputError as error:
+        raise _in_file(error, job) from None
     return Synthesis(job, method, design, tuple(_check(k, one) for k, one in enumerate(design.certificates)))
+
+
+def _in_file(error: InputError, job: SynthesisJob) -> InputError:
+    """The error of a verb, which names its arguments, with the table of the file that they come from."""
+    name = re.match(r"(?:argument )?(\w+)", error.where)
+    word = name.group(1) if name else ""
+    tables = {"P": "plant", "plant": "plant", "plants": "plant", "n_meas": "plant", "n_ctrl": "plant",
+              "K": "controller", "G": "frf", "system": "system", **dict.fromkeys(job.arguments, "design")}
+    if word not in tables:
+        return error
+    where = f"{job.files[0]} [{tables[word]}]" + (f" {word}" if tables[word] == "design" else "")
+    return InputError(error.what, where=where, expected=error.expected, remedy=error.remedy)
 
 
 def _check(k: int, certificate: Certificate) -> Checked:
