@@ -13,8 +13,8 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 
 from ._basis import LocalBasis
+from ._compiled import interior_kernel
 from ._kernel import Kernel
-from ._normal import NormalKernel
 from ._records import Spectrum
 from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
@@ -152,7 +152,7 @@ class LocalEstimate:
         first, last = self.basis.half_width + 1, self.n_bins - self.basis.half_width + 1
         points = len(self.spectra) * self.basis.n_points
         chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
-        normal = NormalKernel(self.spectra, self.basis)
+        normal = interior_kernel(self.spectra, self.basis)
         block = normal.chunk
         full = found.noise is not None
 

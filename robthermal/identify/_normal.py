@@ -24,9 +24,9 @@ from ._moments import BLOCK, Moments, in_blocks, ordered
 from ._records import Spectrum
 from ._transients import ConstantTransient, WeightedTransient, Weights
 
-_WEAK_PIVOT = 1e-6  # energy left of a regressor, relative to its input: rounding costs 1e-16/1e-6 of G
-_WEAK_RESIDUAL = 1e-8  # energy left of an output, relative to it: rounding costs 1e-15/1e-8 of the noise variance
-_WEAK_BOTH = 1e-10  # their product: large coefficients amplify the rounding of what is left, 1e-16/1e-10
+WEAK_PIVOT = 1e-6  # energy left of a regressor, relative to its input: rounding costs 1e-16/1e-6 of G
+WEAK_RESIDUAL = 1e-8  # energy left of an output, relative to it: rounding costs 1e-15/1e-8 of the noise variance
+WEAK_BOTH = 1e-10  # their product: large coefficients amplify the rounding of what is left, 1e-16/1e-10
 # Bins of a chunk, and bytes of its normal equations: calls are long, memory is near, rows do not share cache lines
 # as they would 2**k bytes apart.
 _WIDEST, _BYTES = 4112, 2**23
@@ -199,10 +199,10 @@ class NormalKernel:
             row = np.multiply(H[c, c + 1 :], work.inverse, out=H[c, c + 1 :])
             np.conjugate(row, out=conjugates[c + 1 :])
             self._take_away(H[c], conjugates, c + 1, work, full_noise)
-        fine = least > _WEAK_PIVOT  # not where least is NaN
+        fine = least > WEAK_PIVOT  # not where least is NaN
         for o in range(self.n_y):
             left = H[n_k + o, n_k + o].real / work.energy[n_u + o]
-            fine &= (left > _WEAK_RESIDUAL) & (left * least > _WEAK_BOTH)
+            fine &= (left > WEAK_RESIDUAL) & (left * least > WEAK_BOTH)
         return np.logical_not(fine)
 
     def _take_away(self, row: Array, conjugate: Array, first: int, work: _Work, full_noise: bool) -> None:

@@ -1,0 +1,77 @@
+"""Compile the kernel of the local methods beside its source where there is a C compiler; without one nothing is lost.
+
+The package computes the same with numpy, slower. Whatever goes wrong here is one line of note and a pure package.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+SOURCE = Path("robthermal", "identify", "_moments.c")
+# Not -march=native: what is built on one computer runs on another; the library says whether the processor has AVX2.
+# Neither -ffast-math: numbers that are not numbers must stay so.
+FLAGS = ("-std=c11", "-O3", "-mavx2", "-mfma", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math",
+         "-Wno-psabi", "-shared", "-fPIC")
+LONGEST = 120  # seconds that the compiler may take
+
+
+class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Adds the library to a wheel, or puts it into the tree of an editable install."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Called before a wheel is put together; `version` is "standard" or "editable"."""
+        if self.target_name != "wheel":
+            return
+        source = Path(self.root, SOURCE)
+        name = f"_moments_{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}.so"  # as _compiled.py looks for it
+        editable = version == "editable"
+        self._folder = source.parent if editable else Path(tempfile.mkdtemp())
+        try:
+            build(source, self._folder / name)
+        except (OSError, RuntimeError, subprocess.SubprocessError) as error:
+            print(f"note: robthermal without its compiled kernel ({error}); numpy does the same, slower",
+                  file=sys.stderr)
+            return
+        if editable:
+            for old in source.parent.glob("_moments_*.so"):
+                if old.name != name:
+                    old.unlink(missing_ok=True)
+            return
+        build_data["force_include"][str(self._folder / name)] = str(SOURCE.with_name(name))
+        build_data["pure_python"] = False
+        build_data["tag"] = f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Called when the wheel is written."""
+        if version != "editable" and hasattr(self, "_folder"):
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def build(source: Path, library: Path) -> None:
+    """Compile `source` to `library`, which appears whole or not at all."""
+    if sys.platform == "win32" or platform.machine().lower() not in ("x86_64", "amd64"):
+        raise RuntimeError(f"it is for x86-64 without Windows, this is {sys.platform} on {platform.machine()}")
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
+    if not compiler or not shutil.which(compiler[0]):
+        compiler = ["cc"]
+    unfinished = library.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        run = subprocess.run([*compiler, *FLAGS, "-o", str(unfinished), str(source), "-lm"], capture_output=True,
+                             text=True, timeout=LONGEST, check=False)
+        if run.returncode:
+            raise RuntimeError(f"{compiler[0]}: {(run.stderr.strip().splitlines() or ['failed'])[0][:200]}")
+        unfinished.replace(library)
+    finally:
+        unfinished.unlink(missing_ok=True)

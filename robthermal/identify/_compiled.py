@@ -1,0 +1,134 @@
+"""The compiled kernel `_moments.c` where it was built, by ctypes: the one place that decides between it and numpy.
+
+The library is named by a hash of its source, so that one built from an older source is never loaded. Sizes, types and
+layout of every array are checked here, for the other side trusts them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from .._arrays import Array
+from ._basis import LocalBasis
+from ._kernel import BlockFit
+from ._normal import WEAK_BOTH, WEAK_PIVOT, WEAK_RESIDUAL, NormalKernel
+from ._records import Spectrum
+
+SOURCE = Path(__file__).with_name("_moments.c")
+_MOST_SIZE, _MOST_COLUMNS = 5, 24  # as in the source
+_BINS = 8192  # of a chunk: long enough for other threads, and for what a call costs
+
+
+class _Problem(ctypes.Structure):
+    """`problem` of the source."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("n_records", "n_u", "n_y", "size", "half", "width")),
+        *((name, ctypes.c_void_p) for name in ("U", "Y", "strides", "w", "products", "functions", "ones")),
+        *((name, ctypes.c_double) for name in ("weak_pivot", "weak_residual", "weak_both", "degrees_of_freedom")),
+        *((name, ctypes.c_void_p) for name in ("response", "gram", "noise", "variance", "doubtful")),
+    )
+
+
+def library_name(source: bytes) -> str:
+    """Name of the library that belongs to a source."""
+    return f"_moments_{hashlib.sha256(source).hexdigest()[:16]}.so"
+
+
+@cache
+def library(folder: Path = SOURCE.parent) -> ctypes.CDLL | None:
+    """The library in `folder`, or None: not built, built from another source or for another machine."""
+    try:
+        found = ctypes.CDLL(os.fspath(folder / library_name(SOURCE.read_bytes())))
+        fits = found.robthermal_problem_size() == ctypes.sizeof(_Problem) and found.robthermal_runs_here()
+    except (OSError, AttributeError):
+        return None
+    if not fits:
+        return None
+    found.robthermal_solve.argtypes, found.robthermal_solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int
+    return found
+
+
+def interior_kernel(spectra: Sequence[Spectrum], basis: LocalBasis) -> NormalKernel | CompiledKernel:
+    """The solver of interior windows: compiled where that was built and holds them, else in numpy."""
+    built, n_u, n_y = library(), spectra[0].U.shape[0], spectra[0].Y.shape[0]
+    if built is None or basis.size > _MOST_SIZE or n_u * basis.size + n_y > _MOST_COLUMNS:
+        return NormalKernel(spectra, basis)
+    return CompiledKernel(spectra, basis, built)
+
+
+class CompiledKernel:
+    """As `NormalKernel`, several times faster.
+
+    Parameters
+    ----------
+    spectra : sequence of Spectrum
+        Records of equal length.
+    basis : LocalBasis
+        Functions of plant and transient.
+    built : ctypes.CDLL
+        What `library` found.
+    """
+
+    chunk = _BINS
+
+    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis, built: ctypes.CDLL):
+        self._basis, self._built = basis, built
+        self._n_u, self._n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
+        if basis.size > _MOST_SIZE or self._n_u * basis.size + self._n_y > _MOST_COLUMNS:
+            raise ValueError("more functions or columns than the compiled kernel holds")
+        self._n_bins = spectra[0].n_bins
+        self._U = [_checked(s.U, (self._n_u, self._n_bins)) for s in spectra]
+        self._Y = [_checked(s.Y, (self._n_y, self._n_bins)) for s in spectra]
+        half, size, points = basis.half_width, basis.size, basis.n_points  # functions are even or odd: r >= 0 is enough
+        self._products = _checked(basis.real_products()[:, half:], (2 * size - 1, half + 1), float)
+        self._functions = _checked(basis.real_functions()[:, half:], (size, half + 1), float)
+        self._ones = np.ones((1, half + 1))
+        self._strides = np.full(len(spectra), self._n_bins, dtype=np.int64)
+        self.degrees_of_freedom = len(spectra) * (points - size) - self._n_u * size
+
+    def solve(self, start: int, stop: int, *, full_noise: bool) -> BlockFit:
+        """Windows centered at bins start ... stop-1, counted from 1; all of them must fit between the edges."""
+        half, count, n_u, n_y = self._basis.half_width, stop - start, self._n_u, self._n_y
+        first = start - 1 - half
+        if count < 1 or first < 0 or stop - 1 + half > self._n_bins:
+            raise ValueError("windows reach beyond the spectra")
+        w = None
+        if self._basis.poles.size:
+            bins = np.arange(start - half, stop + half, dtype=float)
+            w = _checked(1.0 / self._basis.rotated_denominator(bins), (count + 2 * half,))
+        fit = BlockFit(
+            response=np.empty((n_y, n_u, count), dtype=complex),
+            gram=np.empty((n_u, n_u, count), dtype=complex),
+            noise=np.empty((n_y, n_y, count) if full_noise else (n_y, count), dtype=complex if full_noise else float),
+            doubtful=np.empty(count, dtype=bool),
+        )
+        variance = np.empty((n_y, count)) if full_noise else fit.noise
+        pointers = [(ctypes.c_void_p * len(of))(*(one[:, first:].ctypes.data for one in of)) for of in (self._U, self._Y)]
+        problem = _Problem(
+            len(self._U), n_u, n_y, self._basis.size, half, count + 2 * half,
+            *(ctypes.addressof(one) for one in pointers), self._strides.ctypes.data,
+            None if w is None else w.ctypes.data,
+            self._products.ctypes.data, self._functions.ctypes.data, self._ones.ctypes.data,
+            WEAK_PIVOT, WEAK_RESIDUAL, WEAK_BOTH, self.degrees_of_freedom,
+            fit.response.ctypes.data, fit.gram.ctypes.data, fit.noise.ctypes.data if full_noise else None,
+            variance.ctypes.data, fit.doubtful.ctypes.data,
+        )
+        if self._built.robthermal_solve(ctypes.byref(problem)) != 0:
+            raise MemoryError("no memory for the windows of a chunk")
+        return fit
+
+
+def _checked(values: Array, shape: tuple[int, ...], kind: type = complex) -> Array:
+    """Contiguous, of the type and shape that the other side expects."""
+    found = np.ascontiguousarray(values, dtype=kind)
+    if found.shape != shape:
+        raise ValueError(f"an array of shape {found.shape} where {shape} is needed")
+    return found
