@@ -1,7 +1,7 @@
-/* Interior windows of local methods through their normal equations, four windows at a time.
+/* Interior windows of local methods through their normal equations, LANES windows at a time.
  *
  * The method is that of _normal.py, term by term; docs/explanations/frequency_kernel.md derives it. A vector holds one
- * number of four windows, whose centers lie LENGTH bins apart, so that every load of a sliding window is aligned.
+ * number of several windows, whose centers lie LENGTH bins apart, so that every load of a sliding window is aligned.
  * Called through _compiled.py, which checks sizes; compiled by hatch_build.py with -mavx2 -mfma.
  */
 #include <math.h>
@@ -121,10 +121,8 @@ INLINE void store(complex_number *to, int64_t first, int64_t count, vec re, vec 
 
 /* Place of the regressor phi_s U_i: the constants of G come last. */
 #define COLUMN(i, s) ((s) ? (i) * (size - 1) + size - 1 - (s) : n_u * (size - 1) + (i))
-/* Places of the sequences of one record. */
-#define PAIR(kind, a, b) (all + (kind) + (a) * n + (b))
 
-/* n_u, n_y and size are constants where the compiler knows them. */
+/* size is a constant where the compiler knows it: sums stay in registers then. */
 INLINE int solve_sized(const problem *q, const int n_u, const int n_y, const int size)
 {
     const int n_k = n_u * size, n = n_u + n_y, columns = n_k + n_y, half = (int)q->half, length = LENGTH + 2 * half;
@@ -345,9 +343,6 @@ int robthermal_solve(const problem *q)
 {
     const int n_u = (int)q->n_u, n_y = (int)q->n_y;
     if (q->size > MOST_SIZE || q->size * n_u + n_y > MOST_COLUMNS) return 2;
-    if (n_u == 1 && n_y == 1 && q->size == 3) return solve_sized(q, 1, 1, 3);
-    if (n_u == 2 && n_y == 2 && q->size == 3) return solve_sized(q, 2, 2, 3);
-    if (n_u == 1 && n_y == 1 && q->size == 4) return solve_sized(q, 1, 1, 4);
     if (q->size == 3) return solve_sized(q, n_u, n_y, 3);
     if (q->size == 4) return solve_sized(q, n_u, n_y, 4);
     return solve_sized(q, n_u, n_y, (int)q->size);

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import compiled
 import numpy as np
 import pytest
 from flint import acb, ctx
 
 import robthermal as rt
+from robthermal.identify import _compiled
 from robthermal.identify._basis import LocalBasis
+
+
+@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+def kernel(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every test on both kernels."""
+    found = compiled.built() if request.param == "compiled" else None
+    monkeypatch.setattr(_compiled, "library", lambda: found)
 
 
 def record_of(n_u: int, n_y: int, noise: float, n: int = 2500, seed: int = 0) -> rt.Record:
