@@ -111,7 +111,8 @@ class CompiledKernel:
             doubtful=np.empty(count, dtype=bool),
         )
         variance = np.empty((n_y, count)) if full_noise else fit.noise
-        pointers = [(ctypes.c_void_p * len(of))(*(one[:, first:].ctypes.data for one in of)) for of in (self._U, self._Y)]
+        pointers = [(ctypes.c_void_p * len(channels))(*(one[:, first:].ctypes.data for one in channels))
+                    for channels in (self._U, self._Y)]
         problem = _Problem(
             len(self._U), n_u, n_y, self._basis.size, half, count + 2 * half,
             *(ctypes.addressof(one) for one in pointers), self._strides.ctypes.data,
@@ -128,7 +129,7 @@ class CompiledKernel:
 
 def _checked(values: Array, shape: tuple[int, ...], kind: type = complex) -> Array:
     """Contiguous, of the type and shape that the other side expects."""
-    found = np.ascontiguousarray(values, dtype=kind)
+    found: Array = np.ascontiguousarray(values, dtype=kind)
     if found.shape != shape:
         raise ValueError(f"an array of shape {found.shape} where {shape} is needed")
     return found

@@ -1,6 +1,6 @@
 /* Interior windows of local methods through their normal equations, LANES windows at a time.
  *
- * The method is that of _normal.py, term by term; docs/explanations/frequency_kernel.md derives it. A vector holds one
+ * The method is that of _normal.py, term by term; docs/explanations/frf_lpm.md derives it. A vector holds one
  * number of several windows, whose centers lie LENGTH bins apart, so that every load of a sliding window is aligned.
  * Called through _compiled.py, which checks sizes; compiled by hatch_build.py with -mavx2 -mfma.
  */
