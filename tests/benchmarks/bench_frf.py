@@ -20,7 +20,9 @@ from _timing import best_of, header, row  # noqa: E402
 from scipy.linalg import expm  # noqa: E402
 
 import robthermal as rt  # noqa: E402
+from robthermal.identify import _compiled  # noqa: E402
 
+BUILT = _compiled.library()
 N, HALF_WIDTH, DEGREE = 172_800, 8, 2
 POLES = [-1e-4, -1e-3, -1e-2]
 
@@ -76,13 +78,17 @@ def speed() -> None:
     for n in (1, 2):
         record = white_record(N, n, n)
         for name, run in (
-            (f"lpm {n}x{n}, degree {DEGREE}, full covariance", lambda r=record: rt.identify.lpm(r).covariance),
-            (f"lrmp {n}x{n}, three poles, full covariance", lambda r=record: rt.identify.lrmp(r, POLES).covariance),
+            (f"lpm {n}x{n}, degree {DEGREE}, covariance", lambda r=record: rt.identify.lpm(r).covariance),
+            (f"lrmp {n}x{n}, three poles, covariance", lambda r=record: rt.identify.lrmp(r, POLES).covariance),
         ):
-            seconds = cpu_seconds(run)
-            part = bins / seconds * moment_flops(n, n) / rate
-            share = f"{part:.1%} of the bound" if name.startswith("lpm") else ""
-            row(name, seconds, f"{bins / seconds / 1e6:.2f} M bins/cpu-s  {share}")
+            for kernel, library in (("numpy", None), *([("compiled", BUILT)] if BUILT else [])):
+                _compiled.library = lambda library=library: library  # what the package asks which kernel to take
+                seconds = cpu_seconds(run)
+                part = bins / seconds * moment_flops(n, n) / rate
+                share = f"{part:.1%} of the bound" if name.startswith("lpm") else ""
+                row(f"{name}, {kernel}", seconds, f"{bins / seconds / 1e6:.2f} M bins/cpu-s  {share}")
+    if BUILT is None:
+        print("The compiled kernel is not there: numpy alone (docs/contributing.md, the kernel in C).")
     for n, repeats in ((N, 15), (1_000_000, 7)):
         record = white_record(n, 2, 2)
         set_cores({min(cores)})
