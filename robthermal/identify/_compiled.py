@@ -59,7 +59,8 @@ def library(folder: Path = SOURCE.parent) -> ctypes.CDLL | None:
 def interior_kernel(spectra: Sequence[Spectrum], basis: LocalBasis) -> NormalKernel | CompiledKernel:
     """The solver of interior windows: compiled where that was built and holds them, else in numpy."""
     built, n_u, n_y = library(), spectra[0].U.shape[0], spectra[0].Y.shape[0]
-    if built is None or basis.size > _MOST_SIZE or n_u * basis.size + n_y > _MOST_COLUMNS:
+    fits = basis.size <= _MOST_SIZE and n_u * basis.size + n_y <= _MOST_COLUMNS
+    if built is None or not fits or not _even_and_odd(basis.real_functions()):
         return NormalKernel(spectra, basis)
     return CompiledKernel(spectra, basis, built)
 
@@ -125,6 +126,12 @@ class CompiledKernel:
         if self._built.robthermal_solve(ctypes.byref(problem)) != 0:
             raise MemoryError("no memory for the windows of a chunk")
         return fit
+
+
+def _even_and_odd(functions: Array) -> bool:
+    """Whether the functions (p, m) are even and odd in turn, which halves the products."""
+    signs = (-1.0) ** np.arange(len(functions))[:, None]
+    return bool(np.allclose(functions[:, ::-1], signs * functions, rtol=0.0, atol=1e-14))
 
 
 def _checked(values: Array, shape: tuple[int, ...], kind: type = complex) -> Array:

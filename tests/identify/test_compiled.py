@@ -107,6 +107,9 @@ def test_numpy_takes_what_the_library_does_not_hold(monkeypatch: pytest.MonkeyPa
     for answer, degree, kind in ((built, 2, CompiledKernel), (built, 5, NormalKernel), (None, 2, NormalKernel)):
         monkeypatch.setattr(_compiled, "library", lambda answer=answer: answer)
         assert type(interior_kernel(spectra_of(1, 1, 1), basis_of(14, degree, ()))) is kind
+    monkeypatch.setattr(_compiled, "library", lambda: built)
+    monkeypatch.setattr(LocalBasis, "real_functions", lambda basis: np.ones((3, 29)))  # the second is not odd
+    assert type(interior_kernel(spectra_of(1, 1, 1), basis_of(14, 2, ()))) is NormalKernel
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
