@@ -338,3 +338,32 @@ def test_noise_of_the_design_has_its_variance(given: rt.coupling.MatrixFilters) 
     run = rt.coupling.simulate(given, samples=4000, seed=1)
     assert np.sqrt(np.mean(np.sum(run.after**2, axis=1))) == pytest.approx(given.norms["h2"], rel=0.1)
     assert np.sqrt(np.mean(np.sum(run.before**2, axis=1))) == pytest.approx(given.norms["h2_uncoupled"], rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def designed(pair: tuple[control.StateSpace, ...]) -> rt.coupling.MatrixFilters:
+    return rt.coupling.synthesize_matrix(*pair, disturbances=(DRIFT, DRIFT), order=6)
+
+
+def test_reduced_filters_are_shorter_and_proven_again(designed: rt.coupling.MatrixFilters,
+                                                      pair: tuple[control.StateSpace, ...]) -> None:
+    short = designed.reduce(tolerance=0.01)
+    assert max(short.X_hat.nstates, short.Y_hat.nstates) < max(designed.X_hat.nstates, designed.Y_hat.nstates)
+    assert short.holds and short.norms["h2"] <= 1.01 * designed.norms["h2"] < 0.9 * designed.norms["h2_uncoupled"]
+    assert np.abs(control.feedback(control.append(*pair[:2]), short.controller).poles()).max() < 1
+    assert all(rt.verify(proof).valid for proof in short.certificates)
+    fine = np.linspace(1e-3, np.pi / DT, 3000)  # the variance again, from the loop of python-control
+    S = np.linalg.inv(np.eye(4) + values(control.append(*pair[:2]), fine) @ values(short.controller, fine))
+    e12 = (S[:, 2:] - S[:, :2]) * values(control.ss(DRIFT), fine)
+    power = np.sum(np.abs(e12) ** 2, axis=(1, 2))
+    assert short.norms["h2"] == pytest.approx(np.sqrt(np.trapezoid(power, fine) * DT / np.pi), rel=2e-3)
+
+
+def test_filters_without_a_state_too_many_are_not_reduced(designed: rt.coupling.MatrixFilters,
+                                                          pair: tuple[control.StateSpace, ...]) -> None:
+    gains = rt.coupling.evaluate_matrix(*pair, X_hat=-0.3 * np.eye(2), disturbances=(DRIFT, DRIFT))
+    kept = gains.reduce()
+    assert kept.outcome.code == "not_reduced" and kept.X_hat is gains.X_hat and kept.holds
+    assert designed.reduce(order=2).X_hat.nstates == 2
+    with pytest.raises(rt.InputError, match="order"):
+        designed.reduce(order=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
@@ -11,18 +11,20 @@ from ..._arrays import Array
 from ..._control import control
 from ...errors import InputError
 from .._outcomes import CouplingCode
-from ..systems import Zpk, realize, series
+from ..systems import series
 
 if TYPE_CHECKING:
-    from ._filters import Filters
+    from ._result import CouplingResult
+
+Result = TypeVar("Result", bound="CouplingResult")
 
 
-def reduce(filters: Filters, order: int | None = None, tolerance: float = 0.01) -> Filters:
+def reduce(filters: Result, order: int | None = None, tolerance: float = 0.01) -> Result:
     """Shorter X_hat and Y_hat with nearly the same objective, verified again.
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         Design to be shortened.
     order : int, optional
         Order of each filter; None: the smallest that keeps everything within the tolerance.
@@ -52,17 +54,17 @@ def reduce(filters: Filters, order: int | None = None, tolerance: float = 0.01) 
         remedy="", ok=filters.holds))
 
 
-def _shortened(filters: Filters, order: int, tolerance: float, prove: bool) -> Filters:
-    problem = filters.problem
-    hats = [_truncated(hat, half.signal, order)
-            for hat, half in ((filters.X_hat, problem.two), (filters.Y_hat, problem.one))]
+def _shortened(filters: Result, order: int, tolerance: float, prove: bool) -> Result:
+    first, second = filters.problem.signals
+    hats = [_truncated(hat, signal, order) for hat, signal in ((filters.X_hat, second), (filters.Y_hat, first))]
     asked = {name: bound if name == "XY" else bound * (1 + tolerance)
              for name, bound in filters.asked.items() if name != "robust"}
-    return filters.again(*hats, basis=filters.basis, order=order, solve_time=filters.solve_time,
-                         requested=filters.requested, asked=asked, prove=prove)
+    made: Result = filters.again(*hats, basis=filters.basis, order=order, solve_time=filters.solve_time,
+                                 requested=filters.requested, asked=asked, prove=prove)
+    return made
 
 
-def _keeps(short: Filters, long: Filters, tolerance: float) -> bool:
+def _keeps(short: CouplingResult, long: CouplingResult, tolerance: float) -> bool:
     for name, bound in short.asked.items():
         reached = short.performance.msd_growth if name == "msd" else short.norms[name]
         if not reached <= bound:
@@ -71,12 +73,12 @@ def _keeps(short: Filters, long: Filters, tolerance: float) -> bool:
     return short.norms["robust"] < robust and objective(short) <= (1 + tolerance) * objective(long)
 
 
-def objective(filters: Filters) -> float:
+def objective(filters: CouplingResult) -> float:
     """What a design minimizes: moving average with a window, else h2 where it is finite, else hinf.
 
     Parameters
     ----------
-    filters : Filters
+    filters : Filters or MatrixFilters
         Design to be shortened.
     """
     if filters.problem.samples:
@@ -84,12 +86,12 @@ def objective(filters: Filters) -> float:
     return filters.norms["h2"] if np.isfinite(filters.norms["h2"]) else filters.norms["hinf"]
 
 
-def _truncated(hat: control.StateSpace, signal: Zpk, order: int) -> control.StateSpace:
+def _truncated(hat: control.StateSpace, signal: control.StateSpace, order: int) -> control.StateSpace:
     """Balanced truncation, the input weighted by the signal; one-sided, so that the result stays stable (Enns 1984)."""
     n = hat.nstates
     if order >= n:
         return hat
-    weighted = series(hat, realize(signal)) if signal.gain else hat
+    weighted = series(hat, signal) if np.any(signal.D) or (np.any(signal.B) and np.any(signal.C)) else hat
     first = weighted.nstates - n
     own, shaped = _gramian(hat.A, hat.B, hat.dt), _gramian(weighted.A, weighted.B, hat.dt)[first:, first:]
     inputs = shaped / max(np.trace(shaped), 1e-300) + 1e-6 * own / np.trace(own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,8 @@ def evaluate_matrix(P1: Any, P2: Any, C1: Any, C2: Any, *, X_hat: Any = 0, Y_hat
 
 def finish_matrix(problem: MatrixProblem, X_hat: control.StateSpace, Y_hat: control.StateSpace, *,
                   basis: str = "manual", order: int = 0, solve_time: float = 0.0,
-                  requested: Mapping[str, float] | None = None, asked: Mapping[str, float] | None = None
-                  ) -> MatrixFilters:
+                  requested: Mapping[str, float] | None = None, asked: Mapping[str, float] | None = None,
+                  prove: bool = True) -> MatrixFilters:
     """Result of a design: everything computed from the filters, and proven.
 
     Parameters
@@ -90,8 +91,10 @@ def finish_matrix(problem: MatrixProblem, X_hat: control.StateSpace, Y_hat: cont
         Values of the search.
     asked : mapping, optional
         Upper bounds on norms that the design had to keep.
+    prove : bool
+        False: numbers only; the result does not hold.
     """
-    parts, proofs = realize_matrix(problem, X_hat, Y_hat), Proofs(prove=True)
+    parts, proofs = realize_matrix(problem, X_hat, Y_hat), Proofs(prove)
     norms = _norms(problem, parts, proofs)
     where = 0.0
     norms["robust"] = norms["robust_without_circles"] = 0.0
@@ -99,9 +102,9 @@ def finish_matrix(problem: MatrixProblem, X_hat: control.StateSpace, Y_hat: cont
         delta, bare = youla_matrix(problem, X_hat, Y_hat), problem.uncertainty.without_confidence()
         norms["robust"], where = proofs.radius(delta, intervals_of(problem.uncertainty, problem.dt))
         norms["robust_without_circles"] = Proofs(False).radius(delta, intervals_of(bare, problem.dt))[0]
-    nominal = proofs.stable(parts.loop_matrix, problem.dt, "internal stability")
-    steady = Proofs(prove=True)  # apart: an unstable controller is no failure unless it was asked for
-    controller_stable = steady.stable(parts.coupling_matrix, problem.dt, "stability of the controller")
+    nominal = proofs.stable(parts.loop_matrix, problem.dt, "internal stability") and prove
+    steady = Proofs(prove)  # apart: an unstable controller is no failure unless it was asked for
+    controller_stable = steady.stable(parts.coupling_matrix, problem.dt, "stability of the controller") and prove
     proofs.certificates |= steady.certificates
     robustly = nominal and norms["robust"] < 1.0
     outcome = verdict(problem.uncertainty is not None, nominal, robustly, asked or {}, norms, proofs)
@@ -110,7 +113,8 @@ def finish_matrix(problem: MatrixProblem, X_hat: control.StateSpace, Y_hat: cont
         Y_input=parts.Y_input, controller=parts.controller, norms=norms, nominally_stable=nominal,
         robustly_stable=robustly, controller_stable=controller_stable, holds=outcome.ok, worst_frequency=where,
         proofs=dict(proofs.certificates), outcome=outcome, basis=basis, order=order, solve_time=solve_time,
-        problem=problem, asked=dict(asked or {}), requested=dict(requested or {}))
+        problem=problem, asked=dict(asked or {}), requested=dict(requested or {}),
+        again=partial(finish_matrix, problem))
 
 
 def refused_matrix(problem: MatrixProblem, outcome: Outcome, *, basis: str, order: int) -> MatrixFilters:

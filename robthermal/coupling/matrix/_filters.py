@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,8 @@ class MatrixFilters(CouplingResult):
         What was designed for.
     asked, requested : dict of float
         Bounds the design had to keep, and the values of the search.
+    again : callable
+        Makes the result of other free filters for the same problem: ``again(X_hat, Y_hat, ...)``.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class MatrixFilters(CouplingResult):
     problem: MatrixProblem
     asked: dict[str, float]
     requested: dict[str, float]
+    again: Callable[..., MatrixFilters]
 
     @property
     def performance(self) -> Performance:

@@ -76,6 +76,11 @@ class MatrixProblem:
         first, second = (series(loop.S, W) for loop, W in zip(self.factors.loops, self.disturbances, strict=True))
         return first, second
 
+    @property
+    def signals(self) -> tuple[control.StateSpace, control.StateSpace]:
+        """What I + Y and I + X multiply in e12: S1 W1 and S2 W2."""
+        return self.disturbed
+
     def grid(self, points: int = 400) -> Array:
         """Frequencies [rad/s] that see every corner and resonance, and those of the measured plants.
 

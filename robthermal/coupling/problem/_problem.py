@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array
+from ..._control import control
 from ...errors import InputError
 from ..factors import CoprimeFactors, Loop, Uncertainty, check_cutoff, close, corner_grid, from_factors
-from ..systems import LTI, Zpk, constant, sample_time_of, stable, zpk_of
+from ..systems import LTI, Zpk, constant, realize, sample_time_of, stable, zpk_of
 
 _OTHER_PLANT = 1e-6  # relative difference of responses beyond which an uncertainty belongs to other plants
 
@@ -79,6 +80,11 @@ class Problem:
     def dt(self) -> float:
         """Sample time [s]; 0 in continuous time."""
         return self.one.P.dt
+
+    @property
+    def signals(self) -> tuple[control.StateSpace, control.StateSpace]:
+        """What 1 + Y and 1 + X multiply in e12: weight S1 W1 and weight S2 W2."""
+        return realize(self.one.signal), realize(self.two.signal)
 
     def envelope(self, omega: ArrayLike) -> Array:
         """Envelope of Delta_p as the proofs use it, zero without uncertainty.

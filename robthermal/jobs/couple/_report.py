@@ -236,5 +236,5 @@ def _filter_section(filters: Filters | MatrixFilters) -> Section:
         text = ("coupling.json holds the state space of every filter. e1⁺ = e1 + X e2⁺, e2⁺ = e2 + Y e1⁺ with vectors; "
                 "X_input and Y_input go from e2⁺ to u1 and from e1⁺ to u2, with P1 X_input = X and P2 Y_input = Y. "
                 "controller is the same as one system, from (e1, e2) to (u1, u2). The key export of the coupling file "
-                "writes them as C source with a test vector, too.")
+                "writes them as C source with a test vector, too. Shorter filters: rt.coupling, MatrixFilters.reduce.")
     return Section("Filters", text, tables=(Table(frame, "Sizes."),), anchor="filters")
