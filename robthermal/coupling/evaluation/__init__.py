@@ -7,6 +7,7 @@ from ._evaluate import verdict as verdict
 from ._filters import Filters as Filters
 from ._joint import Joint as Joint
 from ._joint import joint as joint
+from ._reduce import reduce as reduce
 from ._result import CouplingResult as CouplingResult
 from ._sampled import discretize as discretize
 from ._spectra import Spectra as Spectra
@@ -14,4 +15,4 @@ from ._spectra import cumulative as cumulative
 from ._spectra import spectra as spectra
 
 __all__ = ["CouplingResult", "Filters", "Joint", "Spectra", "cumulative", "discretize", "evaluate", "finish", "joint",
-           "refused", "spectra", "verdict"]
+           "reduce", "refused", "spectra", "verdict"]

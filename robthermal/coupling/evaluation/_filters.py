@@ -16,6 +16,7 @@ from ...errors import Outcome
 from ...verification import Certificate
 from ..implementation import FixedPoint, export, fixed_point, save_filters, sections
 from ..problem import NORMS, Performance, Problem, RunningLoops, running_loops
+from ._reduce import reduce
 from ._result import CouplingResult
 from ._spectra import spectra
 
@@ -127,6 +128,31 @@ class Filters(CouplingResult):
         RunningLoops
         """
         return running_loops(self.problem, self.X_hat, self.Y_hat)
+
+    def reduce(self, order: int | None = None, tolerance: float = 0.01) -> Filters:
+        """Shorter X_hat and Y_hat with nearly the same objective, verified again.
+
+        Balanced truncation, weighted by what the filters multiply. The objective is the moving average with a window,
+        else h2, or hinf where h2 is infinite. A robust design stays robust; other bounds may move by the tolerance.
+
+        Parameters
+        ----------
+        order : int, optional
+            States of each filter; None: the smallest number that keeps everything within the tolerance.
+        tolerance : float
+            Allowed relative loss of the objective [-].
+
+        Returns
+        -------
+        Filters
+            With outcome "not_reduced" and the filters of this design when no shorter ones keep what was asked.
+
+        Raises
+        ------
+        InputError
+            For a negative order or tolerance.
+        """
+        return reduce(self, order, tolerance)
 
     def sections(self) -> dict[str, Array]:
         """Second-order sections for implementation, discrete time only.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import cholesky, solve_continuous_lyapunov, solve_discrete_lyapunov, svd
@@ -12,11 +12,9 @@ from ..._control import control
 from ...errors import InputError
 from .._outcomes import CouplingCode
 from ..systems import series
+from ._result import CouplingResult
 
-if TYPE_CHECKING:
-    from ._result import CouplingResult
-
-Result = TypeVar("Result", bound="CouplingResult")
+Result = TypeVar("Result", bound=CouplingResult)
 
 
 def reduce(filters: Result, order: int | None = None, tolerance: float = 0.01) -> Result:

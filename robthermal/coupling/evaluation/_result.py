@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Self
 from ..._control import control
 from ...errors import Outcome
 from ...verification import Certificate
-from ._reduce import reduce
 
 if TYPE_CHECKING:
     from ..problem import RunningLoops
@@ -61,31 +60,6 @@ class CouplingResult:
         Filters or MatrixFilters
         """
         return replace(self, outcome=outcome, holds=outcome.ok)  # type: ignore[type-var]  # dataclasses only
-
-    def reduce(self, order: int | None = None, tolerance: float = 0.01) -> Self:
-        """Shorter X_hat and Y_hat with nearly the same objective, verified again.
-
-        Balanced truncation, weighted by what the filters multiply. The objective is the moving average with a window,
-        else h2, or hinf where h2 is infinite. A robust design stays robust; other bounds may move by the tolerance.
-
-        Parameters
-        ----------
-        order : int, optional
-            States of each filter; None: the smallest number that keeps everything within the tolerance.
-        tolerance : float
-            Allowed relative loss of the objective [-].
-
-        Returns
-        -------
-        Filters or MatrixFilters
-            With outcome "not_reduced" and the filters of this design when no shorter ones keep what was asked.
-
-        Raises
-        ------
-        InputError
-            For a negative order or tolerance.
-        """
-        return reduce(self, order, tolerance)
 
     def running_loops(self) -> RunningLoops:
         """Plants, disturbances and controllers as state spaces, for a simulation of the model.

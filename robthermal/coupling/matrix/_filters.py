@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..._control import control
 from ...errors import Outcome
 from ...verification import Certificate
-from ..evaluation import CouplingResult, Spectra
+from ..evaluation import CouplingResult, Spectra, reduce
 from ..implementation import export, save_filters
 from ..problem import NORMS, Performance, RunningLoops
 from ._problem import MatrixProblem
@@ -115,6 +115,31 @@ class MatrixFilters(CouplingResult):
         RunningLoops
         """
         return running_matrix_loops(self.problem, self.X_hat, self.Y_hat)
+
+    def reduce(self, order: int | None = None, tolerance: float = 0.01) -> MatrixFilters:
+        """Shorter X_hat and Y_hat with nearly the same objective, verified again.
+
+        Balanced truncation, weighted by what the filters multiply. The objective is h2, or hinf where h2 is infinite.
+        A robust design stays robust; other bounds may move by the tolerance.
+
+        Parameters
+        ----------
+        order : int, optional
+            States of each filter; None: the smallest number that keeps everything within the tolerance.
+        tolerance : float
+            Allowed relative loss of the objective [-].
+
+        Returns
+        -------
+        MatrixFilters
+            With outcome "not_reduced" and the filters of this design when no shorter ones keep what was asked.
+
+        Raises
+        ------
+        InputError
+            For a negative order or tolerance.
+        """
+        return reduce(self, order, tolerance)
 
     def spectra(self, points: int = 400) -> Spectra:
         """Largest singular values of sensitivities and improvement, density of e12, robust number over frequency.
