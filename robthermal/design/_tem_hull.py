@@ -151,7 +151,8 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     current : tuple or mapping
         (lower, upper) for every module, or {module: (lower, upper)} [A].
     covariance : Estimates or mapping, optional
-        Result of a calibration, whose joint ranges at `probability` are covered, or {parameter: (lower, upper)}.
+        Result of a calibration, whose joint ranges at `probability` are covered, or {parameter: (lower, upper)};
+        of links, modules and capacities.
     probability : float
         Probability of the ranges of a calibration [-].
     ambient : mapping, optional
@@ -166,7 +167,7 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     Raises
     ------
     InputError
-        Boxes that do not fit the system, a range of a capacity, more than 4096 vertices.
+        Boxes that do not fit the system, more than 4096 vertices.
 
     References
     ----------
@@ -179,20 +180,31 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     >>> len(plants), plants[0].nstates, plants[0].input_labels
     (729, 18, ['m1', 'm2'])
     """
-    box = read_box(system, temperature, current, covariance, probability, ambient)
-    hull = tem_hull(system, box)
-    if hull.count > _MOST:
-        raise InputError(f"{hull.count} vertices", where="argument system", expected=f"at most {_MOST}",
+    box = read_box(system, temperature, current, covariance, probability, ambient, capacities=True)
+    hull, shares = tem_hull(system, box), _capacity_shares(system, box["parameters"])
+    if hull.count * len(shares) > _MOST:
+        raise InputError(f"{hull.count * len(shares)} vertices", where="argument system", expected=f"at most {_MOST}",
                          remedy="rt.design.tem_feedback takes up those that matter; or take fewer uncertain numbers.")
     names, eye = list(system.lump_names), np.eye(len(system.lumps))
     zero = np.zeros((len(names), len(system.modules)))
-    return [control.ss(A, B, eye, zero, states=names, inputs=list(system.module_names), outputs=names)
-            for A, B in zip(*hull.at(np.arange(hull.count)), strict=True)]
+    return [control.ss(share * A, share * B, eye, zero, states=names, inputs=list(system.module_names), outputs=names)
+            for share in shares for A, B in zip(*hull.at(np.arange(hull.count)), strict=True)]
+
+
+def _capacity_shares(system: System, parameters: Mapping[str, Sequence[float]]) -> list[Array]:
+    """Nominal over uncertain capacity of every lump, columns, at all corners of the ranges.
+
+    E⁻¹J is affine in every 1/c_i and in J: the corners of both make vertices of all of it.
+    """
+    ends = [[lump.capacity / value for value in sorted(set(parameters.get(f"lumps.{name}.capacity", [lump.capacity])))]
+            for name, lump in system.lumps.items()]
+    return [np.array(corner)[:, None] for corner in product(*ends)]
 
 
 def read_box(system: System, temperature: Any, current: Any, covariance: Any, probability: float,
-             ambient: Mapping[str, tuple[float, float]] | None) -> dict[str, dict[str, Sequence[float]]]:
-    """Check a box against the system: what the certificate will say of it."""
+             ambient: Mapping[str, tuple[float, float]] | None, capacities: bool = False
+             ) -> dict[str, dict[str, Sequence[float]]]:
+    """Check a box against the system: what the certificate will say of it; `capacities`: may have ranges."""
     if not isinstance(system, System) or not system.modules:
         raise InputError("a system without modules" if isinstance(system, System) else f"a {type(system).__name__}",
                          where="argument system", expected="a robthermal.System with at least one module")
@@ -200,9 +212,11 @@ def read_box(system: System, temperature: Any, current: Any, covariance: Any, pr
     box = claim_box(system, current=currents, temperature=temperature, ambient=ambient,
                     parameters=parameter_ranges(covariance, probability))
     uncertain = [name for name in box["parameters"] if name.startswith("lumps.")]
-    if uncertain:
+    if uncertain and not capacities:
         raise InputError(f"a range of {uncertain[0]} cannot be covered", where="argument covariance",
-                         expected="ranges of links and modules", remedy="Hold capacities at their values.")
+                         expected="ranges of links and modules",
+                         remedy='Hold capacities at their values: leave "lumps..." out of fit.ranges(probability) and '
+                                "give the rest. rt.design.tem_polytope takes ranges of capacities.")
     return box
 
 

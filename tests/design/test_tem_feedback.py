@@ -12,6 +12,7 @@ import certificate_truth as truth
 import cvxpy as cp
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 import recheck
 import robthermal as rt
@@ -192,6 +193,33 @@ def test_polytope_of_a_stage_designs_a_feedback():
     plants = rt.design.tem_polytope(stage(), **BOX)
     d = rt.design.polytopic_feedback(plants, 1, rate=0.012)
     assert len(plants) == 8 and d.holds and d.rate >= 0.012
+
+
+def test_ranges_of_capacities_make_more_vertices_and_hold_every_plant_of_them():
+    """Slopes of the network by differences, at drawn points and capacities: averages of the vertices."""
+    ranges = {"lumps.module.capacity": (10.0, 15.0), "lumps.plate.capacity": (55.0, 70.0)}
+    plants = rt.design.tem_polytope(stage(), **BOX, covariance=ranges)
+    assert len(plants) == 32
+    vertices = np.array([np.r_[one.A.ravel(), one.B.ravel()] for one in plants])
+    section = rt.design.tem_feedback(stage(), **BOX, operating=1.0, rate=0.009).certificates[0].system
+    rng, h = np.random.default_rng(4), 1e-4
+    for _ in range(8):
+        x, current = rng.uniform(265.0, 335.0, 3), rng.uniform(0.2, 1.8)
+        E = np.array([rng.uniform(55, 70), rng.uniform(10, 15), 90.0])
+
+        def flow(x, current, E=E):
+            return truth.heat(section, x, {"m": current}, {"room": 298.0}, {}) / E
+
+        A = np.stack([(flow(x + h * e, current) - flow(x - h * e, current)) / (2 * h) for e in np.eye(3)], axis=1)
+        B = (flow(x, current + h) - flow(x, current - h)) / (2 * h)
+        near = nnls(np.vstack([vertices.T, np.ones(32)]), np.r_[A.ravel(), B, 1.0])[1]
+        assert near < 1e-6
+    outside = nnls(np.vstack([vertices.T, np.ones(32)]), np.r_[(0.5 * A).ravel(), B, 1.0])[1]
+    assert outside > 1e-3
+    d = rt.design.polytopic_feedback(plants, 1, rate=0.009)
+    assert d.holds and rt.verify(d.certificates[0]).valid
+    with pytest.raises(InputError, match="tem_polytope takes ranges of capacities"):
+        rt.design.tem_feedback(stage(), **BOX, operating=1.0, rate=0.009, covariance=ranges)
 
 
 def forged(certificate, part, key, value):
