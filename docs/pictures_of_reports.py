@@ -115,14 +115,17 @@ def main() -> None:
                                                                          "remainder", "unexplained", "changed")])
         sheet("reports_design", [wide(page, screens[one]) for one in ("design", "coupling", "map")])
         sheet("reports_synthesis", [wide(page, screens[one]) for one in SYNTHESES])
-        narrow = [phone(page, screens["remarks"]), phone(page, screens["remarks"], dark=True),
-                  phone(page, screens["named"]), phone(page, screens["design"], dark=True),
-                  paper(page, screens["remarks"])]
-        sheet("reports_phone_dark_print", narrow, columns=5)
+        kinds = ("pass", "remarks", "fail", "consistent", "named", "ambiguous", "unexplained", "remainder", "design",
+                 "coupling")
+        sheet("reports_dark", [wide(page, screens[one], dark=True) for one in kinds], columns=5)
+        sheet("reports_printed", [paper(page, screens[one]) for one in kinds], columns=5)
+        sheet("reports_phone", [phone(page, screens[one], dark=k % 2 > 0) for k, one in enumerate(kinds)], columns=5)
         if (site / "index.html").is_file():
             names = ("index", "tutorials/gallery", "tutorials/quick_start", "tutorials/bar", "tutorials/two_hours")
             pages = [site / f"{one}.html" for one in names]
-            sheet("pages", [wide(page, pages[0], dark=True), *(wide(page, one) for one in pages)])
+            sheet("pages", [wide(page, one) for one in pages], columns=5)
+            sheet("pages_dark_print", [*(wide(page, one, dark=True) for one in pages),
+                                       *(paper(page, one, THUMB) for one in pages)], columns=5)
             sheet("pages_phone", [phone(page, one) for one in pages], columns=5)
 
 
@@ -209,10 +212,10 @@ def phone(page: Page, file: Path, *, dark: bool = False) -> Image.Image:
     return shown(page, 830, SMALL)
 
 
-def paper(page: Page, file: Path) -> Image.Image:
+def paper(page: Page, file: Path, width: int = SMALL) -> Image.Image:
     """First page as it is printed."""
     page.show(file, width=PAPER, medium="print")
-    return shown(page, 960, SMALL)
+    return shown(page, 960, width)
 
 
 def shown(page: Page, height: int, width: int) -> Image.Image:

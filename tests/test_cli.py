@@ -15,11 +15,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+import typer
 from commands import Run, Said
 from rich.console import Console
 
 import robthermal as rt
-from robthermal.cli.terminal import duration, progress, progress_bar
+from robthermal.cli.terminal import duration, progress, progress_bar, show_report
 
 pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
@@ -634,3 +635,22 @@ def test_names_that_the_system_lacks_are_refused_by_their_option(run: Run, syste
                                                                  known: str) -> None:
     said = run("certify", system, option, value)
     assert said.status == 2 and f"robthermal: {option}: there is no" in said.err and known in said.err
+
+
+@pytest.mark.parametrize(("columns", "box"), [(80, False), (120, True)])
+def test_a_narrow_terminal_has_no_room_for_boxes(columns: int, box: bool, monkeypatch: pytest.MonkeyPatch,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    """And what became of the stages is said in words."""
+    monkeypatch.setattr("robthermal.cli.terminal._PIPE_WIDTH", columns)
+    monkeypatch.setenv("COLUMNS", "80")
+    claim = rt.report.Claim("Contraction", "They meet.", True, True, "m1: 0 to 1 A", "0.01 1/s", "energy", "",
+                            "certificates/contraction.json", "contraction")
+    report = rt.report.Report("bar", "", "", (claim,), (), {}, (), "today")
+    stages = {"calibrate": "done", "design": "skipped", "certify": "done", "couple": "skipped"}
+    with contextlib.suppress(SystemExit, typer.Exit):
+        show_report(report, Path("out"), False, stages=stages)
+    said = capsys.readouterr().out
+    assert ("m1: 0 to 1 A" in said) == box
+    assert "stages: done: calibrate, certify; skipped: design, couple" in said
+    assert said.splitlines()[-1] == f"report: {Path('out') / 'report.html'}"
+    assert max(map(len, said.splitlines())) <= columns

@@ -22,6 +22,7 @@ from ._progress import progress as progress
 from ._progress import progress_bar as progress_bar
 
 _PIPE_WIDTH = 120  # columns of a table in a pipe: a log is wider than a terminal of the last century
+_WIDE = 100  # columns from which a table of claims has room for their boxes
 Out = Annotated[Path, typer.Option("--out", help="Output folder; appears only when complete.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 ColumnMap = Annotated[list[str] | None, typer.Option(
@@ -96,19 +97,20 @@ def drawing(file: Path | None) -> Path | None:
 def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome] = (), **more: Any) -> None:
     """Verdict, reasons and claims of a report, for people or as JSON; exit status 1 where the verdict is FAIL."""
     def show() -> None:
-        table = Table("claim", "answer", "box", "margin")
-        for claim in report.claims:
-            said = Text(_word(claim), style="green" if claim.good else "bold red")
-            table.add_row(Text(claim.name), said, Text(claim.box), Text(claim.margin))  # [1/s] is a unit, no markup
         console = Console()
         if not console.is_terminal:
             console.width = max(console.width, _PIPE_WIDTH)
+        wide = console.width >= _WIDE  # else the boxes are in the report alone
+        table = Table("claim", "answer", *["box"] * wide, "margin")
+        for claim in report.claims:
+            said = Text(_word(claim), style="green" if claim.good else "bold red")
+            table.add_row(Text(claim.name), said, *[Text(claim.box)] * wide, Text(claim.margin))  # [1/s]: no markup
         console.print(table)
         say(f"verdict: {report.verdict}", *(f"  {one.level}: {one}" for one in report.reasons))
         say(*(f"usable current, {row.direction}{' (parameter ranges)' * (row.parameters == 'ranges')}: {row.range}"
               for row in report.usable))
-        say(*(f"{name}: {value}" for name, value in more.items()), *(f"remark: {remark.text}" for remark in remarks),
-            f"report: {out / 'report.html'}")
+        say(*(f"{name}: {_listed(value)}" for name, value in more.items()))
+        say(*(f"remark: {remark.text}" for remark in remarks), f"report: {out / 'report.html'}")
 
     summary = {"verdict": report.verdict, "holds": report.holds,
                "reasons": [one.to_dict() for one in report.reasons], "out": str(out),
@@ -118,6 +120,14 @@ def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome
                "remarks": [{"code": remark.code, "text": remark.text} for remark in remarks]}
     answer(summary, as_json, show)
     exit_unless(report.holds)
+
+
+def _listed(value: Any) -> str:
+    """A mapping by its values: "done: calibrate, certify; skipped: couple"; a list with commas; else as it is."""
+    if isinstance(value, dict):
+        kinds = dict.fromkeys(value.values())
+        return "; ".join(f"{kind}: {', '.join(name for name, one in value.items() if one == kind)}" for kind in kinds)
+    return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
 
 
 def _word(claim: Any) -> str:

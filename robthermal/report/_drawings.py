@@ -117,7 +117,7 @@ def box_ranges(names: Sequence[str], low: ArrayLike, high: ArrayLike, unit: str 
         _names(axes, names)
         axes.set(xlabel=f"temperature [{unit}]")
         axes.use_sticky_edges = False  # room for the numbers beside the bars
-        axes.margins(x=0.1)
+        axes.margins(x=0.14)
     return figure
 
 

@@ -133,3 +133,12 @@ def test_no_measured_temperature_leaves_the_certified_box(measured: Path) -> Non
     for path in (*project.train, *project.validation):
         readings = rt.read_record(path, project.system)["T1"]
         assert low < readings.min() and readings.max() < high
+
+
+def test_no_record_is_drawn_twice(result: rt.jobs.run.JobResult, tmp_path: Path) -> None:
+    report = rt.jobs.write_job(result, tmp_path / "once")
+    captions = [figure.caption for section in (*report.first, *report.sections) for figure in section.figures]
+    assert captions and len(captions) == len(set(captions))
+    assert "validation record" in report.first[0].figures[0].caption
+    text = next(" ".join(section.paragraphs) for section in report.sections if section.anchor == "model")
+    assert "The validation record" in text and "is drawn at the top of this report." in text

@@ -88,11 +88,14 @@ def calibration_part(stage: str, done: Calibrated, data: Data, project: Project)
     facts = data_facts(done.system, done.comparisons, misfits, kinds, done.fit)
     tables: dict[str, Any] = {"facts": asdict(facts), "residuals": residual_table(done.misfits),
                               "imports": import_table([*data.train, *data.validation])}
-    sections = [comparison_section(done.comparisons, done.fit, done.system.sensor_names)] if done.comparisons else []
+    order = done.system.sensor_names
+    above = stage == "diagnose" or not project.diagnose  # else the first screen may be of the diagnosed model
+    sections = [comparison_section(done.comparisons, done.fit, order, done.misfits if above else ())
+                ] if done.comparisons else []
     if done.fit is not None:
         sections += [*response_sections(done.fit), parameter_section(done.fit, None)]
         tables["calibrate"] = {"parameters": parameter_table(done.fit, None), "outcome": done.fit.outcome.code}
-    first = [first_section(done.comparisons, done.misfits, done.system.sensor_names)] if done.misfits else []
+    first = [first_section(done.comparisons, done.misfits, order)] if done.misfits else []
     return part(stage, sections, first=first, data=tables)
 
 

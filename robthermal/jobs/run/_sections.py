@@ -13,8 +13,10 @@ from ._misfit import Misfit
 from ._result import Comparison
 
 
-def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None, order: tuple[str, ...]) -> Section:
-    """Model against data: residuals before and after, every record drawn."""
+def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None, order: tuple[str, ...],
+                       misfits: tuple[Misfit, ...] = ()) -> Section:
+    """Model against data: residuals before and after; every record drawn but the one on the first screen."""
+    shown = _worst_record(comparisons, misfits) if misfits else None
     rows = [{"record": f"{c.kind}: {c.record.name}", "sensor": _named(name, c.record.units.get(name)),
              "nominal model [K]": before, "calibrated model [K]": c.rmse(c.calibrated)[name]}
             for c in comparisons for name, before in c.rmse(c.nominal).items()]
@@ -25,20 +27,27 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None, ord
             "every sensor; for the calibrated model these are the numbers of the calibration itself.")
     if fit is not None:
         text += f"\n\n{fit.outcome.text}"
-    figures = tuple(figure for c in comparisons for figure in _comparison_figures(c, order))
+    figures = tuple(figure for c in comparisons if c is not shown for figure in _comparison_figures(c, order))
+    if shown is not None:
+        text += f"\n\nThe {shown.kind} record {shown.record.name} is drawn at the top of this report."
     return Section("Model against data", text, figures=figures,
                    tables=(Table(table, "Residuals (measured − model), root mean square."),), anchor="model")
 
 
 def first_section(comparisons: tuple[Comparison, ...], misfits: tuple[Misfit, ...], order: tuple[str, ...]) -> Section:
     """Model against the records that were held out, for the first screen; against the training records without any."""
-    kind, record = _shown(misfits)[0].kind, _shown(misfits)[0].record
-    worst = next((c for c in comparisons if c.kind == kind and c.record.name == record), comparisons[0])
+    kind = _shown(misfits)[0].kind
     what = ("records that were held out" if kind == "validation" else
             "its own training records: none was held out, so that nothing is known about its predictions")
     return Section("Model against data", f"The calibrated model, run freely, beside {what}.",
-                   figures=_comparison_figures(worst, order),
+                   figures=_comparison_figures(_worst_record(comparisons, misfits), order),
                    tables=(misfit_table(misfits),), anchor="validation")
+
+
+def _worst_record(comparisons: Sequence[Comparison], misfits: Sequence[Misfit]) -> Comparison:
+    """The record on the first screen: that of the largest misfit among those that were held out."""
+    first = _shown(misfits)[0]
+    return next((c for c in comparisons if c.kind == first.kind and c.record.name == first.record), comparisons[0])
 
 
 def misfit_table(misfits: Sequence[Misfit]) -> Table:
@@ -141,6 +150,7 @@ def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] 
         text = f"{fit.outcome} The numbers below are where the optimizer stopped: they are no estimates."
     if fit.undetermined:
         text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
+    frame["standard deviation"] = [float(f"{value:.3g}") for value in frame["standard deviation"]]
     frame.insert(0, "quantity", [parameter_label(name) for name in frame.index])
     table = Table(frame.reset_index(names="parameter"), "Calibrated parameters, each with its name in the files.",
                   digits=6)

@@ -58,7 +58,7 @@ def write_job(result: JobResult, out: str | Path) -> Report:
     sections = [network_section(result.system)]
     order = result.system.sensor_names
     if result.comparisons:
-        sections.append(comparison_section(result.comparisons, result.fit, order))
+        sections.append(comparison_section(result.comparisons, result.fit, order, result.misfits))
     if result.fit is not None:
         sections.append(parameter_section(result.fit, certified.parameters))
     sections.extend(certification_sections(certified))
