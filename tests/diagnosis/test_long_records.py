@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
-from robthermal.diagnosis.fit import exact
+from robthermal.diagnosis.fit import ENOUGH, NoiseScaling, Refit, Structure, exact, fitted
+from robthermal.diagnosis.fit._refitting import _fitted
 from robthermal.diagnosis.path._riccati import filtered, spread
 from robthermal.diagnosis.plan import trial_conditions
 
@@ -50,29 +53,65 @@ def test_spread_of_random_heat_is_that_of_the_sums_over_all_steps_before(n: int)
         P = A[k] @ P @ A[k].T + Q[k]
 
 
-@pytest.fixture(scope="module")
-def long_fit() -> rt.diagnosis.Refit:
-    bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
-                    links=[{"between": ("bar", "room"), "conductance": 0.5}],
-                    inputs={"heater": {"lump": "bar", "limits": (0.0, 8.0)}},
-                    sensors={"T": {"lump": "bar", "noise": 0.05}})
-    heater = np.repeat(np.random.default_rng(1).uniform(0.0, 6.0, 48), 50)
-    drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((2400, 0)), input_names=["heater"],
+BAR = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0, "disturbance": 0.5}},
+                links=[{"between": ("bar", "room"), "conductance": 0.5}],
+                inputs={"heater": {"lump": "bar", "limits": (0.0, 8.0)}},
+                sensors={"T": {"lump": "bar", "noise": 0.05}})
+UNKNOWN = {"lumps.bar.capacity": (10.0, 500.0), "links.bar-room.conductance": (0.05, 5.0)}
+TRUE = {"lumps.bar.capacity": 130.0, "links.bar-room.conductance": 0.65}
+
+
+def long_fit(first: float = 6.0) -> Refit:
+    """5000 samples with unit steps of the heater; `first`: its largest level in the first 2000."""
+    rng = np.random.default_rng(1)
+    heater = np.repeat(np.concatenate([rng.uniform(0.0, first, 40), rng.uniform(0.0, 6.0, 60)]), 50)
+    drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((5000, 0)), input_names=["heater"],
                       output_names=[])
-    run = rt.thermal.simulate(bar, drive)
-    noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(2).standard_normal((2400, 1)))
-    return rt.diagnosis.refit(bar, noisy, parameters={"lumps.bar.capacity": (10.0, 500.0)})
+    run = rt.thermal.simulate(BAR.with_parameters(TRUE), drive, initial=295.0)
+    noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(2).standard_normal((5000, 1)))
+    return rt.diagnosis.refit(BAR, noisy, parameters=UNKNOWN)
 
 
-def test_a_plan_after_a_long_record_has_two_thousand_samples(long_fit: rt.diagnosis.Refit) -> None:
-    conditions = trial_conditions(long_fit)
+@pytest.fixture(scope="module")
+def heated() -> Refit:
+    return long_fit()
+
+
+def deviations(one: Refit, other: Refit) -> Array:
+    """Differences of the unknowns, in standard deviations."""
+    return np.abs(one.v - other.v) / np.sqrt(np.diag(other.covariance))
+
+
+@pytest.mark.parametrize("first", [6.0, 0.0])
+def test_a_fit_that_starts_from_a_part_of_the_record_is_the_fit_to_the_record(
+        heated: Refit, first: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    # without a heater in the first part, that says nothing of the capacity, and a wrong conductance
+    fit = heated if first else long_fit(first)
+    cold = fit.structure.start(fit.structure.ranges.start, [])
+    simulated = []
+    paths = Structure.paths
+    monkeypatch.setattr(Structure, "paths", lambda self, v: simulated.append((self.n_readings, v.tobytes()))
+                        or paths(self, v))
+    whole = _fitted(replace(fit.structure), cold, fit.floor, NoiseScaling(1.0, {}))
+    alone = len({v for n, v in simulated if n == 5000})
+    simulated.clear()
+    found = fitted(replace(fit.structure), cold, fit.floor, NoiseScaling(1.0, {}))
+    assert found.outcome.ok and whole.outcome.ok and found.levels == whole.levels
+    assert deviations(found, whole).max() < np.sqrt(ENOUGH * found.rss)  # where a descent ends
+    assert deviations(found, replace(found, v=found.structure.start(np.array(list(TRUE.values())), []))).max() < 4.0
+    if first:
+        assert len({v for n, v in simulated if n == 5000}) < alone
+
+
+def test_a_plan_after_a_long_record_has_two_thousand_samples(heated: Refit) -> None:
+    conditions = trial_conditions(heated)
     assert conditions is not None and len(conditions.one.record) == len(conditions.one.readings) == 2000
-    assert np.array_equal(conditions.one.record.inputs, long_fit.structure.data[0].record.inputs[:2000])
-    scores = rt.diagnosis.score(long_fit, ["radiation", "natural_convection"])
-    entries = rt.diagnosis.refit_short_list(long_fit, scores).entries
+    assert np.array_equal(conditions.one.record.inputs, heated.structure.data[0].record.inputs[:2000])
+    scores = rt.diagnosis.score(heated, ["radiation", "natural_convection"])
+    entries = rt.diagnosis.refit_short_list(heated, scores).entries
     plan = rt.diagnosis.next_experiment(entries, trials=1)
     assert len(plan.record) == 2000 and set(plan.inputs) == {"heater"}
 
 
-def test_the_fit_with_the_network_taken_to_be_right_is_made_once(long_fit: rt.diagnosis.Refit) -> None:
-    assert exact(long_fit) is exact(long_fit)
+def test_the_fit_with_the_network_taken_to_be_right_is_made_once(heated: Refit) -> None:
+    assert exact(heated) is exact(heated)

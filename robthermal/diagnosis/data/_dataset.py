@@ -98,3 +98,12 @@ class DataSet(Protocol):
         noise : mapping
             Standard deviation of every sensor [K].
         """
+
+    def first(self, n: int) -> Self:
+        """The first samples of a record; what is no longer, and a response, as it is.
+
+        Parameters
+        ----------
+        n : int
+            Number of samples.
+        """

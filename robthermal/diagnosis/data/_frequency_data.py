@@ -49,6 +49,10 @@ class ResponseData(MeasuredResponse):
         """As `DataSet.without_outliers`: the estimate has averaged them."""
         return self
 
+    def first(self, n: int) -> ResponseData:
+        """As `DataSet.first`: it has no samples."""
+        return self
+
     @property
     def sensors(self) -> tuple[str, ...]:
         """Elements, as "output/input", in the order of the columns of `readings`."""

@@ -52,6 +52,13 @@ class RecordData(Data):
         found = cleaned(system, self, np.array([noise[name] for name in self.sensors]))
         return replace(self, record=found.record, readings=found.readings, missing=found.missing)
 
+    def first(self, n: int) -> RecordData:
+        """As `DataSet.first`."""
+        if len(self.record) <= n:
+            return self
+        return replace(self, record=self.record[:n], readings=self.readings[:n],
+                       missing=None if self.missing is None else self.missing[:n])
+
 
 def record_data(system: System, records: Sequence[Record], where: str) -> list[RecordData]:
     """Check records, and find the sensors of the system in them.

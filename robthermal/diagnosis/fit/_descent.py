@@ -161,6 +161,20 @@ def descend(problem: Problem, v: Array, bounds: tuple[Array, Array], limit: int,
     return Descent(now, False, count)
 
 
+def decrease(at: Point, bounds: tuple[Array, Array]) -> float:
+    """Decrease of the sum of squares that the linearization at a point promises.
+
+    Parameters
+    ----------
+    at : Point
+        Where the problem is linearized.
+    bounds : tuple of ndarray
+        Lower and upper.
+    """
+    J, z = at.small
+    return float(z @ z - np.sum((z - J @ _damped_step(at, 0.0, bounds, 0.0)) ** 2))
+
+
 def _better(new: Point, power: float, goes_on: bool) -> bool:
     """Whether the point survives, as its derivatives must if they will be needed, with a smaller sum of squares."""
     try:

@@ -280,6 +280,22 @@ class Structure:
                        for one, start in zip(self.data, self.starts, strict=True))
         return replace(self, effects=effects, starts=starts)
 
+    def first(self, n: int) -> Structure:
+        """The same on the first samples of every record.
+
+        Parameters
+        ----------
+        n : int
+            Number of samples.
+
+        Returns
+        -------
+        Structure
+        """
+        data = tuple(one.first(n) for one in self.data)
+        coarse = tuple(columns[:len(one.readings)] for columns, one in zip(self.coarse, data, strict=False))
+        return replace(self, data=data, coarse=coarse)
+
     def hides(self, candidate: Candidate) -> str:
         """Why an effect is not tried on these data, known before they are looked at; empty if it is.
 

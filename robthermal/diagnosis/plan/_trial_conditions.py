@@ -47,7 +47,7 @@ def trial_conditions(fit: Refit) -> TrialConditions | None:
     As many samples as that has had, 2000 at most: a search that needs more prolongs its best trial.
     """
     for one in records_of(fit.structure.data):
-        return TrialConditions(_first_part(one), fit.structure.data.index(one), fit.floor, fit.levels)
+        return TrialConditions(one.first(_MOST), fit.structure.data.index(one), fit.floor, fit.levels)
     first, system = responses_of(fit.structure.data)[0], fit.system
     noise = {name: sensor.noise for name, sensor in system.thermometers.items() if sensor.noise}
     found = steady_state(system, first.operating_point)
@@ -63,11 +63,3 @@ def trial_conditions(fit: Refit) -> TrialConditions | None:
                record.outputs)
     heat = {name: lump.disturbance for name, lump in system.lumps.items()}
     return TrialConditions(one, None, replace(fit.floor, noise=noise, disturbance=heat), NoiseScaling(1.0, {}))
-
-
-def _first_part(one: RecordData) -> RecordData:
-    """The first samples of a long record; a short one as it is."""
-    if len(one.record) <= _MOST:
-        return one
-    return replace(one, record=one.record[:_MOST], readings=one.readings[:_MOST],
-                   missing=None if one.missing is None else one.missing[:_MOST])
