@@ -25,6 +25,7 @@ ALIAS = 1e-3  # sine of the angle below which two signatures are the same, and o
 BIC_GAP = 10.0
 _DIGITS = 6  # of the logarithm of a statistic
 _TOGETHER = 64  # signatures at once
+_LITTLE = 0.1  # of a signature: where less is left, what rounding has left along the unknowns is removed again
 Trial = tuple[int, Candidate]  # number of a candidate, and its trial values
 Pair = tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[str, ...]]]
 
@@ -247,7 +248,9 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
     J = (fit.whiten([path.columns([trial for _, trial in trials]) for path in fit.paths]) if trials else
          np.zeros((fit.z.size, 0)))
     explained = fit.basis.T @ J
-    J = fit.project(J - fit.basis @ explained)
+    J -= fit.basis @ explained
+    little = np.linalg.norm(J, axis=0) < _LITTLE * np.linalg.norm(explained, axis=0)
+    J[:, little] = fit.project(J[:, little])  # rounding counts there alone
     trials, turn, n_columns = turned(fit, trials, J)
     rest = turn(J)
     own = np.linalg.norm(rest, axis=0)

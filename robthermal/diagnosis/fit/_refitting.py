@@ -99,30 +99,34 @@ def fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseSc
     """
     part = structure.first(_PART)
     if structure.n_readings >= _LONG * part.n_readings:
-        v, levels = _nearer(structure, part, v, floor, levels)
+        try:
+            near = _on_part(part, v, floor, levels)
+            if near is not None:
+                return _fitted(structure, near[0], floor, near[1], v)
+        except (Diverged, InputError):  # the part leads where the whole record does not survive
+            pass
     return _fitted(structure, v, floor, levels)
 
 
-def _nearer(structure: Structure, part: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling
-            ) -> tuple[Array, NoiseScaling]:
-    """Optimum of a part of the records where v is far from it, if it is the better start."""
-    try:
-        at = Point(Whitened(part, filters(part, v, floor, levels)[1]), v)
-        power = float(at.z @ at.z)
-        if decrease(at, part.bounds) < _FAR * v.size / at.z.size * power:
-            return v, levels
-        near = _fitted(part, v, floor, levels)
-        problem = Whitened(structure, filters(structure, near.v, floor, near.levels)[1])
-        there = problem.residual(near.v)
-    except (Diverged, InputError):  # the part leads where the whole record does not survive
-        return v, levels
-    here = problem.residual(v)
-    return (near.v, near.levels) if there @ there < here @ here else (v, levels)
+def _on_part(part: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling
+             ) -> tuple[Array, NoiseScaling] | None:
+    """Optimum of a part of the records, and the noise levels there; None if v is as near as chance lets it be."""
+    whiteners = filters(part, v, floor, levels)[1]
+    start = Point(Whitened(part, whiteners), v)
+    if decrease(start, part.bounds) < _FAR * v.size / start.z.size * float(start.z @ start.z):
+        return None
+    near = minimized(part, v, whiteners).at.v
+    return near, _refined(part.paths(near), floor, levels)
 
 
-def _fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling) -> Refit:
+def _fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling, other: Array | None = None
+            ) -> Refit:
+    """Fit from v, or from another start if its sum of squares is smaller."""
     for _ in range(_ROUNDS):
         paths, whiteners = filters(structure, v, floor, levels)
+        if other is not None:
+            problem = Whitened(structure, whiteners)
+            v, other = min((v, other), key=lambda at: float(np.sum(problem.residual(at) ** 2))), None
         found = minimized(structure, v, whiteners)
         v = found.at.v
         paths = structure.paths(v)
