@@ -1,18 +1,39 @@
-"""Measured files for the commands: records read as asked, frequency responses, excitation."""
+"""Measured files for the commands: records read as asked, frequency responses, excitation.
 
-from ._frequency import calibrate_files as calibrate_files
-from ._frequency import design_excitation as design_excitation
-from ._frequency import estimate_response as estimate_response
-from ._frequency import read_measured as read_measured
-from ._frequency import write_excitation as write_excitation
+What estimates or calibrates loads on first use (PEP 562), as in `robthermal.jobs`: commands that only read a record
+need none of it.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from ._import import ReadTable as ReadTable
 from ._import import import_reports as import_reports
 from ._import import read_files as read_files
 from ._import import reading_from_text as reading_from_text
-from ._reference import import_report_beside as import_report_beside
-from ._reference import instruments_from_text as instruments_from_text
-from ._reference import noise_from_text as noise_from_text
+
+if TYPE_CHECKING:  # what type checkers and editors see of the table below
+    from ._frequency import calibrate_files as calibrate_files
+    from ._frequency import design_excitation as design_excitation
+    from ._frequency import estimate_response as estimate_response
+    from ._frequency import read_measured as read_measured
+    from ._frequency import write_excitation as write_excitation
+    from ._reference import import_report_beside as import_report_beside
+    from ._reference import instruments_from_text as instruments_from_text
+    from ._reference import noise_from_text as noise_from_text
+
+_HOME = {  # name: the module it lives in
+    **dict.fromkeys(("calibrate_files", "design_excitation", "estimate_response", "read_measured", "write_excitation"),
+                    "_frequency"),
+    **dict.fromkeys(("import_report_beside", "instruments_from_text", "noise_from_text"), "_reference"),
+}
 
 __all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_report_beside",
            "import_reports", "instruments_from_text", "noise_from_text", "read_files", "read_measured",
            "reading_from_text", "write_excitation"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)
