@@ -17,7 +17,8 @@ _TOGGLE = '<summary aria-label="Toggle hidden content">'
 
 def _named(found: re.Match[str]) -> str:
     said = re.sub(r"<[^>]*>|\s+", "", found["formula"])
-    return f'{found[1]}<math role="img" aria-label="{said}"{found["attributes"]}>{found["formula"]}</math></p></th>'
+    formula = f'<math{found["attributes"]}>{found["formula"]}</math>'
+    return f'{found[1]}<span role="img" aria-label="{said}">{formula}</span></p></th>'
 
 
 def _corners(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
