@@ -12,7 +12,7 @@ from ..fitting import Choice
 from ..thermal import System
 from ._judge import Judged, Progress, Validation, Verdict, alternatives
 from ._outcomes import DiagnosisCode
-from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched
+from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched, unsteady
 from .data import DataSet, Measured, as_measured, noise_floor, records_of, without_outliers
 from .evidence import Gap, adequacy, expected_rms, left
 from .fit import Refit, SessionGain, exact
@@ -20,6 +20,7 @@ from .search import SearchState, ShortList
 
 _NOISE_ONLY = 1.5  # whitened variance
 _MOST = 0.95  # of what is outside the scatter, that changes must remove where they leave some of it
+_NAMING: tuple[Verdict, ...] = ("named", "named_with_remainder", "ambiguous")
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -110,7 +111,13 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     excess, bare_excess = excess_of(fit, healthy), excess_of(new, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
     verdict, outcome = _verdict(found, excess, gaps, excess.removed(bare_excess), _bare(fit, healthy))
-    found_some = verdict in ("named", "named_with_remainder", "ambiguous")
+    moving = unsteady(fit, found.rounds, healthy) if verdict in _NAMING else []
+    if moving:
+        verdict, outcome = "unexplained", DiagnosisCode.UNEXPLAINED.outcome(
+            "Something has changed; no change of a parameter and no effect of the catalog explains it. "
+            f"{', '.join(moving)} would, but with another size in every part of the record, where the same on healthy "
+            "records stays: something drifts or comes and goes.")
+    found_some = verdict in _NAMING
     return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
                   plain=exact(fit) if found_some else None)
 
@@ -138,7 +145,7 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
     if not found.rounds or (reasons and removed < _MOST) or not _closes(gaps[1:]):
         helped = "; ".join(map(str, found.rounds))
         text = f"Something has changed; no change of a parameter and no effect of the catalog explains it. {reasons}"
-        text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else "")
+        text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else f" {found.nearest}".rstrip())
         return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
     if any(map(alternatives, found.rounds)):
         return "ambiguous", DiagnosisCode.AMBIGUOUS.outcome("The new records cannot distinguish some changes.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,7 @@ def test_a_fan_that_stands_still_is_named(fan: rt.diagnosis.Diagnosis) -> None:
     assert (found.effect, found.where, unit) == ("parameter_change", (FAN,), "")
     assert abs(value + 0.5) < 3 * std and 0.01 < std < 0.05  # the scatter of 3 % of half the conductance is in it
     assert fan.system.parameter(FAN) == pytest.approx(0.4, rel=0.1)
+    assert found.evidence is not None and found.evidence.stability.spread < 0.01  # the same in every part of the record
     assert fan.gap["validation"].after < 0.4 * fan.gap["validation"].before
 
 
@@ -114,6 +116,30 @@ def test_what_is_in_no_catalog_is_unexplained(rig: rt.System, old: list[rt.Recor
     found = rt.diagnose(rig, record(71, day, **SIZES), reference=old, effects=[*FEW, "periodic_load", "hidden_mass"])
     assert found.verdict == "unexplained" and found.effects == () and not found.outcome.ok
     assert "Something has changed" in found.outcome.text
+
+
+@pytest.mark.parametrize(("seed", "drift"), [(210, 1.0), pytest.param(203, 1.0, marks=pytest.mark.exhaustive),
+                                             pytest.param(202, 2.0, marks=pytest.mark.exhaustive)])
+def test_what_moves_within_the_record_is_no_name(rig: rt.System, seed: int, drift: float) -> None:
+    """A drifting sensor: a gain, a hidden mass or a step would do, with another size in every part of the record."""
+    old = [record(1000 * seed + i, **SIZES) for i in (1, 2, 3)]
+    found = rt.diagnose(rig, record(1000 * seed + 999, Day(drift=drift), **SIZES), reference=old)
+    assert found.verdict == "unexplained" and found.effects == ()
+    assert "something drifts or comes and goes" in found.outcome.text
+
+
+def test_what_comes_nearest_is_said_and_no_name(rig: rt.System) -> None:
+    """A heater that gives 10 % less than its column says: too little for three reference records."""
+    old = [record(502_000 + i, **SIZES) for i in (1, 2, 3)]
+    new = record(502_999, **SIZES)
+    inputs = new.inputs.copy()
+    inputs[:, new.input_names.index("heater")] /= 0.9
+    found = rt.diagnose(rig, replace(new, inputs=inputs), reference=old, effects=[*FEW, "hidden_mass"])
+    assert found.verdict == "unexplained" and found.effects == ()
+    said = found.outcome.text
+    assert "Nearest to an answer, and no name: parameter_change(lumps.block.capacity) (relative 0.1" in said
+    assert "chance 0.0" in said and "more reference records sharpen it" in said
+    assert found.remainder is not None and dict(found.remainder.where)["block"] > dict(found.remainder.where)["sink"]
 
 
 def test_what_was_missing_on_all_days_is_no_change(rig: rt.System) -> None:

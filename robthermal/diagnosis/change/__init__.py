@@ -14,6 +14,7 @@ from ._reference import reference_of as reference_of
 from ._scatter import random_effects as random_effects
 from ._search import Search as Search
 from ._search import searched as searched
+from ._steady import unsteady as unsteady
 
 __all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "excess_of", "held", "parameter_changes", "pinned",
-           "random_effects", "reference_of", "relative", "searched"]
+           "random_effects", "reference_of", "relative", "searched", "unsteady"]

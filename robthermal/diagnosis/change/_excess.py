@@ -78,7 +78,7 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
     spread = math.sqrt((COUNTS * _ASSUMED**2 + float(np.sum((logs - logs.mean()) ** 2))) / freedom * (1.0 + 1.0 / n))
     limit = math.exp(float(scipy.stats.t.isf(_SURE, freedom)) * spread)
     structure, usual = new.structure, math.exp(float(logs.mean()))
-    expected = noise + (usual - noise) * _louder(new, each)
+    expected = noise + (usual - noise) * louder(new, each)
     if not isinstance(structure, Held) or not structure.n_parameters:
         return Excess(_variance(new) / expected, limit, 1.0)
     rows = slice(new.n_readings, new.n_readings + structure.n_priors)
@@ -87,10 +87,17 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
                   float(scipy.stats.f.sf(far / structure.n_priors, structure.n_priors, freedom)))
 
 
-def _louder(new: Refit, each: Sequence[Refit]) -> float:
+def louder(new: Refit, each: Sequence[Refit]) -> float:
     """By how much more the mean square of a relative error of the model shows than on the reference records; 1 or more.
 
     A remainder grows with the temperatures that drive it, as the derivatives by the parameters do.
+
+    Parameters
+    ----------
+    new : Refit
+        The new records.
+    each : sequence of Refit
+        Every reference record as if it were new.
     """
     usual = float(np.mean([_shown(fit) for fit in each]))
     return max(1.0, _shown(new) / usual) if usual > 0.0 else 1.0

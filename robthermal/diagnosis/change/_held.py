@@ -28,6 +28,11 @@ class Held(Structure):
     root: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
+    def known(self) -> range:
+        """As `Structure.known`: the parameters."""
+        return range(len(self.center))
+
+    @property
     def n_priors(self) -> int:
         """As `Structure.n_priors`: one row per parameter."""
         return len(self.center)

@@ -14,12 +14,14 @@ from ..evidence import ALIAS, Scores, score_candidates
 from ..fit import Refit, relinearized
 from ..search import Accepted, Entry, refit_short_list
 from ._excess import excess_of
-from ._parameter_change import NAME, parameter_changes, says_again
+from ._parameter_change import NAME, parameter_changes, relative, says_again
 from ._reference import Reference
 from ._yardstick import chance, inflation, squares, within_scatter
 
 MOST_CHANGES = 2
 _ALPHA_PARAMETERS, _ALPHA_CATALOG = 0.03, 0.01  # family-wise
+_WORTH_SAYING = 0.2  # chance of the best candidate that is no answer
+_SAID = 3  # of those
 _HOPE = 2.0  # times what the linearization promises: a refit may gain over it
 
 
@@ -35,11 +37,14 @@ class Search:
         In order of acceptance.
     scores : Scores
         Scores of all candidates where nothing has changed.
+    nearest : str
+        What came nearest to an answer where nothing is one, in words; empty if healthy records may well show as much.
     """
 
     fit: Refit
     rounds: tuple[Accepted, ...]
     scores: Scores
+    nearest: str = ""
 
 
 def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> Search:
@@ -57,10 +62,12 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
     catalog = None if names is None else list(names)
     tested = _tested(new, catalog)
     first = scores = score_candidates(new, tested)
-    fit, rounds = new, list[Accepted]()
+    fit, rounds, nearest = new, list[Accepted](), ""
     while True:
-        found = _one(fit, scores, reference)
+        tried = _all_refitted(fit, scores, reference)
+        found = _one(fit, tried, reference)
         if found is None:
+            nearest = _nearest(tried, len(reference.each))
             break
         rounds.append(found)
         fit = found.best.fit
@@ -68,7 +75,7 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
             break  # what is left is within the scatter of healthy records: nothing more to find
         taken = {candidate.key for candidate in fit.structure.effects}
         scores = score_candidates(fit, [candidate for candidate in _tested(fit, catalog) if candidate.key not in taken])
-    return Search(fit, tuple(rounds), first)
+    return Search(fit, tuple(rounds), first, nearest)
 
 
 def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
@@ -79,13 +86,17 @@ def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
     return [*parameter_changes(system, ranges), *listed]
 
 
-def _one(fit: Refit, scores: Scores, reference: Reference) -> Accepted | None:
-    """The best candidate beyond the scatter, with those that the records cannot tell from it."""
+def _all_refitted(fit: Refit, scores: Scores, reference: Reference) -> list[_Tried]:
+    """Candidates worth a refit: changes of parameters, and what the catalog adds to them."""
     own = np.array([candidate.effect.name == NAME for candidate in scores.candidates], bool)
     n_own = int(own.sum())
     parameters, catalog = _part(scores, own, n_own), _part(scores, ~own, max(scores.n_trials - n_own, 1))
-    tried = [*_refitted(fit, parameters, reference, _ALPHA_PARAMETERS),
-             *_refitted(fit, _without_repeats(catalog, parameters), reference, _ALPHA_CATALOG)]
+    return [*_refitted(fit, parameters, reference, _ALPHA_PARAMETERS),
+            *_refitted(fit, _without_repeats(catalog, parameters), reference, _ALPHA_CATALOG)]
+
+
+def _one(fit: Refit, tried: Sequence[_Tried], reference: Reference) -> Accepted | None:
+    """The best candidate beyond the scatter, with those that the records cannot tell from it."""
     sure = [one for one in tried if one.sure]
     if not sure:
         return None
@@ -95,6 +106,23 @@ def _one(fit: Refit, scores: Scores, reference: Reference) -> Accepted | None:
     accepted = replace(best.entry, fit=relinearized(best.entry.fit))
     return Accepted(fit, best=accepted, contenders=tuple(sorted((one.entry for one in rivals),
                                                                   key=lambda entry: -entry.delta_bic)))
+
+
+def _nearest(tried: Sequence[_Tried], n_records: int) -> str:
+    """The least likely of the candidates that are no answer, with their sizes and chances on healthy records."""
+    found = sorted((one.entry for one in tried if one.entry.p_value < _WORTH_SAYING), key=lambda one: one.p_value)
+    said = "; ".join(f"{one.candidate.label} ({_sizes(one)}; chance {one.p_value:.1g})" for one in found[:_SAID])
+    return (f"Nearest to an answer, and no name: {said}. The chance is that healthy records show as much, as far as "
+            f"{n_records} of them can tell; more reference records sharpen it.") if said else ""
+
+
+def _sizes(entry: Entry) -> str:
+    """Quantities of a candidate with their standard deviations."""
+    candidate = entry.candidate
+    values = {q.name: (*entry.values[q.name], q.unit) for q in candidate.effect.quantities}
+    values = relative(values) if candidate.effect.name == NAME else values
+    return ", ".join(f"{name} {value:.3g} ± {std:.1g} {unit}".rstrip(" -")
+                     for name, (value, std, unit) in values.items())
 
 
 @dataclass(frozen=True, eq=False)

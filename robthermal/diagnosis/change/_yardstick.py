@@ -34,7 +34,7 @@ def inflation(candidate: Candidate, each: Sequence[Refit], n_new: int) -> float:
     n_new : int
         Readings of the new records: the squares of a misfit grow with them, those of noise do not.
     """
-    tried, total = _held(candidate), 0.0
+    tried, total = with_held_shape(candidate), 0.0
     for fit in each:
         scores = score_candidates(fit, [tried])
         if scores.candidates:
@@ -66,8 +66,14 @@ def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
     return bool(difference < max(_LEAST, kappa * scipy.stats.f.isf(_TIED, 1, COUNTS + n_reference - 1)))
 
 
-def _held(candidate: Candidate) -> Candidate:
-    """With the only trial value of every shape that it has; a phase is chosen by each record."""
+def with_held_shape(candidate: Candidate) -> Candidate:
+    """With the only trial value of every shape that it has; a phase is chosen by each record.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        With the shape that was found.
+    """
     effect = candidate.effect
     quantities = tuple(replace(q, grid=(candidate.shape[q.name],)) if q.grid and q.name in candidate.shape
                        and q.name != effect.paired and q is not effect.size else q for q in effect.quantities)

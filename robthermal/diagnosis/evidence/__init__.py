@@ -9,6 +9,7 @@ from ._blocks import Stability as Stability
 from ._blocks import reproducible as reproducible
 from ._blocks import sandwich as sandwich
 from ._blocks import stability as stability
+from ._blocks import wandering as wandering
 from ._hold_out import Gap as Gap
 from ._hold_out import HoldOut as HoldOut
 from ._hold_out import ValidationResiduals as ValidationResiduals
@@ -39,4 +40,4 @@ __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut"
            "Remainder", "SURE", "Scores", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "expected_rms",
            "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised", "promising",
            "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates", "stability",
-           "unknown_heat", "validation_data"]
+           "unknown_heat", "validation_data", "wandering"]

@@ -113,15 +113,37 @@ def stability(fit: Refit, column: int) -> Stability:
     column : int
         Place of the unknown.
     """
+    moved, weight = _segments(fit, column)
+    if not weight.size:
+        return Stability(0, float("inf"))
+    return Stability(weight.size, float(np.sqrt(_deviations(moved, weight) / weight.sum())))
+
+
+def wandering(fit: Refit, column: int) -> tuple[float, int]:
+    """How far one unknown moves over segments, in units of the declared noise: 1 for white noise; number of segments.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with the unknown.
+    column : int
+        Place of the unknown.
+    """
+    moved, weight = _segments(fit, column)
+    return (_deviations(moved, weight) / max(weight.size - 1, 1) if weight.size else 0.0), weight.size
+
+
+def _segments(fit: Refit, column: int) -> tuple[Array, Array]:
+    """By how much each segment would move an unknown, and what it tells of it; of those that tell anything."""
     own = _alone(fit, column)
     weight = block_sums(fit, own**2, SEGMENTS)
     told = weight > 0.02 * weight.sum() / max(weight.size, 1)
-    moved = block_sums(fit, own * fit.z, SEGMENTS)[told] / weight[told]
-    if not told.any():
-        return Stability(0, float("inf"))
-    share = weight[told] / weight[told].sum()
-    scatter = float(np.sqrt(np.sum(share * (moved - share @ moved) ** 2)))
-    return Stability(int(told.sum()), scatter)
+    return block_sums(fit, own * fit.z, SEGMENTS)[told] / weight[told], weight[told]
+
+
+def _deviations(moved: Array, weight: Array) -> float:
+    """Weighted sum of squares about the mean."""
+    return float(np.sum(weight * (moved - (weight @ moved) / weight.sum()) ** 2))
 
 
 def sandwich(fit: Refit, columns: Sequence[int]) -> Array:
@@ -149,8 +171,12 @@ def sandwich(fit: Refit, columns: Sequence[int]) -> Array:
 
 
 def _alone(fit: Refit, column: int) -> Array:
-    """Whitened derivative by one unknown, without what all others can explain (m,)."""
-    others = np.delete(fit.J, column, axis=1)
+    """Whitened derivative by one unknown, without what all others can explain (m,).
+
+    Parameters that are known but for the scatter of healthy days are no others: they would explain a change of
+    themselves, at the price of their prior, which is in no segment.
+    """
+    others = np.delete(fit.J, [*fit.structure.known, column], axis=1)
     scale = np.linalg.norm(others, axis=0)
     others = others[:, scale > 0] / scale[scale > 0]
     J = fit.J[:, column]

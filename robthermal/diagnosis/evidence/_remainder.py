@@ -128,7 +128,8 @@ def _squares(fit: Refit) -> dict[str, float]:
 def _places(fit: Refit) -> tuple[tuple[tuple[str, float], ...], float]:
     """Share that a spline of heat into every lump removes of what is left, and the rms of the best one [W]."""
     rest = float(fit.rest @ fit.rest)
-    beyond = max(rest - fit.degrees_of_freedom, 1e-3 * rest)
+    beyond = rest - fit.degrees_of_freedom  # nothing where healthy records raised the noise level above it
+    beyond = beyond if beyond > _SMALL * rest else rest
     found: dict[str, tuple[float, float]] = {}
     basis = np.concatenate([heat_splines(path.time) for path in fit.records])
     for i, lump in enumerate(fit.system.lumps):
@@ -138,9 +139,9 @@ def _places(fit: Refit) -> tuple[tuple[tuple[str, float], ...], float]:
         kept = s > _SMALL * max(s[0], 1e-300)
         along = U[:, kept].T @ fit.rest
         size = Vt[kept].T @ (along / s[kept])
-        found[lump] = (min(float(along @ along) / beyond, 1.0), float(np.sqrt(np.mean((basis @ size) ** 2))))
+        found[lump] = (float(along @ along) / beyond, float(np.sqrt(np.mean((basis @ size) ** 2))))
     order = sorted(found, key=lambda name: -found[name][0])
-    return tuple((name, found[name][0]) for name in order), found[order[0]][1]
+    return tuple((name, min(found[name][0], 1.0)) for name in order), found[order[0]][1]
 
 
 def _band(fit: Refit) -> tuple[float, float, float]:

@@ -93,6 +93,11 @@ class Structure:
         return self.n_parameters + self.n_effects + self.n_coarse
 
     @property
+    def known(self) -> range:
+        """Places of unknowns that other records tell: none, unless healthy ones were compared."""
+        return range(0)
+
+    @property
     def n_priors(self) -> int:
         """Number of rows that priors of nominal parameters add to the residuals."""
         return int(np.isfinite(self.ranges.sigma).sum())
