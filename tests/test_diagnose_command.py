@@ -73,7 +73,7 @@ def constant(t: float, T: np.ndarray) -> np.ndarray:
     return np.array([0.4, 0.0])
 
 
-def measure(path: Path, hidden: Callable[[float, np.ndarray], np.ndarray], seed: int, n: int) -> Path:
+def measure(path: Path, hidden: Callable[[float, np.ndarray], np.ndarray], seed: int, n: int, room: bool) -> Path:
     rng = np.random.default_rng(seed)
     heater = rng.choice([0.0, 3.0, 7.0, 11.0], n // DWELL)
     T, rows = np.array([25.0, 25.0]), []
@@ -89,7 +89,10 @@ def measure(path: Path, hidden: Callable[[float, np.ndarray], np.ndarray], seed:
         rows += [(time, q, *y) for time, y in zip(t[:-1], run.y.T[:-1], strict=True)]
     table = np.array(rows)
     table[:, 2:] += 0.01 * rng.standard_normal((n, 2))
-    np.savetxt(path, table, delimiter=",", header="time,heater,Tp,Tb", comments="", fmt="%.9g")
+    table, names = np.insert(table, 2, 25.0, axis=1), "time,heater,room,Tp,Tb"
+    if not room:
+        table, names = np.delete(table, 2, axis=1), "time,heater,Tp,Tb"
+    np.savetxt(path, table, delimiter=",", header=names, comments="", fmt="%.9g")
     return path
 
 
@@ -98,11 +101,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., tuple[Path,
     folder = tmp_path_factory.mktemp("records")
     (folder / "setup.toml").write_text(SYSTEM, encoding="utf-8")
 
-    def made(hidden: Callable[[float, np.ndarray], np.ndarray]) -> tuple[Path, Path, Path]:
-        train, validation = (folder / f"{hidden.__name__}_{kind}.csv" for kind in ("train", "validation"))
+    def made(hidden: Callable[[float, np.ndarray], np.ndarray], room: bool = False) -> tuple[Path, Path, Path]:
+        name = f"{hidden.__name__}{'_room' * room}"
+        train, validation = (folder / f"{name}_{kind}.csv" for kind in ("train", "validation"))
         if not train.exists():
-            measure(train, hidden, 1, 400)
-            measure(validation, hidden, 2, 200)
+            measure(train, hidden, 1, 400, room)
+            measure(validation, hidden, 2, 200, room)
         return folder / "setup.toml", train, validation
 
     return made
@@ -183,7 +187,7 @@ def test_without_validation_the_report_says_so(run: Run, files: Any, tmp_path: P
 
 
 def test_ambiguous_is_no_and_lists_the_others(run: Run, files: Any, tmp_path: Path) -> None:
-    system, train, validation = files(constant)
+    system, train, validation = files(constant, room=True)
     out = tmp_path / "out"
     status, said, _ = run("diagnose", system, train, "--validation", validation, "--out", out, "--json")
     found = json.loads(said)
@@ -192,9 +196,24 @@ def test_ambiguous_is_no_and_lists_the_others(run: Run, files: Any, tmp_path: Pa
     assert {"heat_source", "ambient_gradient", "sensor_self_heating"} <= names
     page = (out / "report.html").read_text(encoding="utf-8")
     assert sorted(path.name for path in out.iterdir()) == sorted([*FILES, "next_experiment.csv"])
-    assert (out / "next_experiment.csv").read_text(encoding="utf-8").splitlines()[0] == "time,heater"
+    assert (out / "next_experiment.csv").read_text(encoding="utf-8").splitlines()[0] == "time,heater,room"
     assert run("simulate", system, out / "next_experiment.csv", "--out", tmp_path / "predicted.csv")[0] == 0
     assert "✗</span> AMBIGUOUS" in page and "these records cannot tell it from" in page
+
+
+def test_a_constant_heat_where_the_room_is_not_recorded_may_be_the_room(run: Run, files: Any, tmp_path: Path,
+                                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    """0.4 W into the plate, which loses 0.62 W/K: as a room that is 0.65 K warmer."""
+    few = partial(rt.diagnose, effects=["heat_source", "sensor_offset"])
+    monkeypatch.setattr("robthermal.jobs.diagnose._diagnose.diagnose", few)
+    system, train, validation = files(constant)
+    status, said, _ = run("diagnose", system, train, "--validation", validation, "--out", tmp_path / "out", "--json")
+    found = json.loads(said)
+    assert (status, found["verdict"]) == (0, "consistent")
+    room, = found["ambients"]
+    assert (room["ambient"], room["record"], room["unit"], room["declared"]) == ("room", train.name, "K", 298.15)
+    assert abs(room["value"] - 298.15 - 0.4 / 0.62) < 4 * room["std"] < 0.4
+    assert "room was not recorded, and is an unknown of every record: 25." in found["outcome"]["text"]
 
 
 def test_what_does_not_hold_on_validation_records_has_no_name(run: Run, files: Any, tmp_path: Path) -> None:

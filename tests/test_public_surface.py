@@ -56,7 +56,8 @@ SURFACE = {
         uncertainty_weight
     """,
     "diagnosis": """
-        Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found Gap HoldOut
+        Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found FoundAmbient
+        Gap HoldOut
         JointCheck JointSelection Left Refinement Resolving Split
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder
         Response Scores ShortList Stability UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects

@@ -33,6 +33,7 @@ from .evidence import hold_out as hold_out
 from .evidence import locate as locate
 from .evidence import score as score
 from .evidence import unknown_heat as unknown_heat
+from .fit import FoundAmbient as FoundAmbient
 from .fit import NoiseScaling as NoiseScaling
 from .fit import Refit as Refit
 from .fit import refit as refit
@@ -52,9 +53,9 @@ from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
 __all__ = ["Adequacy", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet",
-           "Entry", "Evidence", "Found", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left", "LinearizedRecord",
-           "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity", "Refinement",
-           "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split", "Stability", "UnknownHeat",
-           "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects", "forget_effect",
-           "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list", "register_effect",
-           "score", "select_jointly", "unknown_heat"]
+           "Entry", "Evidence", "Found", "FoundAmbient", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left",
+           "LinearizedRecord", "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity",
+           "Refinement", "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split", "Stability",
+           "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
+           "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list",
+           "register_effect", "score", "select_jointly", "unknown_heat"]

@@ -1,14 +1,18 @@
-"""What to hold against a name, a sentence each."""
+"""What to hold against an answer, and what it says of ambients that were not recorded, a sentence each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .._celsius import ZERO_CELSIUS
 from ..thermal import System
+from ._judge import Name
 from .effects import AMBIENT_DRIFT, Candidate
-from .fit import Refit
+from .fit import FoundAmbient, Refit
 
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
+_SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
+_LISTED = 4  # records by name
 
 
 def doubts(system: System, remainder: bool) -> list[str]:
@@ -25,6 +29,25 @@ def doubts(system: System, remainder: bool) -> list[str]:
         return []
     return ["A module has no inside of its own in this test. On 18 simulated stacks with a module none of the names "
             "was wrong, which does not exclude one in five: confirm this name on the machine."]
+
+
+def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:
+    """Where one heat path is named and the records do not tell to which of neighboring lumps it goes, a sentence each.
+
+    Parameters
+    ----------
+    effects : sequence of tuple
+        Named effects with their places.
+    alternatives : sequence of sequence of tuple
+        The same effect at neighboring lumps, for each of them.
+    """
+    said = []
+    for (_, where), others in zip(effects, alternatives, strict=True):
+        if others:
+            places = " or between ".join(" and ".join(at) for at in (where, *(at for _, at in others)))
+            said.append(f"The records do not tell whether this path goes between {places}: neighboring lumps are one "
+                        "answer, because where a lump ends is the model's choice. The augmented model has the first.")
+    return said
 
 
 def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
@@ -49,3 +72,67 @@ def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
         if any(one.effect.name == AMBIENT_DRIFT and one.where == (room,) for one in effects):
             said.append(f"That {room} drifts is read off other temperatures: record it.")
     return said
+
+
+def ambients_in_words(found: Sequence[FoundAmbient], system: System) -> list[str]:
+    """What the readings say of ambients that were not recorded, a sentence each.
+
+    Parameters
+    ----------
+    found : sequence of FoundAmbient
+        One per ambient and record.
+    system : System
+        System whose unit of temperature is used.
+    """
+    said = []
+    for name in dict.fromkeys(one.ambient for one in found):
+        own = [one for one in found if one.ambient == name]
+        values = ", ".join(f"{_shown(one.value, system)} ± {one.std:.2g} K in {one.record!r}" for one in own[:_LISTED])
+        if len(own) > _LISTED:
+            values = (f"{_shown(min(one.value for one in own), system)} to "
+                      f"{_shown(max(one.value for one in own), system)} in {len(own)} records")
+        said.append(f"The temperature of {name} was not recorded, and is an unknown of every record: {values}; the "
+                    f"system says {_shown(own[0].declared, system)}.")
+    return said
+
+
+def may_drift(nominal: Refit) -> list[str]:
+    """Where nothing explains the records: ambients that may be what is missing, a sentence each.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Fit of the nominal system that was diagnosed.
+    """
+    return [f"The temperature of {room} was not recorded: that it swings, drifts or jumps may be part of what is "
+            "missing. Record it." for room in nominal.unrecorded]
+
+
+def far_ambients(found: Sequence[FoundAmbient], system: System) -> list[str]:
+    """Ambients that come out so far from what the system says that something else may be the cause, a sentence each.
+
+    Parameters
+    ----------
+    found : sequence of FoundAmbient
+        One per ambient and record.
+    system : System
+        System with the links of the ambients.
+    """
+    said = []
+    for name in dict.fromkeys(one.ambient for one in found):
+        differences = [one.value - one.declared for one in found if one.ambient == name
+                       and abs(one.value - one.declared) > max(_FAR, _SURE * one.std)]
+        if differences:
+            most = max(differences, key=abs)
+            joined = sorted({end for link in system.links if name in link.between for end in link.between} - {name})
+            warmer = "warmer" if most > 0 else "colder"
+            said.append(f"The readings ask for a {name} {abs(most):.2g} K {warmer} than the system says. A constant "
+                        f"heat into {' or '.join(joined)}, or an offset of the sensors, may be the cause as well: "
+                        f"record {name}.")
+    return said
+
+
+def _shown(kelvin: float, system: System) -> str:
+    if system.temperature_unit == "degC":
+        return f"{kelvin - ZERO_CELSIUS:.4g} °C"
+    return f"{kelvin:.5g} K"

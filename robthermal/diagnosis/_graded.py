@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._judge import Judged, Progress, Validation, Verdict, alternatives, independent_of_step, judge
+from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge
 from ._outcomes import DiagnosisCode
 from ._searching import coarsely_searched, validated
 from .evidence import NEEDED, SURE, Evidence, Gap, Stability, expected_rms, left, reproducible, score, stability
@@ -20,6 +20,7 @@ from .search import (
     Accepted,
     SearchState,
     ShortList,
+    one_place,
     refit_short_list,
     revise,
     revised,
@@ -219,7 +220,7 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
     gaps = [Gap(nominal.rms, plain.rms, expected_rms(plain))] + ([] if held is None else [held.gap])
     if not _closes(gaps) or not independent_of_step(fit):
         return judged
-    ambiguous = any(map(alternatives, state.rounds))
+    ambiguous = not all(one_place(round_, nominal.structure.base) for round_ in state.rounds)
     verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
     code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
     return Judged(state=kept, adequacy=down.adequacy, hold_out=held, verdict=verdict, outcome=code.outcome(),

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._changed import changed
-from ._doubts import doubts, may_be_the_room
+from ._doubts import ambients_in_words, doubts, far_ambients, may_be_the_room, may_drift, place_undecided
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from ._refine import refine as refined
@@ -32,7 +32,7 @@ from .evidence import (
     sandwich,
     unknown_heat,
 )
-from .fit import Refit, SessionGain, exact, refit
+from .fit import Refit, SessionGain, exact, found_ambients, refit
 from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
 
@@ -168,12 +168,29 @@ def concluded(judged: Judged) -> Diagnosis:
         next_experiment=_plan(state.rounds) if named else None, outcome=judged.outcome,
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
-        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves)
-    caveats = (*may_be_the_room(nominal, state.fit.structure.effects),
-               *doubts(nominal.system, judged.plain is not None))
-    said = [judged.outcome.text, *nominal.floor.remarks, *map(str, filter(None, (rest, resolves))),
-            *fit.contradictions, *caveats]
-    return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=" ".join(said)))
+        unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves,
+        ambients=found_ambients(fit))
+    caveats = _caveats(judged, diagnosis)
+    return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=_text(diagnosis, caveats)))
+
+
+def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
+    """All that is to be said of an answer."""
+    rooms = [] if found.verdict == "unexplained" else ambients_in_words(found.ambients, found.nominal.system)
+    left_over = map(str, filter(None, (found.remainder, found.resolving)))
+    return " ".join([found.outcome.text, *found.nominal.floor.remarks, *rooms, *left_over, *found.fit.contradictions,
+                     *caveats])
+
+
+def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
+    """What to hold against the answer."""
+    state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
+    said = []
+    if verdict == "named_with_remainder":
+        said += place_undecided([one.key for one in found.effects], found.alternatives)
+    said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
+    return (*said, *may_be_the_room(nominal, state.fit.structure.effects),
+            *doubts(nominal.system, judged.plain is not None))
 
 
 def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:

@@ -19,7 +19,7 @@ from ._refinement import Refinement
 from .data import NoiseEstimate
 from .effects import Candidate
 from .evidence import Adequacy, Evidence, Gap, HoldOut, Location, Remainder, Scores, UnknownHeat
-from .fit import Refit
+from .fit import FoundAmbient, Refit
 from .plan import NextExperiment, Resolving
 from .search import Accepted, JointCheck, ruled_out
 
@@ -52,6 +52,11 @@ class Found:
     evidence: Evidence | None = None
 
     @property
+    def key(self) -> Name:
+        """Name and place, as in `Diagnosis.alternatives`."""
+        return self.effect, self.where
+
+    @property
     def label(self) -> str:
         """For tables: ``sensor_lag(T6)``."""
         return f"{self.effect}({', '.join(self.where)})"
@@ -69,7 +74,8 @@ class Diagnosis:
     effects : tuple of Found
         In order of acceptance; empty unless named or ambiguous.
     alternatives : tuple of tuple
-        For every effect, the (effect, where) the records cannot exclude.
+        For every effect, the (effect, where) the records cannot exclude; beside "named_with_remainder" the same heat
+        path at neighboring lumps.
     system : System
         Nominal parameters refitted, with the effects added.
     gap : dict
@@ -101,6 +107,8 @@ class Diagnosis:
         the network as it is.
     caveats : tuple of str
         What to hold against a name, a sentence each; the outcome's text has them too.
+    ambients : tuple of FoundAmbient
+        Ambients that a training record does not hold, as its readings say them; `system` keeps its own.
     """
 
     verdict: Verdict
@@ -127,6 +135,7 @@ class Diagnosis:
     reference: Compared | None = None
     refinement: Refinement | None = None
     caveats: tuple[str, ...] = ()
+    ambients: tuple[FoundAmbient, ...] = ()
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
@@ -195,6 +204,7 @@ class Diagnosis:
             "provisional": [_plain(found) for found in self.provisional],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "resolving": None if self.resolving is None else self.resolving.to_dict(),
+            "ambients": list(map(_with_unit, self.ambients)),
             "outcome": vars(self.outcome),
             **({} if self.reference is None else {"reference": vars(self.reference)}),
             **({} if self.refinement is None else {"refinement": self.refinement.to_dict()}),
@@ -210,6 +220,10 @@ class Diagnosis:
             File to write.
         """
         write_json(path, self.to_dict())
+
+
+def _with_unit(one: FoundAmbient) -> dict[str, Any]:
+    return {**vars(one), "unit": "K"}
 
 
 def _plain(found: Found) -> dict[str, Any]:

@@ -149,6 +149,40 @@ def test_an_alias_of_an_impossible_sign_is_not_listed() -> None:
     gain = names.index("input_gain")
     every = {names[j] for j in scores.aliases(gain)}
     assert every == {"input_gain_slope", "input_saturation"}
-    assert {names[j] for j in scores.possible_aliases(gain)} == {"input_gain_slope"}
     falling = names.index("input_saturation")
-    assert not scores.possible[falling] and set(scores.possible_aliases(falling)) == set(scores.aliases(falling))
+    for i, known in ((gain, True), (falling, False)):
+        assert bool(scores.possible[i]) is known
+    assert {twin.candidate.effect.name for twin in scores.twins(gain) if twin.possible} == {"input_gain_slope"}
+    assert all(twin.possible for twin in scores.twins(falling))  # beside another effect its sign may be the other one
+    for i in range(len(names)):
+        for twin in scores.twins(i):
+            j = [candidate is twin.candidate for candidate in scores.candidates].index(True)
+            assert scores.size[i] * twin.per == pytest.approx(scores.size[j], rel=1e-3)
+
+
+def test_an_alias_whose_sign_the_refit_turns_is_listed() -> None:
+    """The heater gives 4 % less than it should; the file's capacity is too large by a quarter and not fitted.
+
+    The conductance ends at its bound. The linearization does not know that, and asks for 20 % more heat: a gain that
+    falls with the level is impossible there, and was not listed although the refit says 4 % less.
+    """
+    C, G, rng = 40.0, 1.2, np.random.default_rng(0)
+    u = np.repeat(rng.choice([0.0, 8.0], 40), 20)
+    T, rows, a = ROOM, [], np.exp(-H * G / C)
+    for power in 0.96 * u:
+        rows.append(T)
+        T = ROOM + a * (T - ROOM) + (1.0 - a) * power / G
+    run = rt.Record(sample_time=H, inputs=np.column_stack([u, np.full(u.size, ROOM)]),
+                    outputs=np.array(rows)[:, None] + 0.01 * rng.standard_normal((u.size, 1)),
+                    input_names=["heater", "room"], output_names=["T"])
+    block = rt.System(ambients={"room": {"temperature": ROOM}}, lumps={"block": {"capacity": 50.0}},
+                      links=[{"between": ("block", "room"), "conductance": 1.0}], inputs={"heater": {"lump": "block"}},
+                      sensors={"T": {"lump": "block", "noise": 0.01}},
+                      fit={"links.block-room.conductance": {"lower": 0.5, "upper": 1.2}})
+    fit = rt.diagnosis.refit(block, run)
+    scores = rt.diagnosis.score(fit, ["input_gain", "input_gain_slope", "input_saturation"])
+    entry, = rt.diagnosis.refit_short_list(fit, scores).entries
+    assert entry.candidate.effect.name == "input_gain"
+    linearized = scores.size[[candidate.key for candidate in scores.candidates].index(entry.candidate.key)]
+    assert linearized > 0.1 and entry.values["gain"][0] < -0.02
+    assert {one.effect.name for one in entry.aliases} == {"input_gain_slope", "input_saturation"}

@@ -13,12 +13,15 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.diagnosis import Entry
 from robthermal.diagnosis._graded import _predicts, chosen_again
 from robthermal.diagnosis._judge import Validation
-from robthermal.diagnosis.diagnose import doubts
+from robthermal.diagnosis.diagnose import doubts, place_undecided
+from robthermal.diagnosis.evidence import Twin
 from robthermal.diagnosis.fit import Refit, coarsened
-from robthermal.diagnosis.search import Accepted, begin, decide, refit_short_list, with_neighbors
+from robthermal.diagnosis.search import Accepted, begin, decide, one_place, refit_short_list, with_neighbors
 from robthermal.diagnosis.search._neighbors import neighboring
+from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
 H, N, CELLS, LUMPS, ROOM = 10.0, 400, 60, 5, 296.0
 
@@ -35,10 +38,10 @@ def bar() -> rt.System:
 
 
 @cache
-def measured(cell: int, seed: int = 1) -> rt.Record:
+def measured(cell: int, seed: int = 1, path: float = 0.2) -> rt.Record:
     """The bar of 60 cells with a path of 0.2 W/K from a cell to the middle of the last lump."""
     C, K = 30.0 * LUMPS / CELLS, np.zeros((CELLS, CELLS))
-    pairs = [(i, i + 1, 0.8 * CELLS / LUMPS) for i in range(CELLS - 1)] + [(cell, 53, 0.2)]
+    pairs = [(i, i + 1, 0.8 * CELLS / LUMPS) for i in range(CELLS - 1)] + [(cell, 53, path)]
     for i, j, G in pairs:
         K[[i, j], [i, j]] -= G
         K[[i, j], [j, i]] += G
@@ -79,6 +82,41 @@ def test_a_path_from_between_two_lumps_has_two_names():
     assert {frozenset({"x1", "x5"}), frozenset({"x2", "x5"})} <= names(both)
     assert both.best is one.best and names(one) <= names(both)
     assert all(neighboring(bar(), entry.candidate, one.best.candidate) for entry in both.contenders)
+
+
+def test_neighboring_places_are_one_answer_and_other_effects_are_not():
+    both = with_neighbors(found(16))
+    assert both.contenders and one_place(both, bar())
+    assert not one_place(replace(both, contenders=(*both.contenders, both.best, other_effect(both))), bar())
+    alias = Twin(other_effect(both).candidate, 1.0, 0.0, True)
+    assert not one_place(replace(both, best=replace(both.best, twins=(alias,))), bar())
+
+
+def other_effect(round_: Accepted) -> Entry:
+    return replace(round_.best, candidate=rt.diagnosis.candidates(bar(), ["sensor_lag"])[0])
+
+
+def test_a_place_that_is_not_decided_is_said_to_be_one_of_two():
+    link, rival = ("missing_link", ("x1", "x5")), ("missing_link", ("x2", "x5"))
+    said, = place_undecided([link, ("sensor_lag", ("T1",))], [[rival], []])
+    assert said.startswith("The records do not tell whether this path goes between x1 and x5 or between x2 and x5: "
+                           "neighboring lumps are one answer") and said.endswith("The augmented model has the first.")
+    assert place_undecided([link], [[]]) == []
+
+
+@pytest.mark.exhaustive
+def test_one_path_at_neighboring_lumps_is_named_with_its_other_place():
+    """A bar of 60 cells with a path from between two lumps: one answer, and the report says one of two."""
+    train, unseen = measured(16, path=0.8), measured(16, seed=2, path=0.8)
+    answer = rt.diagnose(bar(), train, validation=unseen, effects=["missing_link", "sensor_lag"])
+    (one,), (others,) = answer.effects, answer.alternatives
+    assert answer.verdict == "named_with_remainder" and answer.outcome.ok
+    assert {frozenset(one.where), *(frozenset(where) for _, where in others)} == {
+        frozenset({"x1", "x5"}), frozenset({"x2", "x5"})}
+    headline = diagnosis_report(Diagnosed(answer, (), (), ())).headline
+    assert " or a heat path between " in headline
+    assert "The records do not tell whether this path goes between" in headline
+    assert answer.to_dict()["alternatives"] == [[{"effect": name, "where": list(where)} for name, where in others]]
 
 
 def test_a_path_from_the_middle_of_a_lump_is_among_its_names():

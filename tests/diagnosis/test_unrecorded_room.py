@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from unrecorded_room import ROOM, TIME, model, names, records
+from unrecorded_room import ROOM, STEP, TIME, N, model, names, records
 
 import robthermal as rt
 from robthermal.diagnosis.effects import AMBIENT_DRIFT
@@ -57,6 +57,76 @@ def test_a_room_that_stands_still_is_no_finding(both: bool) -> None:
     found = diagnosed("nothing", both)
     assert found.verdict == "consistent" and found.effects == ()
     assert DRIFT in [one.key for one in found.scores.candidates]  # it was tried
+
+
+def test_every_record_has_a_room_of_its_own() -> None:
+    """4 K warmer on one day, 6 K colder on another, 3 K warmer on the one held out; the file says 295 K on all."""
+    days = [records(room=room, seed=seed)[0] for seed, room in ((1, ROOM + 4.0), (2, ROOM - 6.0), (3, ROOM + 3.0))]
+    assert max(days[0].outputs.min() - ROOM, ROOM - days[1].outputs.min()) > 3.0
+    found = rt.diagnose(model(), [replaced(one, f"day {i}") for i, one in enumerate(days[:2])], validation=days[2],
+                        effects=FEW)
+    assert found.verdict == "consistent" and found.effects == ()
+    assert [(one.ambient, one.record, one.declared) for one in found.ambients] == [
+        ("room", "day 0", ROOM), ("room", "day 1", ROOM)]
+    for one, room in zip(found.ambients, (ROOM + 4.0, ROOM - 6.0), strict=True):
+        assert abs(one.value - room) < 4 * one.std < 0.4
+    assert found.gap["validation"].after < 1.1 * found.gap["validation"].noise  # its own room is estimated
+    assert found.system.ambients["room"].temperature == ROOM
+    assert [entry["ambient"] for entry in found.to_dict()["ambients"]] == ["room", "room"]
+    assert found.caveats[0].startswith("The readings ask for a room 6 K colder than the system says. A constant heat "
+                                       "into plate, or an offset of the sensors, may be the cause as well")
+    assert " K in 'day 0', 289." in found.outcome.text or " K in 'day 0', 288." in found.outcome.text
+
+
+def replaced(one: rt.Record, name: str) -> rt.Record:
+    return rt.Record(sample_time=one.sample_time, inputs=one.inputs, outputs=one.outputs, input_names=one.input_names,
+                     output_names=one.output_names, start_time=one.start_time, name=name)
+
+
+def test_a_room_in_the_fit_table_is_one_number_of_all_records() -> None:
+    days = [records(room=ROOM + 2.0, seed=seed)[0] for seed in (1, 2)]
+    own = rt.diagnosis.refit(model(), days)
+    assert own.structure.sessions.n_free == 1 and own.structure.n_own == 2 * (2 + 1)
+    system = model().model_copy(update={"fit": {**model().fit, **rt.System(
+        ambients={"room": {"temperature": ROOM}}, lumps={"block": {"capacity": 1.0}},
+        links=[{"between": ("block", "room"), "conductance": 1.0}],
+        fit={"ambients.room.temperature": {"lower": 280.0, "upper": 310.0, "sigma": 5.0}}).fit}})
+    common = rt.diagnosis.refit(system, days)
+    assert common.structure.sessions.n_free == 0 and common.structure.n_own == 2 * 2
+    assert abs(common.system.ambients["room"].temperature - ROOM - 2.0) < 0.1
+
+
+@pytest.mark.parametrize(("heat", "offset", "warmer"), [(3.4, 0.0, 4.0), (0.0, 3.0, 3.0)])
+def test_what_a_room_of_another_temperature_imitates_gets_no_name(heat: float, offset: float, warmer: float) -> None:
+    """3.4 W into the plate, which loses 0.85 W/K, is a room 4 K warmer; so are two sensors that read 3 K too much."""
+    train, unseen = (one.with_outputs(one.outputs + offset) for one in records(heat=heat))
+    found = rt.diagnose(model(), train, validation=unseen, effects=["heat_source", "ambient_gradient", "sensor_offset"])
+    assert found.verdict == "consistent" and found.effects == ()
+    room, = found.ambients
+    assert abs(room.value - ROOM - warmer) < 4 * room.std < 0.5
+    assert found.caveats[0].startswith(f"The readings ask for a room {room.value - ROOM:.2g} K warmer")
+    if heat:
+        assert ("heat_source", ("plate",)) in found.not_testable
+
+
+def test_an_offset_of_one_sensor_is_one_of_the_other_in_another_room() -> None:
+    """Or a constant heat that flows from block to plate, in another room."""
+    train, unseen = (one.with_outputs(one.outputs + np.array([3.0, 0.0])) for one in records())
+    found = rt.diagnose(model(), train, validation=unseen, effects=["heat_source", "ambient_gradient", "sensor_offset"])
+    assert found.verdict == "ambiguous"
+    assert names(found) == [{("sensor_offset", ("T_block",)), ("sensor_offset", ("T_plate",)),
+                             ("heat_source", ("block",))}]
+
+
+def test_a_ramp_is_taken_where_half_a_period_explains_no_more() -> None:
+    """Seed 0: a sine of 3100 s left 299.5 of one record, one of 17 000 s 301.4; the next record asks for the ramp."""
+    train, unseen = records(room=ROOM + 2.0 * TIME / TIME[-1], seed=0)
+    found = rt.diagnose(model(), train, validation=unseen, effects=["periodic_load"])
+    assert found.verdict == "ambiguous" and names(found) == [{HEAT, DRIFT}]
+    assert found.effects[0].values["period"][0] > 3 * STEP * N
+    half = rt.diagnose(model(), records(room=ROOM + 2.0 * np.sin(2 * np.pi * TIME / 3000.0))[0],
+                       effects=["periodic_load"])  # what the record can tell stays
+    assert 2000.0 < half.effects[0].values["period"][0] < 4500.0
 
 
 def test_a_recorded_room_is_no_rival() -> None:

@@ -33,11 +33,12 @@ from ._score import promised as promised
 from ._score import promising as promising
 from ._score import score as score
 from ._score import score_candidates as score_candidates
+from ._twin import Twin as Twin
 from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
-           "Remainder", "SURE", "Scores", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "expected_rms",
-           "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised", "promising",
-           "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates", "stability",
-           "unknown_heat", "validation_data", "wandering"]
+           "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "adequacy",
+           "expected_rms", "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised",
+           "promising", "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates",
+           "stability", "unknown_heat", "validation_data", "wandering"]

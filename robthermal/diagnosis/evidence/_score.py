@@ -17,6 +17,7 @@ from ..._pandas import pd
 from ..effects import Candidate, candidates
 from ..fit import Refit
 from ._frequency_tails import inflation, tail
+from ._twin import Twin, possible_size
 
 Array = NDArray[np.float64]
 ALPHA = 0.01  # family-wise
@@ -96,20 +97,25 @@ class Scores:
         alike = 1.0 - self.confusion[i] ** 2 < ALIAS**2
         return [int(j) for j in np.flatnonzero(alike) if j != i]
 
-    def possible_aliases(self, i: int) -> list[int]:
-        """Aliases of a possible candidate whose own size would be possible: a conductance below zero is no answer.
+    def twins(self, i: int) -> tuple[Twin, ...]:
+        """Aliases of a candidate, with the sizes that they have where it has one.
+
+        Beside another effect the sign of a size may be another one: of a candidate that is impossible by itself all
+        aliases count as possible.
 
         Parameters
         ----------
         i : int
-            Place in `candidates`. Of one that is impossible by itself all aliases count: beside another effect the sign
-            of its size may be the other one, and theirs with it.
+            Place in `candidates`.
 
         Returns
         -------
-        list of int
+        tuple of Twin
         """
-        return [j for j in self.aliases(i) if self.possible[j] or not self.possible[i]]
+        # the deviations of two sizes of one signature are as the sizes
+        return tuple(Twin(self.candidates[j], math.copysign(self.std[j] / self.std[i], self.confusion[i, j]),
+                          float(self.std[j]), bool(self.possible[j] or not self.possible[i]))
+                     for j in self.aliases(i))
 
     @property
     def not_testable(self) -> dict[tuple[str, tuple[str, ...]], str]:
@@ -264,7 +270,7 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
     statistic = along**2 / variance / inflation(fit, unit)
     size, std = along / own_safe, np.sqrt(variance) / own_safe
     identifiability = np.where(length > 0, own / np.where(length > 0, length, 1.0), 0.0)
-    possible = np.array([_possible(trial, beta, deviation) for (_, trial), beta, deviation
+    possible = np.array([possible_size(trial, beta, deviation) for (_, trial), beta, deviation
                          in zip(trials, size, std, strict=True)], bool)
     best = _best_of(trials, statistic, size, possible)
     return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best],
@@ -369,9 +375,3 @@ def _best_of(trials: Sequence[tuple[int, Candidate]], statistic: Array, size: Ar
         if number not in best or rank > best[number][0]:
             best[number] = rank, i
     return np.array([best[number][1] for number in sorted(best)], np.intp)
-
-
-def _possible(trial: Candidate, size: float, std: float) -> bool:
-    """Within the physical bounds, give or take two standard deviations."""
-    bounds = trial.effect.size
-    return bounds.lower - 2 * std < size < bounds.upper + 2 * std and (size != 0)

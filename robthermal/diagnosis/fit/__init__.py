@@ -21,9 +21,12 @@ from ._sessions import Sessions as Sessions
 from ._sessions import sessions_of as sessions_of
 from ._structure import Structure as Structure
 from ._structure import structure_of as structure_of
+from ._unknown_ambients import FoundAmbient as FoundAmbient
+from ._unknown_ambients import found_ambients as found_ambients
 from ._unknown_ambients import with_unknown_ambients as with_unknown_ambients
 from ._whitened import Whitened as Whitened
 
-__all__ = ["ENOUGH", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain", "Sessions",
-           "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters", "fitted", "refit",
-           "relinearized", "sessions_of", "structure_of", "with_slow_part", "with_unknown_ambients"]
+__all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
+           "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
+           "fitted", "found_ambients", "refit", "relinearized", "sessions_of", "structure_of", "with_slow_part",
+           "with_unknown_ambients"]

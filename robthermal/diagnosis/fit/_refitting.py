@@ -12,13 +12,14 @@ from ...errors import Diverged, InputError, Outcome
 from ...fitting import NONE, Choice, chosen_ranges
 from ...thermal import System
 from .._outcomes import DiagnosisCode
-from ..data import Measured, NoiseEstimate, as_measured, noise_floor, without_outliers
+from ..data import Measured, NoiseEstimate, as_measured, noise_floor, records_of, without_outliers
 from ..path import Linearized, White, linearized_records
 from ._descent import Descent, Point, decrease, descend
 from ._noise_scaling import NoiseScaling, refined
 from ._refit import Refit
 from ._sessions import SessionGain, sessions_of
 from ._structure import Structure, structure_of
+from ._unknown_ambients import with_unknown_ambients
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
@@ -80,7 +81,8 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEs
     data = without_outliers(system, as_measured(system, records, "records", operating_point), floor.noise)
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
     starts = [one.initial(system, "free") for one in data]
-    structure = structure_of(system, ranges, data, starts, sessions_of(system, session_gain))
+    sessions = with_unknown_ambients(sessions_of(system, session_gain), system, records_of(data), ranges.flat)
+    structure = structure_of(system, ranges, data, starts, sessions)
     n_unknown = structure.n_parameters + structure.n_own
     if structure.n_readings <= 2 * n_unknown:
         raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",

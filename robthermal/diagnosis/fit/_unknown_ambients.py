@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ...thermal import System
-from ..data import RecordData
+from ..data import RecordData, records_of
+from ._refit import Refit
 from ._sessions import Sessions
 
 SIGMA = 5.0  # K: how far a room may be from what the system says
 
 
-def with_unknown_ambients(sessions: Sessions, system: System, records: Sequence[RecordData]) -> Sessions:
+@dataclass(frozen=True)
+class FoundAmbient:
+    """Temperature of an ambient that a record does not hold, as the readings of that record say it.
+
+    Parameters
+    ----------
+    ambient : str
+        Name of the ambient in the system.
+    record : str
+        Name of the record.
+    value, std : float
+        Estimate, and its standard deviation: that of the prior, 5 K, where the readings say nothing [K].
+    declared : float
+        Temperature that the system says [K], the center of the prior.
+    """
+
+    ambient: str
+    record: str
+    value: float
+    std: float
+    declared: float
+
+
+def with_unknown_ambients(sessions: Sessions, system: System, records: Sequence[RecordData],
+                          common: Collection[str] = ()) -> Sessions:
     """Sessions whose ambients are unknown where no record holds them.
 
     Parameters
@@ -23,9 +50,35 @@ def with_unknown_ambients(sessions: Sessions, system: System, records: Sequence[
         Nominal system; its temperatures are the centers of the priors.
     records : sequence of RecordData
         Records of all sessions.
+    common : collection of str
+        Numbers of the system that are fitted to all records at once: an ambient among them is no record's own.
     """
-    names = [name for name in system.ambients
-             if any(name not in one.record.input_names for one in records)]
+    names = [name for name in system.ambients if f"ambients.{name}.temperature" not in common
+             and any(name not in one.record.input_names for one in records)]
     return replace(sessions, inputs=(*sessions.inputs, *names),
                    numbers=(*sessions.numbers, *(f"ambients.{name}.temperature" for name in names)),
                    sigma=(*sessions.sigma, *(SIGMA for _ in names)))
+
+
+def found_ambients(fit: Refit) -> tuple[FoundAmbient, ...]:
+    """Ambients that were unknowns of the records, as found.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit to the records.
+    """
+    structure = fit.structure
+    sessions, std = structure.sessions, np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    of = {f"ambients.{name}.temperature": name for name in structure.base.ambients}
+    sized = ([g for one, g in zip(structure.data, structure.gains(v), strict=True) if one.n_sessions]
+             for v in (fit.v, std))
+    found = []
+    for one, values, deviations in zip(records_of(structure.data), *sized, strict=True):
+        for number, sigma, value, deviation in zip(sessions.numbers, sessions.sigma, values, deviations, strict=True):
+            name = of.get(number)
+            if name is not None and name not in one.record.input_names:
+                declared = structure.base.ambients[name].temperature
+                found.append(FoundAmbient(name, one.label, declared + sigma * float(value), sigma * float(deviation),
+                                          declared))
+    return tuple(found)

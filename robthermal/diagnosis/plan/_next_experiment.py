@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -168,19 +168,32 @@ def rivals(decision: Decision) -> tuple[Entry, ...]:
         for alias in entry.aliases:
             if alias.key not in known and len(entries) < MOST:
                 known.add(alias.key)
-                entries += _alias(decision.before, alias)
+                entries += _alias(decision.before, alias, entry)
     return tuple(entries)
 
 
-def _alias(before: Refit, alias: Candidate) -> list[Entry]:
+def _alias(before: Refit, alias: Candidate, entry: Entry) -> list[Entry]:
+    """An alias refitted; with the same times as the effect it is an alias of, where both have the same."""
     scores = score_candidates(before, [alias])
     if not scores.candidates:
         return []
+    candidates, sizes, near = scores.candidates, scores.size.tolist(), before
+    if alias.effect.paired:
+        (candidates, sizes), near = _alike(before, alias, entry), entry.fit
     try:
-        found = refit_set(before, scores.candidates, scores.size.tolist(), limit=_FIRST)
+        found = refit_set(before, candidates, sizes, near, _FIRST)
     except (Diverged, InputError):
         return []
     return [Entry(found.candidates[0], found.fit, found.delta_bic, float(scores.p_value[0]))]
+
+
+def _alike(before: Refit, alias: Candidate, entry: Entry) -> tuple[tuple[Candidate], list[float]]:
+    """A sine with the period and phase of the one it is an alias of, and the size that changes the readings as much."""
+    values = dict(entry.fit.structure.quantities(entry.fit.v)[-1])
+    size = values.pop(entry.candidate.effect.size.name)
+    pair = [replace(candidate, shape=values) for candidate in (alias, entry.candidate)]
+    own, other = before.whiten([path.columns(pair) for path in before.paths]).T
+    return (pair[0],), [size * float(own @ other) / float(own @ own)]
 
 
 def _clearest(tried: Sequence[Trial], times: int) -> list[Trial]:

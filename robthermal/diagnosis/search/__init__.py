@@ -11,6 +11,7 @@ from ._joint_check import checked_jointly as checked_jointly
 from ._joint_sets import EffectSet as EffectSet
 from ._joint_sets import refit_set as refit_set
 from ._neighbors import ALIKE as ALIKE
+from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
 from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
 from ._resolve_alternatives import ruled_out as ruled_out
@@ -35,6 +36,6 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "checked_jointly", "compare", "decide", "leaves_large_misfit",
-           "needed", "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
-           "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors",
-           "with_wider_noise", "without", "without_contradicted"]
+           "needed", "one_place", "quantities_of", "refit_candidates", "refit_set", "refit_short_list",
+           "resolve_alternatives", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
+           "with_neighbors", "with_wider_noise", "without", "without_contradicted"]

@@ -120,12 +120,12 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
     winner = again[0]
     others = tuple(entry for entry in again[1:] if _as_good(entry, winner))
     if winner.fit.structure is best.fit.structure:
-        winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.aliases)
+        winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.twins)
     else:
         own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
         winner = Entry(winner.candidate, own, next(e.delta_bic for e in entries
                                                    if e.fit.structure is winner.fit.structure), winner.p_value,
-                       winner.aliases)
+                       winner.twins)
     return Accepted(before, best=winner, contenders=others)
 
 

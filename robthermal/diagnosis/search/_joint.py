@@ -149,8 +149,8 @@ def select_jointly(fit: Refit, scores: Scores, *, tries: int = 2, known: Refit |
     ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"heater": {"lump": "bar"}},
     ...                 sensors={"T": {"lump": "bar", "noise": 0.05}})
     >>> true = bar.with_parameters({"sensors.T.time_constant": 30.0, "lumps.bar.heat": 0.2})
-    >>> heater = np.repeat([4.0, 0.0, 6.0, 2.0], 50)
-    >>> drive = rt.Record(sample_time=10.0, inputs=heater, outputs=np.zeros((200, 0)), input_names=["heater"],
+    >>> columns = np.column_stack([np.repeat([4.0, 0.0, 6.0, 2.0], 50), np.full(200, 295.0)])
+    >>> drive = rt.Record(sample_time=10.0, inputs=columns, outputs=np.zeros((200, 0)), input_names=["heater", "room"],
     ...                   output_names=[])
     >>> run = rt.thermal.simulate(true, drive)
     >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))

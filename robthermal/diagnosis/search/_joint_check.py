@@ -100,8 +100,7 @@ def _listed(round_: Accepted, rivals: list[tuple[float, EffectSet]], stepwise: t
 def _entry(found: EffectSet, candidate: Candidate, scores: Scores, delta_bic: float) -> Entry:
     keys = [one.key for one in scores.candidates]
     i = keys.index(candidate.key)
-    return Entry(candidate, found.fit, delta_bic, float(scores.p_value[i]),
-                 tuple(scores.candidates[j] for j in scores.possible_aliases(i)))
+    return Entry(candidate, found.fit, delta_bic, float(scores.p_value[i]), scores.twins(i))
 
 
 def _representative(key: Key, scores: Scores) -> Key:

@@ -61,6 +61,21 @@ def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
     return exchanged <= set(system.lumps) and any(set(link.between) == exchanged for link in system.links)
 
 
+def one_place(round_: Accepted, system: System) -> bool:
+    """Whether all that the records cannot tell from an effect is the same heat path at neighboring lumps: one answer.
+
+    Parameters
+    ----------
+    round_ : Accepted
+        Accepted effect with its contenders and aliases.
+    system : System
+        Network with the links that make neighbors.
+    """
+    best = round_.best.candidate
+    others = [*round_.best.aliases, *(one for entry in round_.contenders for one in (entry.candidate, *entry.aliases))]
+    return all(one.key == best.key or neighboring(system, one, best) for one in others)
+
+
 def _nearly_best(before: Refit, entries: Sequence[Entry]) -> list[Entry]:
     """Entries that reach most of the decrease that the best of them reaches."""
     most = before.rss - min((entry.fit.rss for entry in entries), default=before.rss)

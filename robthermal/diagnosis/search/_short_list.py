@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from ..._drawing import axes_for
 from ...errors import Diverged, InputError
 from ..effects import Candidate
-from ..evidence import BIC_GAP, Scores, promised
+from ..evidence import BIC_GAP, Scores, Twin, promised
 from ..fit import Refit, extended
+from ._ramp import as_ramp
 from ._scan import retried, scanned
 from ._starts import BEHIND, Origin, in_reach, started
 
@@ -43,20 +44,30 @@ class Entry:
         N log(RSS₀/RSS) - dim log N against the structure without it: above 10 is very strong.
     p_value : float
         Family-wise, from its score.
-    aliases : tuple of Candidate
-        Effects with the same change of every reading.
+    twins : tuple of Twin
+        Effects with the same change of every reading, whether their size is possible or not.
     """
 
     candidate: Candidate
     fit: Refit
     delta_bic: float
     p_value: float
-    aliases: tuple[Candidate, ...] = ()
+    twins: tuple[Twin, ...] = ()
+
+    @property
+    def aliases(self) -> tuple[Candidate, ...]:
+        """Exact aliases whose own size is possible, linearized or at the size found here: no conductance below zero."""
+        size = self.fit.structure.quantities(self.fit.v)[self._place][self.candidate.effect.size.name]
+        return tuple(twin.candidate for twin in self.twins if twin.possible_beside(size))
+
+    @property
+    def _place(self) -> int:
+        return [c.key for c in self.fit.structure.effects].index(self.candidate.key)
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
         """Value and standard deviation of every quantity."""
-        return quantities_of(self.fit, [c.key for c in self.fit.structure.effects].index(self.candidate.key))
+        return quantities_of(self.fit, self._place)
 
     @property
     def converged(self) -> bool:
@@ -150,10 +161,9 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
         best = max((entry.delta_bic for entry in entries), default=0.0)
         if fit.n_readings * math.log(fit.rss / promised(fit, scores, i)) < _PROMISED * best - BEHIND:
             continue
-        aliases = tuple(scores.candidates[j] for j in scores.possible_aliases(i))
         try:
             entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
-                                    aliases, best))
+                                    scores.twins(i), best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
     return ShortList(fit, tuple(_reconsidered(fit, map(finished, competitive(entries)), tried)), failed)
@@ -177,7 +187,7 @@ def beside(short: ShortList, found: Entry) -> ShortList:
         new = extended(short.before, structure, v, _LAST)
     except (Diverged, InputError):
         return short
-    own = Entry(found.candidate, new, delta_bic(short.before, new), found.p_value, found.aliases)
+    own = Entry(found.candidate, new, delta_bic(short.before, new), found.p_value, found.twins)
     others = [entry for entry in short.entries if entry.candidate.key != own.candidate.key
               or entry.delta_bic > own.delta_bic]
     if len(others) == len(short.entries) and any(entry.candidate.key == own.candidate.key for entry in others):
@@ -190,7 +200,7 @@ def _reconsidered(before: Refit, entries: Iterable[Entry], tried: Key | None) ->
     ordered = sorted(entries, key=lambda entry: -entry.delta_bic)
     if not ordered or leaves_large_misfit(before, ordered[0]):
         return ordered
-    ordered[0] = replaced(ordered[0], scanned(ordered[0].fit))
+    ordered[0] = replaced(ordered[0], as_ramp(scanned(ordered[0].fit)))
     if ordered[0].delta_bic < BIC_GAP:
         return ordered
     near = min(ordered[0].delta_bic - BEHIND, _NEAR * ordered[0].delta_bic)
@@ -226,12 +236,12 @@ def replaced(entry: Entry, fit: Refit) -> Entry:
 
 
 def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,
-             aliases: tuple[Candidate, ...] = (), best: float = 0.0) -> Entry:
+             twins: tuple[Twin, ...] = (), best: float = 0.0) -> Entry:
     """Refit one candidate from the better of its starts; not to the end yet. Another has reached the `best` ΔBIC."""
     new = started(origin, candidate, size, best)
     if in_reach(delta_bic(origin.fit, new), best):
         new = extended(new, new.structure, new.v, _FIRST)
-    return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, aliases)
+    return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, twins)
 
 
 def delta_bic(before: Refit, after: Refit) -> float:
@@ -258,4 +268,4 @@ def refiltered(before: Refit, after: Refit, entries: Sequence[Entry]) -> Iterabl
     """Entries refitted with the filters of `after`, warm."""
     for entry in entries:
         new = extended(after, entry.fit.structure, entry.fit.v)
-        yield Entry(entry.candidate, new, delta_bic(before, new), entry.p_value, entry.aliases)
+        yield Entry(entry.candidate, new, delta_bic(before, new), entry.p_value, entry.twins)

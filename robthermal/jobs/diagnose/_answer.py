@@ -25,7 +25,7 @@ def answer_sentence(found: Diagnosis) -> str:
         if found.reference:
             return nothing_changed(found)
         text = "The model explains the records: its error is no larger than the noise of the sensors allows."
-        return " ".join([text, *found.noise_floor.remarks[:1]])
+        return " ".join([text, *found.noise_floor.remarks[:1], *found.caveats])
     what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
             "Something is missing in the model that no effect of the catalog explains")
     return (f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "

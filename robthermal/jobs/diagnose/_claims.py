@@ -82,6 +82,7 @@ def diagnosis_assumptions(found: Diagnosis) -> Iterator[str]:
         yield (f"The {found.reference.records} reference records are of a healthy machine, and scatter as healthy days "
                "do; before any record is seen the scatter of a parameter is taken to be 3 %, which counts as much as "
                "four records.")
+    if found.reference is not None or found.ambients:
         yield "An ambient that a record does not hold, and initial temperatures, are unknowns of each record."
     yield "Nothing is proven: all numbers are estimates, and all answers are tests on these records."
     units = found.system.sensor_units

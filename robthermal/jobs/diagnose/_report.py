@@ -208,7 +208,7 @@ def _gap_section(result: Diagnosed) -> Section:
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
             "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
-            "records have gains of their own, those, from the whole record).")
+            "records have gains of their own or lack an ambient, those, from the whole record).")
     if not (found.effects or found.provisional):
         text = text.replace("After: with the effects. Both models run free",
                             "After: the same, for no effect was added. It runs free")

@@ -69,7 +69,7 @@ class DiagnosisFacts:
     verdict : str
         "named", "ambiguous", "consistent" or "unexplained".
     names : str
-        Effects with what could not be told from them, in words.
+        Effects with what could not be told from them, in words; what the readings say of an ambient that they lack.
     adopted : bool
         Whether the certified system has them.
     """
@@ -130,6 +130,8 @@ def diagnosis_facts(found: Diagnosis, adopted: bool = False) -> DiagnosisFacts:
     adopted : bool
         Whether the certified system has the effects.
     """
+    if found.verdict == "consistent" and found.caveats:  # an ambient far from what the system says, or something else
+        return DiagnosisFacts("ambiguous", " ".join(found.caveats).rstrip("."), adopted)
     names = ", ".join(" or ".join([effect.label, *(f"{name}({', '.join(where)})" for name, where in others
                                                    if (name, where) != (effect.effect, effect.where))])
                       for effect, others in zip(found.effects, found.alternatives, strict=True))
