@@ -14,7 +14,7 @@ class Twin:
     Parameters
     ----------
     candidate : Candidate
-        The alias.
+        Effect that is the alias, with its trial values.
     per : float
         Its size per size of the other one, with the sign.
     std : float
