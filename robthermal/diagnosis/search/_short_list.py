@@ -57,6 +57,8 @@ class Entry:
     @property
     def aliases(self) -> tuple[Candidate, ...]:
         """Exact aliases whose own size is possible, linearized or at the size found here: no conductance below zero."""
+        if not self.twins:
+            return ()
         size = self.fit.structure.quantities(self.fit.v)[self._place][self.candidate.effect.size.name]
         return tuple(twin.candidate for twin in self.twins if twin.possible_beside(size))
 
