@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -162,7 +163,7 @@ def diagnoses(written: Path) -> dict[str, list[object]]:
                 machine = rt.thermal.add_effect(machine, effect, where, values).system
             measured(machine, k, written / f"{name}_{k}.csv")
     bar = made(Case("bar", "hidden", "heater_power_slope", 0))  # 240 cells, against a file of six lumps
-    rt.thermal.write_system(bar.system, written / "bar.toml")
+    rt.thermal.write_system(replace(bar.system, name="bar of 240 cells (simulated)"), written / "bar.toml")
     bar.train.save(written / "bar_0.csv")
     bar.unseen.save(written / "bar_1.csv")
     changed = system.with_parameters({"links.plate-room.conductance": 0.4})
@@ -178,13 +179,14 @@ def measured(system: rt.System, seed: int, path: Path) -> None:
     """A simulated record of half an hour."""
     rng = np.random.default_rng(seed)
     heat = np.repeat(rng.choice([1.0, 3.0, 7.0, 11.0], 18), 20)
-    drive = rt.Record(sample_time=5.0, inputs=heat, outputs=np.zeros((heat.size, 0)), input_names=["heater"],
+    inputs = np.column_stack([heat, np.full(heat.size, 298.15)])
+    drive = rt.Record(sample_time=5.0, inputs=inputs, outputs=np.zeros((heat.size, 0)), input_names=["heater", "room"],
                       output_names=[])
     run = rt.thermal.simulate(system, drive)
     noisy = run.outputs + 0.01 * rng.standard_normal(run.outputs.shape)
-    record = rt.Record(sample_time=5.0, inputs=heat, outputs=noisy, input_names=["heater"],
+    record = rt.Record(sample_time=5.0, inputs=inputs, outputs=noisy, input_names=["heater", "room"],
                        output_names=run.output_names)
-    record.save(path, temperature_unit="degC", temperatures=list(run.output_names))
+    record.save(path, temperature_unit="degC", temperatures=["room", *run.output_names])
 
 
 def syntheses(written: Path) -> dict[str, list[object]]:
