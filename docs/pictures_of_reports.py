@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -163,7 +162,8 @@ def diagnoses(written: Path) -> dict[str, list[object]]:
                 machine = rt.thermal.add_effect(machine, effect, where, values).system
             measured(machine, k, written / f"{name}_{k}.csv")
     bar = made(Case("bar", "hidden", "heater_power_slope", 0))  # 240 cells, against a file of six lumps
-    rt.thermal.write_system(replace(bar.system, name="bar of 240 cells (simulated)"), written / "bar.toml")
+    named = bar.system.model_copy(update={"name": "bar of 240 cells (simulated)"})
+    rt.thermal.write_system(named, written / "bar.toml")
     bar.train.save(written / "bar_0.csv")
     bar.unseen.save(written / "bar_1.csv")
     changed = system.with_parameters({"links.plate-room.conductance": 0.4})

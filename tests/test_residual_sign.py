@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,14 @@ def diagnosed(train: list[rt.Record], validation: list[rt.Record], **options: An
     with pytest.MonkeyPatch.context() as patch:
         few = partial(rt.diagnose, effects=["sensor_lag", "heat_source"])
         patch.setattr("robthermal.jobs.diagnose._diagnose.diagnose", few)
-        return rt.jobs.diagnose_records(narrow(), (), train, validation, **options)
+        return rt.jobs.diagnose_records(narrow(), (), list(map(with_room, train)), list(map(with_room, validation)),
+                                        **options)
+
+
+def with_room(one: rt.Record) -> rt.Record:
+    """With the temperature of the room, which is an unknown of the record else, and explains what is warmer."""
+    inputs = np.column_stack([one.inputs, np.full(len(one), 293.15)])
+    return replace(one, inputs=inputs, input_names=[*one.input_names, "room"])
 
 
 def test_diagnosis_of_a_machine_that_is_warmer(warm: rt.jobs.diagnose.Diagnosed) -> None:

@@ -85,7 +85,8 @@ def record() -> rt.Record:
         end = 295.0 + (q - 1.0) / 0.5
         T[k + 1] = end + (T[k] - end) * decay
     noisy = T[:-1, None] + 0.02 * np.random.default_rng(1).standard_normal((heater.size, 1))
-    return rt.Record(sample_time=h, inputs=heater, outputs=noisy, input_names=["heater"], output_names=["T"])
+    return rt.Record(sample_time=h, inputs=np.column_stack([heater, np.full(heater.size, 295.0)]), outputs=noisy,
+                     input_names=["heater", "room"], output_names=["T"])
 
 
 def test_an_effect_of_a_user_is_added_without_knowing_its_numbers() -> None:
