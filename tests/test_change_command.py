@@ -27,6 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.exhaustive
 def test_a_fan_that_stands_still(run: Run, folder: Path) -> None:
     """As the manual writes it: all files after --reference are of the healthy machine."""
     out = folder / "changed"

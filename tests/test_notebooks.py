@@ -12,7 +12,7 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
-LONG = {"case_studies", "certify_in_ci", "convection", "missing_plate", "scanner", "scheduled_current",
+LONG = {"bar", "case_studies", "certify_in_ci", "convection", "missing_plate", "observer", "scanner", "scheduled_current",
         "thermomechanical", "two_hours"}  # tests do the same
 PATIENCE = 300  # a cell may take this long before it counts as hanging [s]
 

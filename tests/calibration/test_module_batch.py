@@ -148,6 +148,7 @@ def test_the_result_flows_into_the_two_module_setup(batch: rt.calibration.Module
     assert ranges["modules.m1.resistance.value"][0] < alone[0]  # ten at once are wider than five
 
 
+@pytest.mark.exhaustive
 def test_a_box_contracts_with_any_modules_of_the_type(batch: rt.calibration.ModuleBatch) -> None:
     """Ten uncertain parameters: the common bound of all vertices proves less than the vertices say, not nothing."""
     setup = batch.applied(rt.systems.two_module())

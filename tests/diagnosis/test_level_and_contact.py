@@ -132,6 +132,7 @@ def test_a_contact_that_follows_the_clock_does_not_follow_the_current() -> None:
     assert found.verdict == "unexplained" and not said(found)
 
 
+@pytest.mark.exhaustive
 def test_heat_stored_between_heater_and_body_is_a_lag_and_a_mass_with_one_time_constant() -> None:
     hidden = {"stored": 15.0}
     chosen = ["input_lag", "hidden_mass", "sensor_lag", "input_gain_slope", "driven_conductance"]

@@ -268,6 +268,7 @@ def test_response_of_a_delayed_held_input_is_not_taken_for_a_lag(bench: rt.Syste
     assert abs(value - 2.0) < 4.0 * std
 
 
+@pytest.mark.exhaustive
 def test_record_is_planned_after_a_response(bench: rt.System) -> None:
     run = truth(delay=0.5)
     found = rt.diagnose(bench, answered(run, 5), operating_point={"heater": 4.5}, effects=["input_delay", "input_lag"])

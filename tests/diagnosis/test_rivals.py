@@ -75,6 +75,7 @@ def names(round_: Accepted) -> set[frozenset[str]]:
     return {frozenset(entry.candidate.where) for entry in (round_.best, *round_.contenders)}
 
 
+@pytest.mark.exhaustive
 def test_a_path_from_between_two_lumps_has_two_names():
     """From cell 16, between the middles of the first lump (6) and of the second (18)."""
     one = found(16)
@@ -129,6 +130,7 @@ def test_a_path_from_the_middle_of_a_lump_is_among_its_names():
     assert all(gain < 0.5 * most for where, gain in removed.items() if where not in ({"x1", "x5"}, {"x2", "x5"}))
 
 
+@pytest.mark.exhaustive
 def test_what_is_left_after_a_drop_is_chosen_again():
     """A heat stayed named in a wrong lump when the link that made up for the place was dropped (plate, seed 7)."""
     before = finer(18)

@@ -96,6 +96,7 @@ def test_a_missing_value_of_deviation_is_refused(network) -> None:
             found.with_uncertain_poles(wrong)
 
 
+@pytest.mark.exhaustive
 def test_resonant_poles_are_found_and_thermal_ones_too(network, resonance) -> None:
     record, G0 = resonance
     by_pair = rt.identify.pole_sensitivity(record, "resonant")

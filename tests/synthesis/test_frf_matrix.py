@@ -93,6 +93,7 @@ def measured(noise, seed=0, dof=200):
         method="made for a test", notes=())
 
 
+@pytest.mark.exhaustive
 def test_plants_drawn_from_the_covariance_keep_the_margin(designs):
     d = rt.design.frf_pid(measured(0.004), modulus_margin=0.5, probability=0.95)
     assert d.holds and d.outcome.code == "at_the_bins" and d.robust_against.data["probability"] == 0.95

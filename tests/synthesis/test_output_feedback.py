@@ -42,6 +42,7 @@ def test_static_gain_of_two_states_against_brute_force():
     assert proven(d, P) and brute * 0.999 < d.value < 1.005 * brute
 
 
+@pytest.mark.exhaustive
 def test_a_state_stabilizes_what_no_gain_does():
     none = rt.design.output_feedback(DOUBLE, 1, 1)
     assert not none.holds and np.isinf(none.value) and not none.certificates and "does not say" in none.outcome.text
