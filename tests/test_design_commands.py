@@ -264,7 +264,8 @@ def closed_loop(numbers: dict[str, Any], system: rt.System, inputs: list[float],
     return np.array(rows)
 
 
-@pytest.mark.parametrize("which", [pytest.param("bench", marks=pytest.mark.exhaustive), "two"])
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("which", ["bench", "two"])
 def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
         which: str, bench: rt.System, two: rt.jobs.design.ControllerDesign, request: pytest.FixtureRequest) -> None:
     done = two if which == "two" else request.getfixturevalue("nonlinear")
@@ -279,6 +280,7 @@ def test_a_controller_programmed_from_the_file_is_the_one_that_was_simulated(
     assert np.abs(found).max() > 0.05
 
 
+@pytest.mark.exhaustive
 def test_limits_are_below_the_fold_and_the_box_is_never_left(two: rt.jobs.design.ControllerDesign) -> None:
     fold = two.certification.runaway
     assert two.holds and fold is not None
@@ -290,6 +292,7 @@ def test_limits_are_below_the_fold_and_the_box_is_never_left(two: rt.jobs.design
     assert two.collapse is not None and two.collapse.outcome and two.collapse.ratio > 20
 
 
+@pytest.mark.exhaustive
 def test_limits_beyond_the_certified_ones_are_refused_with_these(two: rt.jobs.design.ControllerDesign) -> None:
     asked = replace(two.request, current={"m1": (-3.3, 0.5)})
     done = two.certification

@@ -12,8 +12,8 @@ from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
-LONG = {"bar", "case_studies", "certify_in_ci", "convection", "missing_plate", "observer", "scanner",
-        "scheduled_current", "thermomechanical", "two_hours"}  # tests do the same
+LONG = {"bar", "case_studies", "certify_in_ci", "convection", "current_limit", "missing_plate", "observer",
+        "scanner", "scheduled_current", "thermomechanical", "two_hours"}  # tests do the same
 PATIENCE = 300  # a cell may take this long before it counts as hanging [s]
 
 LOOK = "__import__('figures').look_at_open_figures(described={!r})"  # leaves no name behind

@@ -30,7 +30,9 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
     q = np.arange(1.0, max(1, int(degrees_of_freedom.max())) + 1.0)
-    place = np.maximum(degrees_of_freedom, 1) - 1
+    place: Array | int = np.maximum(degrees_of_freedom, 1) - 1
+    if degrees_of_freedom.min() == degrees_of_freedom.max():
+        place = int(q.size) - 1  # one number for all bins, as without weak ones: nothing to look up
     limit = scipy.special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place]
     ratio = _median_ratio(q)[place]
     by_output = np.zeros((n_y, n_f), dtype=bool)
@@ -65,8 +67,9 @@ def _reference(row: Array, gap: int, reach: int) -> Array:
     # Window i begins at bin i stride: on the right of bin k the first with i stride >= k + gap, on the left the last
     # that ends at k - gap or before.
     on_right, on_left, start = np.full(n, np.inf), np.full(n, np.inf), gap + reach - 1
-    following = np.repeat(medians[1:], stride)[gap - 1 :][:n]
-    preceding = np.repeat(medians, stride)[: max(0, n - start)]
+    each = np.broadcast_to(medians[:, None], (medians.size, stride)).ravel()  # several times faster than np.repeat
+    following = each[stride + gap - 1 :][:n]
+    preceding = each[: max(0, n - start)]
     on_right[: following.size], on_left[start : start + preceding.size] = following, preceding
     lower = np.minimum(on_right, on_left)
     known = np.isfinite(lower)

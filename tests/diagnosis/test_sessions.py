@@ -120,6 +120,7 @@ def test_feedback_makes_no_names(shaken: rt.System, first: int) -> None:
         assert found.verdict == "consistent", seed
 
 
+@pytest.mark.exhaustive
 def test_scores_under_feedback_have_mean_zero_only_with_the_right_noise(plant: rt.System, shaken: rt.System) -> None:
     # Sensitivities depend on past noise, yet with the innovations of the right filter the score is a martingale. With
     # the random heat left out of the model it is not: the weights are no innovations, and the loop correlates the two.

@@ -132,6 +132,7 @@ def test_limit_map_continues(tmp_path):
         rt.certify.limit_map(other, store=store, **options)
 
 
+@pytest.mark.exhaustive
 def test_dask_cluster(tmp_path):
     """A scheduler and two worker processes: same numbers, live progress; a killed worker loses nothing; restart."""
     distributed = pytest.importorskip("distributed", reason="the package distributed (Dask) is not installed")

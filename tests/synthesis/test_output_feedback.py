@@ -63,6 +63,7 @@ def test_decentralized(order):
     assert at[0, 1] == at[1, 0] == 0 and at[0, 0] != 0
 
 
+@pytest.mark.exhaustive
 def test_sampled_plant():
     P = random_plant(3, 3, dt=0.5)
     d = rt.design.output_feedback(P, 2, 2, order=1)
