@@ -85,7 +85,7 @@ def lasting_beyond_steps(judged: Judged) -> Judged:
 def _stability(fit: Refit, place: int) -> Stability:
     """Of the size of an effect, relative to it."""
     structure = fit.structure
-    at = structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])
+    at = structure.column_of(place)
     found, size = stability(fit, at), structure.effects[place].effect.size
     scale = 1.0 if size.lower > 0 else abs(fit.v[at])  # a logarithm's spread is relative
     return Stability(found.segments, found.spread / scale if scale > 0 else float("inf"))

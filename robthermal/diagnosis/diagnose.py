@@ -229,7 +229,7 @@ def _with_remainder(fit: Refit, place: int, values: dict[str, tuple[float, float
     """Values with standard deviations that include the remainder."""
     structure = fit.structure
     free = structure.effects[place].effect.free
-    at = structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])
+    at = structure.column_of(place)
     out = dict(values)
     for quantity, std in zip(free, sandwich(fit, range(at, at + len(free))), strict=True):
         value = values[quantity.name][0]

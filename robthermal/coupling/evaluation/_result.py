@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ..problem import RunningLoops
 
 
-class CouplingResult:
+class CouplingResult(ABC):
     """Verdict, certificates and outcome of filters; base of `Filters` and `MatrixFilters`, which are dataclasses."""
 
     X_hat: control.StateSpace
@@ -61,6 +62,7 @@ class CouplingResult:
         """
         return replace(self, outcome=outcome, holds=outcome.ok)  # type: ignore[type-var]  # dataclasses only
 
+    @abstractmethod
     def running_loops(self) -> RunningLoops:
         """Plants, disturbances and controllers as state spaces, for a simulation of the model.
 
@@ -68,4 +70,3 @@ class CouplingResult:
         -------
         RunningLoops
         """
-        raise NotImplementedError

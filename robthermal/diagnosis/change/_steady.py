@@ -36,7 +36,7 @@ def unsteady(fit: Refit, rounds: Sequence[Accepted], reference: Reference) -> li
     more = louder(fit, reference.each)
     out = []
     for place, round_ in enumerate(rounds):
-        moves, segments = wandering(fit, _column(fit, place))
+        moves, segments = wandering(fit, fit.structure.column_of(place))
         healthy = _on_healthy(round_.best.candidate, reference)
         noise = 1.0 / reference.scatter.inflation
         usual = max(float(np.mean(healthy)), noise) if healthy else 1.0  # 1: the raised noise level
@@ -52,12 +52,6 @@ def _on_healthy(candidate: Candidate, reference: Reference) -> list[float]:
     for one in reference.each:
         scores = score_candidates(one, [with_held_shape(candidate)])
         entries = refit_short_list(one, scores).entries if scores.candidates else ()
-        found = [wandering(entry.fit, _column(entry.fit, 0)) for entry in entries[:1]]
+        found = [wandering(entry.fit, entry.fit.structure.column_of(0)) for entry in entries[:1]]
         out += [moves for moves, segments in found if segments > 1]
     return out
-
-
-def _column(fit: Refit, place: int) -> int:
-    """Place of the size of an effect among the unknowns."""
-    structure = fit.structure
-    return structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])

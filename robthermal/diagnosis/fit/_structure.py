@@ -82,6 +82,16 @@ class Structure:
         """Number of quantities of all effects."""
         return sum(len(c.effect.free) for c in self.effects)
 
+    def column_of(self, place: int) -> int:
+        """Place among the unknowns of the first quantity, its size, of an effect.
+
+        Parameters
+        ----------
+        place : int
+            Place of the effect in `effects`.
+        """
+        return self.n_parameters + sum(len(c.effect.free) for c in self.effects[:place])
+
     @property
     def n_coarse(self) -> int:
         """Number of ways in which a finer network may differ."""

@@ -257,7 +257,7 @@ def quantities_of(fit: Refit, place: int) -> dict[str, tuple[float, float]]:
     """Value and standard deviation of every quantity of one effect; what is known has no deviation."""
     structure = fit.structure
     values = structure.quantities(fit.v)[place]
-    at = structure.n_parameters + sum(len(c.effect.free) for c in structure.effects[:place])
+    at = structure.column_of(place)
     out = {name: (value, 0.0) for name, value in values.items()}
     for i, quantity in enumerate(structure.effects[place].effect.free):
         std = math.sqrt(float(fit.covariance[at + i, at + i]))
