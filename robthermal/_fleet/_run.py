@@ -9,9 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
+from joblib import Parallel, delayed, effective_n_jobs
 
 from ..errors import InputError, Outcome
+from ._batches import Batches, answer_batch
 from ._outcomes import FleetCode
 from ._store import Answer, Store, key_of
 
@@ -76,7 +77,7 @@ def fleet(function: Callable[[Any], Any], cases: Sequence[Any], *, store: str | 
     jobs : int, optional
         Processes; default what joblib's `parallel_config` says, else 1.
     progress : callable, optional
-        Called with the number of cases done and how many there are, whenever one is done.
+        Called with the number of cases done and how many there are, once for every case that is done.
 
     Returns
     -------
@@ -111,24 +112,18 @@ def fleet(function: Callable[[Any], Any], cases: Sequence[Any], *, store: str | 
     copies = Counter(keys)
     finished = sum(copies[key] for key in copies if key in answers)
     progress(finished, total)
-    work = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
-        delayed(_answer)(function, key, case) for key, case in todo.items())
-    for key, answer in work:
-        answers[key] = answer if book is None else book.add(key, answer)
-        finished += copies[key]
-        progress(finished, total)
-    return _run(tuple(cases), [answers[key] for key in keys], len(todo))
-
-
-def _answer(function: Callable[[Any], Any], key: Any, case: Any) -> tuple[Any, Answer]:
-    """Runs where the work is done; an exception travels home as text."""
-    try:
-        return key, Answer(function(case))
-    except InputError as error:
-        return key, Answer(None, {"what": error.what, "where": error.where, "expected": error.expected,
-                                  "remedy": error.remedy})
-    except Exception as error:  # of whatever kind: the other cases go on
-        return key, Answer(None, {"what": f"{type(error).__name__}: {error}"}, again=True)
+    computed = len(todo)
+    batches = Batches(todo, effective_n_jobs(jobs))
+    while batches:  # a second time only if a worker gave back cases after the last batch was handed out
+        work = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
+            delayed(answer_batch)(function, number, [todo[key] for key in batch]) for number, batch in batches)
+        for done in map(batches.back, work):
+            for key, answer in done if book is None else book.add(done):
+                answers[key] = answer
+                del todo[key]
+                finished += copies[key]
+                progress(finished, total)
+    return _run(tuple(cases), [answers[key] for key in keys], computed)
 
 
 def _run(cases: tuple[Any, ...], answers: list[Answer], computed: int) -> FleetRun:

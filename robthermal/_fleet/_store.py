@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 
 FORMAT = "robthermal-fleet/1"
+Key = int | str  # of a case: its number, or its hash where there is a store
+_START = json.dumps({"format": FORMAT})[:-1].encode()  # of the first line
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Answer:
     """What became of a case.
 
@@ -23,14 +25,14 @@ class Answer:
     ----------
     result : Any
         What the function returned.
-    error : mapping
-        Parts of the message, empty if there was none.
+    error : mapping, optional
+        Parts of the message, if there was one.
     again : bool
         Whether a restarted run tries again: the error may be the machine's.
     """
 
     result: Any
-    error: Mapping[str, str] = field(default_factory=dict)
+    error: Mapping[str, str] | None = None
     again: bool = False
 
 
@@ -61,45 +63,46 @@ class Store:
 
     def read(self) -> dict[Any, Answer]:
         """Answers so far. A last line that was cut short by a crash is dropped."""
+        answers: dict[Any, Answer] = {}
+        number, line = 0, b""
         try:
-            lines = self.path.read_bytes().split(b"\n")
+            with self.path.open("rb") as lines:
+                for number, line in enumerate(lines, start=1):
+                    entry = self._entry(line, number)
+                    if "key" in entry and not entry.get("again"):  # a later line wins: an error that was tried again
+                        answers[entry["key"]] = Answer(entry.get("result"), entry.get("error"))
         except FileNotFoundError:
             return {}
         except OSError as error:
             raise InputError(f"cannot be read ({error.strerror})", where=str(self.path)) from None
-        entries = [self._entry(line, number) for number, line in enumerate(lines[:-1], start=1) if line.strip()]
-        if lines[-1]:
-            self._end_torn_line(whole=len(lines) == 1)
-        if entries and entries[0].get("title") != self.title:
-            raise InputError("holds the results of another function or setting", where=str(self.path),
-                             expected=self.title, remedy="Choose another store.")
-        # a later line wins: an error that was tried again
-        return {entry["key"]: Answer(entry.get("result"), entry.get("error", {}))
-                for entry in entries[1:] if "key" in entry and not entry.get("again")}
+        if line and not line.endswith(b"\n"):
+            self._end_torn_line(whole=number == 1)
+        return answers
 
-    def add(self, key: str, answer: Answer) -> Answer:
-        """Append an answer; returns it as it will be read back.
+    def add(self, answers: Sequence[tuple[Key, Answer]]) -> list[tuple[Key, Answer]]:
+        """Append answers, a line each; returns them as they will be read back.
 
         Parameters
         ----------
-        key : str
-            Of the case.
-        answer : Answer
-            What became of it.
+        answers : sequence of tuple
+            Keys of cases, and what became of them.
         """
-        entry = {"key": key, "result": answer.result, **({"error": dict(answer.error)} if answer.error else {}),
-                 **({"again": True} if answer.again else {})}
-        line = _text(entry, "a result", "argument function")
-        self._append(line)
-        return Answer(json.loads(line)["result"], answer.error)
+        lines = [_text({"key": key, "result": answer.result, **({"error": dict(answer.error)} if answer.error else {}),
+                        **({"again": True} if answer.again else {})}, "a result", "argument function")
+                 for key, answer in answers]
+        self._append("".join(f"{line}\n" for line in lines))
+        return [(key, Answer(json.loads(line)["result"], answer.error))
+                for (key, answer), line in zip(answers, lines, strict=True)]
 
-    def _append(self, line: str) -> None:
-        """In one write: a line is there whole or not at all, also beside another run."""
+    def _append(self, lines: str) -> None:
+        """In one write, flushed to the disk: whole lines, also beside another run."""
         try:
             handle = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             try:
                 head = "" if os.fstat(handle).st_size else json.dumps({"format": FORMAT, "title": self.title}) + "\n"
-                os.write(handle, f"{head}{line}\n".encode())
+                content = f"{head}{lines}".encode()
+                while content:  # a disk that is nearly full takes a part, and says so when asked again
+                    content = content[os.write(handle, content):]
                 os.fsync(handle)
             finally:
                 os.close(handle)
@@ -115,14 +118,20 @@ class Store:
                 file.write(b"\n")
 
     def _entry(self, line: bytes, number: int) -> dict[str, Any]:
+        """What a line says; nothing of one that a crash cut short, whether or not the run after it ended it."""
+        if number == 1 and not line.endswith(b"\n") and (line.startswith(_START) or _START.startswith(line)):
+            return {}
         try:
-            entry = json.loads(line)
+            entry = json.loads(line) if line.endswith(b"\n") else {}
         except ValueError:
-            entry = None if number == 1 else {}  # cut short by a crash, and ended by the run after it
-        if not isinstance(entry, dict) or (number == 1 and entry.get("format") != FORMAT):
-            raise InputError(f"line {number} is not of a store", where=str(self.path), expected=f"a file of {FORMAT}",
+            entry = {}
+        if number == 1 and (not isinstance(entry, dict) or entry.get("format") != FORMAT):
+            raise InputError("line 1 is not of a store", where=str(self.path), expected=f"a file of {FORMAT}",
                              remedy="Choose another store.")
-        return entry
+        if number == 1 and entry.get("title") != self.title:
+            raise InputError("holds the results of another function or setting", where=str(self.path),
+                             expected=self.title, remedy="Choose another store.")
+        return entry if isinstance(entry, dict) else {}
 
 
 def _text(value: Any, what: str, where: str, sort_keys: bool = False) -> str:
