@@ -69,8 +69,9 @@ def fleet(function: Callable[[Any], Any], cases: Sequence[Any], *, store: str | 
         With a store: of plain values (numbers, texts, lists, dictionaries with text keys), for example seeds,
         operating conditions or paths of records; the results too. A case that stands twice is computed once.
     store : str or path, optional
-        File that gets one line of JSON per finished case, at once. A run that was stopped continues where it was:
-        what has a result or an `InputError` in the file is not computed again, any other exception is tried again.
+        File that gets one line of JSON per finished case. A run that was stopped continues where it was: what has a
+        result or an `InputError` in the file is not computed again, any other exception is tried again. Short cases
+        travel in batches of about half a second; what is stopped loses the batch that each process has in hand.
     setting : str
         What else the results depend on, for example ``rt.thermal.format_system(system)``. A store that was made with
         another function name or setting is refused.

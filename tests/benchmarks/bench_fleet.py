@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -25,11 +26,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402  (after the thread count is set)
 from _timing import header  # noqa: E402
-from joblib import parallel_config  # noqa: E402
+from joblib import Parallel, delayed, parallel_config  # noqa: E402
 
 import robthermal as rt  # noqa: E402
 
 CASES, WORKERS = 40, 2
+PEER = 2000  # small tasks of joblib alone
 ROWS = 10_000  # results in a row group of the Parquet file
 
 
@@ -162,6 +164,13 @@ def small_tasks(folder: Path, count: int) -> None:
         spent = processor_time(processes) - before
         print(f"{time.perf_counter() - start:.0f} s wall, {spent:.0f} s of processor time of all processes: "
               f"{1e3 * spent / count:.2f} ms per task")
+        for batch_size in (1, "auto"):
+            before, start = processor_time(processes), time.perf_counter()
+            deque(Parallel(return_as="generator_unordered", batch_size=batch_size)(
+                delayed(small)(case) for case in range(PEER)), maxlen=0)
+            spent = processor_time(processes) - before
+            print(f"peer, joblib alone with batch_size={batch_size!r}, {PEER} tasks: {time.perf_counter() - start:.1f} "
+                  f"s wall, {1e3 * spent / PEER:.2f} ms of processor time per task", flush=True)
     before = memory(os.getpid())
     rows = to_parquet(store, folder / "small.parquet")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10

@@ -29,6 +29,11 @@ def fragile(x):
     return x * x / (x - 2) * (x - 2) if x == 2 else x * x
 
 
+def gap(x):
+    """Says whose result it is; breaks at 0."""
+    return {"path": str(x), "gap": 1 / x}
+
+
 def recorded(trace, x):
     """Leaves a line for every call."""
     with Path(trace).open("a") as file:

@@ -6,9 +6,10 @@ import json
 import os
 import signal
 from functools import partial
+from pathlib import Path
 
 import pytest
-from fleet_work import coldest, fragile, recorded, slow_square
+from fleet_work import coldest, fragile, gap, recorded, slow_square
 from joblib import parallel_config
 
 import robthermal as rt
@@ -131,6 +132,21 @@ def test_limit_map_continues(tmp_path):
     other = system.with_parameters({"lumps.cold.capacity": 5.0})
     with pytest.raises(rt.InputError, match="another function or setting"):
         rt.certify.limit_map(other, store=store, **options)
+
+
+def test_documented_lines_write_parquet(tmp_path, monkeypatch):
+    """What failed, what was cut short by a crash, and the title are no rows."""
+    parquet = pytest.importorskip("pyarrow.parquet", reason="the package pyarrow is not installed")
+    page = (Path(__file__).parents[2] / "docs" / "more_machines.md").read_text(encoding="utf-8")
+    lines = next(block.partition("```")[0] for block in page.split("```python\n") if "ParquetWriter" in block)
+    monkeypatch.chdir(tmp_path)
+    assert rt.fleet(gap, [4.0, 0.0, 2.0], store="gaps.jsonl").computed == 3  # the second fails
+    with Path("gaps.jsonl").open("a") as file:
+        file.write('{"key": "0123", "resu\n')
+    rt.fleet(gap, [8.0], store="gaps.jsonl")
+    exec(lines, {})
+    assert parquet.read_table("gaps.parquet").to_pylist() == [
+        {"path": "4.0", "gap": 0.25}, {"path": "2.0", "gap": 0.5}, {"path": "8.0", "gap": 0.125}]
 
 
 @pytest.mark.exhaustive
