@@ -14,17 +14,22 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 SOURCE = Path("robthermal", "identify", "_moments.c")
-# Not -march=native: what is built on one computer runs on another; the library says whether the processor has AVX2.
-# Neither -ffast-math: numbers that are not numbers must stay so.
-FLAGS = ("-std=c11", "-O3", "-mavx2", "-mfma", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math",
-         "-Wno-psabi", "-shared", "-fPIC")
-LONGEST = 120  # seconds that the compiler may take
+HEADER = SOURCE.with_name("_vectors.h")
+# Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor
+# has instructions for. Neither -ffast-math: numbers that are not numbers must stay so.
+FLAGS = ("-std=c11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-fPIC")
+PARTS = {  # by the width of a vector; the first has to succeed
+    4: ("-mavx2", "-mfma"),
+    8: ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mfma", "-mprefer-vector-width=512"),
+}
+LONGEST = 300  # seconds that the compiler may take: 20 where nothing else runs
 
 
 class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -35,7 +40,8 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
         if self.target_name != "wheel":
             return
         source = Path(self.root, SOURCE)
-        name = f"_moments_{hashlib.sha256(source.read_bytes()).hexdigest()[:16]}.so"  # as _compiled.py looks for it
+        text = source.read_bytes() + source.with_name(HEADER.name).read_bytes()
+        name = f"_moments_{hashlib.sha256(text).hexdigest()[:16]}.so"  # as _compiled.py looks for it
         editable = version == "editable"
         self._folder = source.parent if editable else Path(tempfile.mkdtemp())
         try:
@@ -67,11 +73,24 @@ def build(source: Path, library: Path) -> None:
     if not compiler or not shutil.which(compiler[0]):
         compiler = ["cc"]
     unfinished = library.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        run = subprocess.run([*compiler, *FLAGS, "-o", str(unfinished), str(source), "-lm"], capture_output=True,
-                             text=True, timeout=LONGEST, check=False)
-        if run.returncode:
-            raise RuntimeError(f"{compiler[0]}: {(run.stderr.strip().splitlines() or ['failed'])[0][:200]}")
-        unfinished.replace(library)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        objects = [Path(folder, f"{lanes}.o") for lanes in PARTS]
+        with ThreadPoolExecutor() as pool:
+            failed = [*pool.map(lambda lanes, target: _run([*compiler, *FLAGS, *PARTS[lanes], f"-DLANES={lanes}", "-c",
+                                                            "-o", str(target), str(source)]), PARTS, objects)]
+        if failed[0]:
+            raise RuntimeError(failed[0])
+        whole = [str(target) for target, message in zip(objects, failed, strict=True) if not message]
+        try:
+            if message := _run([*compiler, "-shared", "-o", str(unfinished), *whole]):
+                raise RuntimeError(message)
+            unfinished.replace(library)
+        finally:
+            unfinished.unlink(missing_ok=True)
+
+
+def _run(command: list[str]) -> str:
+    """What a command of the compiler complains about; empty where it succeeded."""
+    run = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, check=False)
+    first = (run.stderr.strip().splitlines() or ["failed"])[0][:200]
+    return f"{command[0]}: {first}" if run.returncode else ""

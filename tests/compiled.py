@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+import atexit
 import runpy
 import shutil
 import sys
@@ -29,17 +29,23 @@ def hook() -> dict[str, Any]:
 
 
 @cache
-def built() -> ctypes.CDLL:
-    """The library beside its source, or one that is compiled now."""
-    found = _compiled.library()
-    if found is not None:
-        return found
+def built(lanes: int | None = None) -> _compiled.Solver:
+    """What the library beside its source solves with, or one that is compiled now; so many windows at a time."""
+    found = _compiled.library(folder(), lanes)
+    if found is None:
+        pytest.skip("this processor or this compiler has no AVX2" if lanes != 8 else "no AVX-512 here")
+    return found
+
+
+@cache
+def folder() -> Path:
+    """Where the library is."""
+    name = _compiled.library_name(_compiled.source_text())
+    if _compiled.SOURCE.with_name(name).exists():
+        return _compiled.SOURCE.parent
     if shutil.which("cc") is None:
         pytest.skip("no C compiler, and the package was installed without its compiled kernel")
-    folder = Path(mkdtemp())
-    hook()["build"](_compiled.SOURCE, folder / _compiled.library_name(_compiled.SOURCE.read_bytes()))
-    found = _compiled.library(folder)
-    shutil.rmtree(folder)  # it stays loaded
-    if found is None:
-        pytest.skip("this processor has no AVX2")
-    return found
+    made = Path(mkdtemp())
+    atexit.register(shutil.rmtree, made)
+    hook()["build"](_compiled.SOURCE, made / name)
+    return made

@@ -8,6 +8,8 @@ import numpy as np
 
 from .._arrays import Array
 
+_TURNS = 64  # neighboring bins whose angles are sums of one common angle and one of as many
+
 
 @dataclass(frozen=True)
 class LocalBasis:
@@ -90,9 +92,20 @@ class LocalBasis:
         no cancellation for slow poles at low bins."""
         D, half = np.ones(np.shape(bins), dtype=complex), 0.5 * self.step * bins
         cosine, sine = np.cos(half), np.sin(half)
-        for pole in self.poles:
-            D *= -np.expm1(pole) * cosine + 1j * (1.0 + np.exp(pole)) * sine
+        for alpha, beta in self.factors_of_denominator():
+            D *= alpha * cosine + 1j * beta * sine
         return D
+
+    def factors_of_denominator(self) -> Array:
+        """alpha and beta (n_poles, 2) whose products of alpha cos(theta/2) + j beta sin(theta/2) are D/z^(n/2)."""
+        return np.stack([-np.expm1(self.poles), 1.0 + np.exp(self.poles)], axis=-1)
+
+    def half_turns(self, start: int, stop: int) -> Array:
+        """exp(j theta/2) of bins start ... stop-1, to rounding in both parts: products of two angles from 0 to pi/2."""
+        first, length = start // _TURNS, -(-stop // _TURNS)
+        coarse = np.exp(0.5j * self.step * _TURNS * np.arange(first, length))
+        fine = np.exp(0.5j * self.step * np.arange(_TURNS))
+        return np.outer(coarse, fine).ravel()[start - first * _TURNS : stop - first * _TURNS]
 
     def weights(self, bins: Array, offsets: Array) -> Array:
         """D(k)/D(k+r), with `bins` (B,) counted from 1 and `offsets` (B, m)."""

@@ -9,9 +9,11 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,37 +25,52 @@ from ._records import Spectrum
 
 SOURCE = Path(__file__).with_name("_moments.c")
 _MOST_SIZE, _MOST_COLUMNS = 5, 24  # as in the source
+LANES = (8, 4)  # windows at a time: with AVX-512, with AVX2
 _BINS = 8192  # of a chunk: long enough for other threads, and for what a call costs
+
+
+Solver = Callable[[Any], int]  # of a pointer to a problem; 0 where it is solved
 
 
 class _Problem(ctypes.Structure):
     """`problem` of the source."""
 
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("n_records", "n_u", "n_y", "size", "half", "width")),
-        *((name, ctypes.c_void_p) for name in ("U", "Y", "strides", "w", "products", "functions", "ones")),
+        *((name, ctypes.c_int64) for name in ("n_records", "n_u", "n_y", "size", "half", "n_poles", "count", "stride")),
+        *((name, ctypes.c_void_p)
+          for name in ("U", "Y", "strides", "turn", "poles", "products", "functions", "ones")),
         *((name, ctypes.c_double) for name in ("weak_pivot", "weak_residual", "weak_both", "degrees_of_freedom")),
         *((name, ctypes.c_void_p) for name in ("response", "gram", "noise", "variance", "doubtful")),
     )
 
 
-def library_name(source: bytes) -> str:
-    """Name of the library that belongs to a source."""
-    return f"_moments_{hashlib.sha256(source).hexdigest()[:16]}.so"
+def library_name(text: bytes) -> str:
+    """Name of the library that belongs to the text of a source and its header."""
+    return f"_moments_{hashlib.sha256(text).hexdigest()[:16]}.so"
+
+
+def source_text() -> bytes:
+    """The text that the library has to be compiled from."""
+    return SOURCE.read_bytes() + SOURCE.with_name("_vectors.h").read_bytes()
 
 
 @cache
-def library(folder: Path = SOURCE.parent) -> ctypes.CDLL | None:
-    """The library in `folder`, or None: not built, built from another source or for another machine."""
+def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Solver | None:
+    """What solves chunks by the library in `folder`, as many windows at a time as this processor can, or `lanes`.
+
+    None where it was not built, or from another source, or for other processors.
+    """
     try:
-        found = ctypes.CDLL(os.fspath(folder / library_name(SOURCE.read_bytes())))
-        fits = found.robthermal_problem_size() == ctypes.sizeof(_Problem) and found.robthermal_runs_here()
-    except (OSError, AttributeError):
+        found = ctypes.CDLL(os.fspath(folder / library_name(source_text())))
+    except OSError:
         return None
-    if not fits:
-        return None
-    found.robthermal_solve.argtypes, found.robthermal_solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int
-    return found
+    for wide in LANES if lanes is None else (lanes,):
+        with suppress(AttributeError):  # the compiler had no such instructions
+            size, runs, solve = (found[f"robthermal_{name}_{wide}"] for name in ("problem_size", "runs_here", "solve"))
+            if size() == ctypes.sizeof(_Problem) and runs():
+                solve.argtypes, solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int
+                return solve
+    return None
 
 
 def interior_kernel(spectra: Sequence[Spectrum], basis: LocalBasis) -> NormalKernel | CompiledKernel:
@@ -74,13 +91,13 @@ class CompiledKernel:
         Records of equal length.
     basis : LocalBasis
         Functions of plant and transient.
-    built : ctypes.CDLL
+    built : callable
         What `library` found.
     """
 
     chunk = _BINS
 
-    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis, built: ctypes.CDLL):
+    def __init__(self, spectra: Sequence[Spectrum], basis: LocalBasis, built: Solver):
         self._basis, self._built = basis, built
         self._n_u, self._n_y = spectra[0].U.shape[0], spectra[0].Y.shape[0]
         if basis.size > _MOST_SIZE or self._n_u * basis.size + self._n_y > _MOST_COLUMNS:
@@ -89,9 +106,10 @@ class CompiledKernel:
         self._U = [_checked(s.U, (self._n_u, self._n_bins)) for s in spectra]
         self._Y = [_checked(s.Y, (self._n_y, self._n_bins)) for s in spectra]
         half, size, points = basis.half_width, basis.size, basis.n_points  # functions are even or odd: r >= 0 is enough
-        self._products = _checked(basis.real_products()[:, half:], (2 * size - 1, half + 1), float)
-        self._functions = _checked(basis.real_functions()[:, half:], (size, half + 1), float)
-        self._ones = np.ones((1, half + 1))
+        self._products = _checked(basis.real_products()[:, half:].T, (half + 1, 2 * size - 1), float)
+        self._functions = _checked(basis.real_functions()[:, half:].T, (half + 1, size), float)
+        self._ones = np.ones((half + 1, 1))
+        self._poles = _checked(basis.factors_of_denominator(), (basis.poles.size, 2))
         self._strides = np.full(len(spectra), self._n_bins, dtype=np.int64)
         self.degrees_of_freedom = len(spectra) * (points - size) - self._n_u * size
 
@@ -101,10 +119,7 @@ class CompiledKernel:
         first = start - 1 - half
         if count < 1 or first < 0 or stop - 1 + half > self._n_bins:
             raise ValueError("windows reach beyond the spectra")
-        w = None
-        if self._basis.poles.size:
-            bins = np.arange(start - half, stop + half, dtype=float)
-            w = _checked(1.0 / self._basis.rotated_denominator(bins), (count + 2 * half,))
+        turn = self._basis.half_turns(start - half, stop + half) if len(self._poles) else np.empty(0, dtype=complex)
         fit = BlockFit(
             response=np.empty((n_y, n_u, count), dtype=complex),
             gram=np.empty((n_u, n_u, count), dtype=complex),
@@ -115,15 +130,15 @@ class CompiledKernel:
         pointers = [(ctypes.c_void_p * len(channels))(*(one[:, first:].ctypes.data for one in channels))
                     for channels in (self._U, self._Y)]
         problem = _Problem(
-            len(self._U), n_u, n_y, self._basis.size, half, count + 2 * half,
+            len(self._U), n_u, n_y, self._basis.size, half, len(self._poles), count, count,
             *(ctypes.addressof(one) for one in pointers), self._strides.ctypes.data,
-            None if w is None else w.ctypes.data,
+            turn.ctypes.data, self._poles.ctypes.data,
             self._products.ctypes.data, self._functions.ctypes.data, self._ones.ctypes.data,
             WEAK_PIVOT, WEAK_RESIDUAL, WEAK_BOTH, self.degrees_of_freedom,
             fit.response.ctypes.data, fit.gram.ctypes.data, fit.noise.ctypes.data if full_noise else None,
             variance.ctypes.data, fit.doubtful.ctypes.data,
         )
-        if self._built.robthermal_solve(ctypes.byref(problem)) != 0:
+        if self._built(ctypes.byref(problem)) != 0:
             raise MemoryError("no memory for the windows of a chunk")
         return fit
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 from pathlib import Path
 from typing import Any
@@ -37,13 +38,20 @@ def basis_of(half_width: int, degree: int, poles: tuple[complex, ...], n_bins: i
     return LocalBasis(half_width, degree, 2 * n_bins + 1, poles=np.array(poles, dtype=complex))
 
 
+@pytest.fixture(params=_compiled.LANES)
+def built(request: pytest.FixtureRequest) -> _compiled.Solver:
+    """Every part of the library that this processor can run."""
+    return compiled.built(request.param)
+
+
 @pytest.mark.parametrize(("n_u", "n_y", "n_r", "half_width", "degree", "poles", "full"), CASES)
-def test_the_same_as_numpy(n_u: int, n_y: int, n_r: int, half_width: int, degree: int, poles: Any, full: bool) -> None:
+def test_the_same_as_numpy(n_u: int, n_y: int, n_r: int, half_width: int, degree: int, poles: Any, full: bool,
+                           built: _compiled.Solver) -> None:
     """All windows between the edges, and parts of them that are no multiple of anything."""
     spectra, basis = spectra_of(n_u, n_y, n_r), basis_of(half_width, degree, poles)
-    here, numpy = CompiledKernel(spectra, basis, compiled.built()), NormalKernel(spectra, basis)
+    here, numpy = CompiledKernel(spectra, basis, built), NormalKernel(spectra, basis)
     assert here.degrees_of_freedom == numpy.degrees_of_freedom
-    for start, stop in ((half_width + 1, 1501 - half_width), (700, 701), (41, 41 + 257)):
+    for start, stop in ((half_width + 1, 1501 - half_width), (700, 701), (90, 95), (41, 41 + 257)):
         mine, theirs = (kernel.solve(start, stop, full_noise=full) for kernel in (here, numpy))
         np.testing.assert_array_equal(mine.doubtful, theirs.doubtful)
         assert not mine.doubtful.all()
@@ -53,35 +61,35 @@ def test_the_same_as_numpy(n_u: int, n_y: int, n_r: int, half_width: int, degree
             np.testing.assert_allclose(a, b, rtol=1e-7, atol=1e-7 * np.abs(b).max(), err_msg=name)
 
 
-def test_a_bin_has_the_same_digits_wherever_its_part_begins() -> None:
+def test_a_bin_has_the_same_digits_wherever_its_part_begins(built: _compiled.Solver) -> None:
     spectra, basis = spectra_of(2, 2, 1), basis_of(8, 2, ())
-    kernel = CompiledKernel(spectra, basis, compiled.built())
+    kernel = CompiledKernel(spectra, basis, built)
     whole, part = kernel.solve(9, 1493, full_noise=True), kernel.solve(400, 777, full_noise=True)
     for name in ("response", "gram", "noise", "doubtful"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[..., 391:768])
 
 
 @pytest.mark.parametrize("channel", ["U", "Y"])
-def test_silence_is_as_doubtful_as_in_numpy(channel: str) -> None:
+def test_silence_is_as_doubtful_as_in_numpy(channel: str, built: _compiled.Solver) -> None:
     spectra, basis = spectra_of(1, 1, 1), basis_of(8, 2, ())
     getattr(spectra[0], channel)[:, 300:340] = 0.0
     mine, theirs = (kernel.solve(9, 1493, full_noise=True).doubtful
-                    for kernel in (CompiledKernel(spectra, basis, compiled.built()), NormalKernel(spectra, basis)))
+                    for kernel in (CompiledKernel(spectra, basis, built), NormalKernel(spectra, basis)))
     np.testing.assert_array_equal(mine, theirs)
     assert mine[300:324].all() and not mine[:280].any() and not mine[345:].any()
 
 
 @pytest.mark.parametrize(("value", "channel"), [(np.nan, "U"), (np.nan, "Y"), (np.inf, "Y"), (np.inf, "U")])
-def test_windows_that_reach_what_is_no_number_are_doubtful(value: float, channel: str) -> None:
+def test_windows_that_reach_what_is_no_number_are_doubtful(value: float, channel: str, built: _compiled.Solver) -> None:
     """Window i is centered at place i + 8 and reaches eight places to either side."""
     spectra, basis = spectra_of(1, 1, 1), basis_of(8, 2, ())
     getattr(spectra[0], channel)[:, 300:340] = value
-    fit = CompiledKernel(spectra, basis, compiled.built()).solve(9, 1493, full_noise=True)
+    fit = CompiledKernel(spectra, basis, built).solve(9, 1493, full_noise=True)
     np.testing.assert_array_equal(np.flatnonzero(fit.doubtful), np.arange(284, 340))
 
 
-def test_wrong_sizes_are_exceptions() -> None:
-    spectra, basis, built = spectra_of(1, 1, 1), basis_of(8, 2, ()), compiled.built()
+def test_wrong_sizes_are_exceptions(built: _compiled.Solver) -> None:
+    spectra, basis = spectra_of(1, 1, 1), basis_of(8, 2, ())
     kernel = CompiledKernel(spectra, basis, built)
     for start, stop in ((8, 100), (9, 1494), (100, 100), (200, 100), (-5, 3)):
         with pytest.raises(ValueError, match="reach beyond"):
@@ -95,10 +103,10 @@ def test_wrong_sizes_are_exceptions() -> None:
         CompiledKernel(spectra, basis_of(14, 5, ()), built)
 
 
-def test_arrays_that_do_not_lie_in_a_row_are_copied() -> None:
+def test_arrays_that_do_not_lie_in_a_row_are_copied(built: _compiled.Solver) -> None:
     (one,), basis = spectra_of(2, 1, 1), basis_of(8, 2, ())
     other = Spectrum(U=np.asfortranarray(one.U), Y=np.repeat(one.Y, 2, axis=1)[:, ::2], n_samples=one.n_samples)
-    a, b = (CompiledKernel([s], basis, compiled.built()).solve(9, 1493, full_noise=True) for s in (one, other))
+    a, b = (CompiledKernel([s], basis, built).solve(9, 1493, full_noise=True) for s in (one, other))
     np.testing.assert_array_equal(a.response, b.response)
 
 
@@ -113,13 +121,21 @@ def test_numpy_takes_what_the_library_does_not_hold(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
-    source = _compiled.SOURCE.read_bytes()
+    source = _compiled.source_text()
     assert library_name(source) != library_name(source + b" ")
     (tmp_path / library_name(source + b" ")).write_bytes(b"")
     assert library(tmp_path) is None
     (tmp_path / "damaged").mkdir()
     (tmp_path / "damaged" / library_name(source)).write_bytes(b"no library")
     assert library(tmp_path / "damaged") is None
+
+
+def test_the_widest_part_that_runs_is_taken(built: _compiled.Solver) -> None:
+    """By name, for a pointer to a function does not say whose it is; None for a width that was not compiled."""
+    folder = compiled.folder()
+    widest = next(lanes for lanes in _compiled.LANES if library(folder, lanes) is not None)
+    assert library(folder).__name__ == f"robthermal_solve_{widest}"
+    assert library(folder, 3) is None and built.__name__ in ("robthermal_solve_4", "robthermal_solve_8")
 
 
 def built_by_hook(root: Path, version: str, target: str = "wheel") -> dict[str, Any]:
@@ -138,6 +154,7 @@ def tree(tmp_path: Path) -> Path:
     folder = tmp_path / "robthermal" / "identify"
     folder.mkdir(parents=True)
     shutil.copy(_compiled.SOURCE, folder)
+    shutil.copy(_compiled.SOURCE.with_name("_vectors.h"), folder)
     (folder / "_moments_0123456789abcdef.so").write_bytes(b"old")
     return tmp_path
 
@@ -164,13 +181,31 @@ def test_the_source_distribution_has_no_library(tree: Path) -> None:
     assert built_by_hook(tree, "standard", "sdist") == {"force_include": {}}
 
 
+PARTS = "#define JOINED(lanes) robthermal_runs_here_##lanes\n#define NAMED(lanes) JOINED(lanes)\n"
+PARTS += "int NAMED(LANES)(void) { return LANES; }\n"
+
+
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_an_editable_install_replaces_the_old_library(tree: Path) -> None:
     source = tree / "robthermal" / "identify" / "_moments.c"
-    source.write_text("int robthermal_runs_here(void) { return 0; }\n")
+    source.write_text(PARTS)
+    name = library_name(source.read_bytes() + source.with_name("_vectors.h").read_bytes())
     assert built_by_hook(tree, "editable") == {"force_include": {}}
-    assert [path.name for path in source.parent.glob("*.so")] == [library_name(source.read_bytes())]
+    assert [path.name for path in source.parent.glob("*.so")] == [name]
     wheel = built_by_hook(tree, "standard")
     (there,) = wheel["force_include"].values()
-    assert there == f"robthermal/identify/{library_name(source.read_bytes())}" and wheel["pure_python"] is False
+    assert there == f"robthermal/identify/{name}" and wheel["pure_python"] is False
     assert wheel["tag"].startswith("py3-none-")
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize(("missing", "parts"), [(8, {4}), (4, set()), (0, {4, 8})])
+def test_a_compiler_without_avx512_builds_the_other_part(tree: Path, missing: int, parts: set[int]) -> None:
+    source = tree / "robthermal" / "identify" / "_moments.c"
+    source.write_text(f"#if LANES == {missing}\n#error no such instructions\n#endif\n{PARTS}")
+    built_by_hook(tree, "editable")
+    (path,) = source.parent.glob("*.so")
+    assert (path.read_bytes() == b"old") == (not parts)
+    if parts:
+        found = ctypes.CDLL(str(path))
+        assert {lanes for lanes in (4, 8) if hasattr(found, f"robthermal_runs_here_{lanes}")} == parts

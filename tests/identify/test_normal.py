@@ -12,10 +12,10 @@ from robthermal.identify import _compiled
 from robthermal.identify._basis import LocalBasis
 
 
-@pytest.fixture(params=["numpy", "compiled"], autouse=True)
+@pytest.fixture(params=["numpy", "AVX2", "AVX-512"], autouse=True)
 def kernel(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every test on both kernels."""
-    found = compiled.built() if request.param == "compiled" else None
+    """Every test on numpy and on both parts of the library."""
+    found = None if request.param == "numpy" else compiled.built(4 if request.param == "AVX2" else 8)
     monkeypatch.setattr(_compiled, "library", lambda: found)
 
 
