@@ -29,7 +29,7 @@ help:
 	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
 	@echo "make docs    the documentation site in build/docs"
-	@echo "make bench   the timings quoted in the documentation, kept in docs/benchmarks.json"
+	@echo "make bench   the timings quoted in the documentation, kept in docs/benchmarks.json; hours"
 	@echo "make clean   remove everything the targets above made"
 
 demo: $(VENV)/.installed
@@ -57,7 +57,7 @@ docs: $(VENV)/.test
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs build/docs
 	@echo "build/docs/index.html"
 
-bench: $(VENV)/.installed
+bench: $(VENV)/.test
 	$(ONE_THREAD) $(BIN)/python tests/benchmarks/run_benchmarks.py
 
 clean:
