@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs, ztbtrs
 
 
 def all_pole(a: NDArray[Any], signal: NDArray[Any]) -> NDArray[Any]:
@@ -33,6 +33,7 @@ def all_pole(a: NDArray[Any], signal: NDArray[Any]) -> NDArray[Any]:
     if not len(signal):
         return signal.astype(np.result_type(a, signal, float))
     band = np.repeat(np.asarray(a)[: len(signal), None], len(signal), axis=1)
-    solve = ztbtrs if np.iscomplexobj(band) or np.iscomplexobj(signal) else dtbtrs
+    lapack = scipy.linalg.lapack
+    solve = lapack.ztbtrs if np.iscomplexobj(band) or np.iscomplexobj(signal) else lapack.dtbtrs
     found = solve(band, signal.reshape(len(signal), -1), uplo="L", diag="U")[0]
     return np.asarray(found.reshape(signal.shape))

@@ -124,14 +124,17 @@ def test_imports_stand_at_the_top(path: Path) -> None:
 
 
 _ON_FIRST_USE = ("control", "pandas", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "scipy.optimize",
-                 "scipy.interpolate", "scipy.ndimage", "scipy.io", "scipy.fft")
+                 "scipy.interpolate", "scipy.ndimage", "scipy.io", "scipy.fft", "joblib")
+_BEFORE_THE_FILES = ("signals", "thermal", "identify", "fitting", "calibration", "systems")  # loaded by every command
+_EARLY = ("scipy.linalg", "scipy.sparse", "scipy.special")
 
 
 def test_slow_libraries_are_imported_on_first_use() -> None:
     """`import scipy`, then `scipy.signal.lfilter(...)`, loaded when asked; `from .._control import control`, `pd`."""
     found = [f"{relative(path)}:{node.lineno} {name}" for path in FILES if path.name != "conftest.py"
              for node in ast.parse(path.read_text(encoding="utf-8")).body for name in _imported(node)
-             if any(f"{name}.".startswith(f"{slow}.") for slow in _ON_FIRST_USE)]
+             for slow in (*_ON_FIRST_USE, *_EARLY * (relative(path).split("/")[1] in _BEFORE_THE_FILES))
+             if f"{name}.".startswith(f"{slow}.")]
     assert not found
 
 

@@ -193,20 +193,6 @@ def test_packages_load_no_more_than_they_need(package: str, unused: tuple[str, .
     assert not loaded & set(unused)
 
 
-@pytest.mark.parametrize(("command", "unused"), [
-    (["--help"], ("numpy", "scipy", "pandas", "pydantic", "robthermal.thermal")),
-    (["verify", str(MACHINE.parent / "nowhere")], ("scipy", "pandas", "matplotlib", "robthermal.thermal",
-                                                   "robthermal.signals", "robthermal.identify")),
-    (["check", str(MACHINE)], (*_ON_FIRST_USE, "cvxpy", "matplotlib", "robthermal.design", "robthermal.certify"))])
-def test_commands_load_no_more_than_they_need(command: list[str], unused: tuple[str, ...]) -> None:
-    run = subprocess.run([sys.executable, "-X", "importtime", "-m", "robthermal", *command], capture_output=True,
-                         text=True, check=False)
-    assert run.returncode == 2 * (command[0] == "verify")  # where there is nothing: the files are looked for last
-    loaded = {line.rpartition("|")[2].strip() for line in run.stderr.splitlines() if line.startswith("import time:")}
-    assert "robthermal.cli.app" in loaded
-    assert not loaded & set(unused)
-
-
 def test_a_fit_and_a_response_need_no_statistics_library() -> None:
     """scipy.signal and scipy.stats take a second to import; filters and quantiles come from elsewhere."""
     code = """

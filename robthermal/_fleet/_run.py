@@ -9,8 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed, effective_n_jobs
-
+from .._joblib import joblib
 from ..errors import InputError, Outcome
 from ._batches import Batches, answer_batch
 from ._outcomes import FleetCode
@@ -114,10 +113,10 @@ def fleet(function: Callable[[Any], Any], cases: Sequence[Any], *, store: str | 
     finished = sum(copies[key] for key in copies if key in answers)
     progress(finished, total)
     computed = len(todo)
-    batches = Batches(todo, effective_n_jobs(jobs))
+    batches = Batches(todo, joblib.effective_n_jobs(jobs))
     while batches:  # a second time only if a worker gave back cases after the last batch was handed out
-        work = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
-            delayed(answer_batch)(function, number, [todo[key] for key in batch]) for number, batch in batches)
+        work = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
+            joblib.delayed(answer_batch)(function, number, [todo[key] for key in batch]) for number, batch in batches)
         for done in map(batches.back, work):
             for key, answer in done if book is None else book.add(done):
                 answers[key] = answer

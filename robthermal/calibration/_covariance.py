@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from .._arrays import Floats
 from ..fitting import Loss, Problem, Ranges, score, score_slope
@@ -143,7 +143,7 @@ def with_priors(ranges: Ranges, values: Floats, H: Floats, M: Floats, degrees_of
     unit = ranges.unit
     units = np.outer(unit, unit)
     H, M, P = H * units, M * units, np.diag(ranges.prior_slopes(values) ** 2) * units
-    size, vectors = eigh(H)
+    size, vectors = scipy.linalg.eigh(H)
     spread = np.array([_variance(value, vector, M, size[-1])
                        for value, vector in zip(size, vectors.T, strict=True)])
     open_ = tuple(vectors[:, i] for i in np.flatnonzero(spread > 1.0))
@@ -164,7 +164,7 @@ def _without_prior(V: Floats, P: Floats, bounds: Floats) -> tuple[tuple[Floats, 
     if not V.shape[1]:
         return (), np.zeros_like(P)
     B = V.T @ bounds @ V
-    told, w = eigh(V.T @ P @ V, B)
+    told, w = scipy.linalg.eigh(V.T @ P @ V, B)
     w = w[:, told < 1.0]
     own = V @ B @ w
     return tuple(d / np.linalg.norm(d) for d in (V @ w).T), own @ own.T

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from .._arrays import Floats
 from ..fitting import Data
@@ -91,7 +91,7 @@ def _sampled(A: Floats, q: Floats, h: float) -> tuple[Floats, Floats]:
     """
     n = len(A)
     halvings = max(0, math.ceil(math.log2(max(float(np.linalg.norm(A, 1)) * h, 1.0))))
-    block = expm(np.block([[-A, q], [np.zeros((n, n)), A.T]]) * (h / 2**halvings))
+    block = scipy.linalg.expm(np.block([[-A, q], [np.zeros((n, n)), A.T]]) * (h / 2**halvings))
     step = block[n:, n:].T
     Q = step @ block[:n, n:]
     for _ in range(halvings):

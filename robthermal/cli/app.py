@@ -34,6 +34,7 @@ from .terminal import (
     reading,
     say,
     show_report,
+    there,
 )
 
 app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, pretty_exceptions_enable=False,
@@ -90,9 +91,9 @@ def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="P
 
     Example: robthermal run project.toml --out results
     """
-    _run(rt.jobs.request.gate_from_text(rt.jobs.read_project(project), confidence=confidence,
-                                        tolerance=tolerance or []), out, as_json,
-         [name.strip() for name in only.split(",") if name.strip()], start, force)
+    job = rt.jobs.read_project(project)
+    job = rt.jobs.request.gate_from_text(job, confidence=confidence, tolerance=tolerance or [])
+    _run(job, out, as_json, [name.strip() for name in only.split(",") if name.strip()], start, force)
 
 
 def _run(job: rt.jobs.request.Project, out: Path, as_json: bool, only: Sequence[str] = (), start: str = "",
@@ -115,6 +116,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
     Example: robthermal check setup.toml run1.csv run2.csv
     """
     system = files[0] if files[0].suffix.lower() == ".toml" else None
+    there(*files[bool(system):])
     found = rt.read_system(system) if system else None
     tables = reading(record, column)
     measured = files[1:] if system else files
@@ -124,7 +126,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
     summary: dict[str, Any] = {"records": [{"file": str(file), "import": report.to_dict()}
                            for file, report in zip(measured, reports, strict=True)]}
     if found is not None:
-        constants = rt.thermal.time_constants(found)["time constant [s]"] if len(found.lumps) <= 2000 else None
+        constants = -1.0 / found.poles() if len(found.lumps) <= 2000 else None
         summary = {"system": found.name, "lumps": len(found.lumps), "links": len(found.links),
                    "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
                    "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
@@ -142,6 +144,7 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 
     Example: robthermal simulate setup.toml inputs.csv --out simulated.csv
     """
+    there(record)
     found = rt.read_system(system)
     with progress() as stage:
         stage("reading the record")
@@ -171,6 +174,7 @@ def calibrate(system: SystemFile,
 
     Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
     """
+    there(*records, *(validation or []))
     found = rt.read_system(system)
     point = rt.jobs.request.point_from_text(found, operating_point or [])
     with progress() as stage:

@@ -23,6 +23,7 @@ from .terminal import (
     progress,
     reading,
     say,
+    there,
 )
 
 
@@ -46,6 +47,7 @@ def diagnose(system: SystemFile,
 
     Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
     """
+    there(*records, *(validation or []), *(reference or []))
     found = rt.read_system(system)
     tables = reading(record, column)
     point = rt.jobs.request.point_from_text(found, operating_point or [])

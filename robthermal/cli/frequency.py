@@ -9,7 +9,7 @@ import typer
 
 import robthermal as rt
 
-from .terminal import ColumnMap, Json, ReadOption, answer, drawing, place, progress, reading, say
+from .terminal import ColumnMap, Json, ReadOption, answer, drawing, place, progress, reading, say, there
 
 
 def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machine.", metavar="RECORD.csv")],
@@ -50,6 +50,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
 
     Example: robthermal frf run1.csv run2.csv --system setup.toml --method lrmp --out frf.json --plot frf.svg
     """
+    there(*records)
     model = rt.read_system(system) if system else None
     with progress() as stage:
         stage("estimating the frequency response")

@@ -20,6 +20,7 @@ def report(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results f
 
     Example: robthermal report results
     """
+    rt.jobs.folder.check_results(folder)  # before the checker is loaded
     with progress_bar("certificates") as done:
         rebuilt = rt.jobs.rebuild_report(folder, done)
     show_report(rebuilt, folder, as_json)

@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 
 import robthermal as rt
 
-from ..errors import Outcome
+from ..errors import InputError, Outcome
 from ._progress import Told as Told
 from ._progress import duration as duration
 from ._progress import progress as progress
@@ -69,6 +69,13 @@ class SeveralFiles(TyperCommand):
 def reading(record: list[str] | None, column: list[str] | None) -> tuple[Any, ...]:
     """How measured files are read, from the options --record and --column."""
     return rt.jobs.measured.reading_from_text(record or [], column or [])
+
+
+def there(*files: Path) -> None:
+    """Refuse input files that do not exist: said before the work, not after a part of it."""
+    for file in files:
+        if not file.exists():
+            raise InputError("there is no such file", where=str(file))
 
 
 def place(file: Path | None) -> Path | None:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from ..errors import InputError
 from ..identify import FrequencyResponse
@@ -50,7 +50,7 @@ class ResponseWhitener:
         z = np.sqrt(2.0) * (self.roots @ flat)  # circular noise: half the variance in either part
         if self.factor.size:
             columns = z.reshape(n * m // self.n_outputs, -1)
-            z = solve_triangular(self.factor, columns, lower=True).reshape(n, m, -1)
+            z = scipy.linalg.solve_triangular(self.factor, columns, lower=True).reshape(n, m, -1)
         return as_real(z).reshape(r.shape)
 
 

@@ -63,6 +63,31 @@ def output_folder(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
+def check_results(folder: Path) -> None:
+    """Refuse a folder that no command has finished.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder about to be read.
+
+    Raises
+    ------
+    InputError
+        No report.json in it.
+
+    Examples
+    --------
+    >>> check_results(Path("nowhere"))
+    Traceback (most recent call last):
+    ...
+    robthermal.errors.InputError: nowhere: holds no report.json. Expected a folder that run, ... or diagnose wrote.
+    """
+    if not (folder / "report.json").is_file():
+        raise InputError("holds no report.json", where=str(folder),
+                         expected="a folder that run, demo, certify, design, map, couple or diagnose wrote")
+
+
 def check_free(target: Path) -> None:
     """Refuse to overwrite what is not an earlier result.
 

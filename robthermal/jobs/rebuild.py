@@ -28,6 +28,7 @@ from ..verification import Certificate, Verdict, same_system, verify
 from .certify import CODES, box_stays_inside, current_reasons, rest_on_certificates, within_usable
 from .claims import ARITHMETIC, GateCode, claim_of, kind_assumptions
 from .evidence import checker, judged, twice_checked
+from .folder import check_results
 from .now import now
 
 _FOLDERS = ("certificates", "design/certificates", "coupling/certificates")
@@ -70,7 +71,9 @@ def rebuild_report(folder: str | Path, progress: Callable[[int, int], None] = la
     False
     """
     folder = Path(folder)
-    report = replace(checked_again(_stored(folder), folder, progress), checker=checker(), generated=now())
+    check_results(folder)
+    stored = read_content(folder / "report.json")
+    report = replace(checked_again(stored, folder, progress), checker=checker(), generated=now())
     if not is_unchanged(folder / "report.json"):
         report = _distrusted(report, folder)
     _write(report, folder)
@@ -115,13 +118,6 @@ class _Found:
     evidence: Evidence
     certificate: Certificate | None = None
     verdict: Verdict | None = None
-
-
-def _stored(folder: Path) -> Report:
-    if not (folder / "report.json").is_file():
-        raise InputError("holds no report.json", where=str(folder),
-                         expected="a folder that run, demo, certify, design, map, couple or diagnose wrote")
-    return read_content(folder / "report.json")
 
 
 def _checked_again(one: Evidence, folder: Path) -> _Found:

@@ -7,14 +7,19 @@ from collections.abc import Sequence
 from functools import cache
 from itertools import chain, count
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-
+from .._first_use import OnFirstUse
 from ._appendix import margins, numbered_assumptions, resting
 from ._content import Claim, Report, Section
 from ._figure import Figure, inline
 from ._save import printable, save_text
 from ._usable import LIMITED_BY, Bound, rounded_down, shown
+
+if TYPE_CHECKING:
+    import jinja2
+else:  # a certificate is checked without it
+    jinja2 = OnFirstUse("jinja2")
 
 
 def write_html(report: Report, path: str | Path) -> Path:
@@ -138,9 +143,10 @@ _OWN = ("top", "numbers", "usable", "usable-title", "claims", "claims-title", "b
 
 
 @cache
-def _template(name: str) -> Template:
-    environment = Environment(loader=PackageLoader(__package__, "template"), autoescape=True, undefined=StrictUndefined,
-                              trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+def _template(name: str) -> jinja2.Template:
+    environment = jinja2.Environment(loader=jinja2.PackageLoader(__package__, "template"), autoescape=True,
+                                     undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+                                     keep_trailing_newline=True)
     environment.filters["units"] = _together
     return environment.get_template(name)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from ..errors import InputError
 from ._checks import Array
@@ -103,7 +103,7 @@ def machine_of(model: Any, h: float, n_u: int) -> Machine | None:
     if _step(model, h) == 0.0:
         block = np.zeros((len(A) + n_u,) * 2)
         block[: len(A)] = np.hstack([A, B]) * h
-        exact = expm(block)[: len(A)]
+        exact = scipy.linalg.expm(block)[: len(A)]
         A, B = exact[:, : len(A)], exact[:, len(A) :]
     return Machine(A, B, C, D)
 

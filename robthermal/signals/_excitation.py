@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import dft, hadamard
 
 from .._checks import whole_number
 from ..errors import InputError
@@ -149,4 +149,4 @@ def _experiment_phases(n_u: int) -> Array:
     """Phases [rad] added to input i in experiment e, (n_u, n_u): e^j of them is an orthogonal matrix."""
     power_of_two = n_u & (n_u - 1) == 0
     # Hadamard: experiments differ by signs only, which leaves every crest factor as it is.
-    return np.angle(hadamard(n_u) if power_of_two else dft(n_u))
+    return np.angle(scipy.linalg.hadamard(n_u) if power_of_two else scipy.linalg.dft(n_u))

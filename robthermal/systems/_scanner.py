@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm, solve_discrete_lyapunov
 
 from .._control import control
 
@@ -137,7 +136,7 @@ def _plant(stage: _Stage, position: float | None = None) -> control.StateSpace:
         omega = 2 * np.pi * frequency
         A.append(np.array([[0.0, 1.0], [-omega**2, -2 * damping * omega]]))
         B, C = B + [0.0, 1 / stage.mass], C + [gain, 0.0]
-    return _delayed(block_diag(*A), np.array(B)[:, None], np.array(C)[None])
+    return _delayed(scipy.linalg.block_diag(*A), np.array(B)[:, None], np.array(C)[None])
 
 
 def _delayed(A: Array, B: Array, C: Array) -> control.StateSpace:
@@ -160,7 +159,7 @@ def _hold(A: Array, B: Array, time: float) -> Array:
     n = len(A)
     M = np.zeros((n + 1, n + 1))
     M[:n, :n], M[:n, n:] = A * time, B * time
-    return expm(M)
+    return scipy.linalg.expm(M)
 
 
 def _controller(stage: _Stage) -> control.StateSpace:
@@ -183,7 +182,7 @@ def _disturbance(stage: _Stage) -> control.StateSpace:
                                           (stage.guide[0], 0.03, stage.guide[1])):
         omega = 2 * np.pi * frequency
         part = _tustin([omega**2], [1.0, 2 * damping * omega, omega**2], frequency)
-        P = solve_discrete_lyapunov(part.A, part.B @ part.B.T)
+        P = scipy.linalg.solve_discrete_lyapunov(part.A, part.B @ part.B.T)
         total = total + part * (deviation / np.sqrt((part.C @ P @ part.C.T + part.D @ part.D.T).item()))
     return total
 

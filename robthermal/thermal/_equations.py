@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array, csr_array, diags_array
 
 from ._assembly_terms import terms_of
 from ._drives import Drives
@@ -70,7 +70,7 @@ class Equations:
         return np.array([lump.capacity for lump in self.system.lumps.values()])
 
     @cached_property
-    def _network(self) -> csr_array:
+    def _network(self) -> scipy.sparse.csr_array:
         """Linear heat into the lumps from every node, (n, n + n_ambients) [W/K]."""
         i = self.index
         ends = [(i[link.between[0]], i[link.between[1]], link.conductance) for link in self.system.links]
@@ -79,18 +79,18 @@ class Equations:
         a, b = a.astype(np.intp), b.astype(np.intp)
         n, nodes = len(self.system.lumps), len(i)
         rows, columns = np.concatenate([a, a, b, b]), np.concatenate([a, b, b, a])
-        full = coo_array((np.concatenate([-g, g, -g, g]), (rows, columns)), shape=(nodes, nodes)).tocsr()
-        return csr_array(full[:n])
+        full = scipy.sparse.coo_array((np.concatenate([-g, g, -g, g]), (rows, columns)), shape=(nodes, nodes)).tocsr()
+        return scipy.sparse.csr_array(full[:n])
 
     @cached_property
-    def A(self) -> csr_array:
+    def A(self) -> scipy.sparse.csr_array:
         """Linear network [W/K], (n, n)."""
-        return csr_array(self._network[:, : len(self.system.lumps)])
+        return scipy.sparse.csr_array(self._network[:, : len(self.system.lumps)])
 
     @cached_property
-    def B(self) -> csr_array:
+    def B(self) -> scipy.sparse.csr_array:
         """Heat per unit of every heater [W/unit] and ambient [W/K], (n, n_u)."""
-        return csr_array(self.D[:, : self.drives.n_u])
+        return scipy.sparse.csr_array(self.D[:, : self.drives.n_u])
 
     @cached_property
     def gradient(self) -> NDArray[np.float64]:
@@ -98,9 +98,10 @@ class Equations:
         return np.array([lump.gradient for lump in self.system.lumps.values()])
 
     @cached_property
-    def D(self) -> csr_array:
+    def D(self) -> scipy.sparse.csr_array:
         """Heat per unit of every column of w (`drives`), (n, n_w), without the memory of a hysteresis."""
-        n, i, to_ambients = len(self.system.lumps), self.index, coo_array(self._network[:, len(self.system.lumps):])
+        n, i = len(self.system.lumps), self.index
+        to_ambients = scipy.sparse.coo_array(self._network[:, n:])
         entries = [(i[h.lump], column, h.gain * (1 - (h.feedthrough.share if h.feedthrough else 0.0)))
                    for column, h in enumerate(self.system.inputs.values())]
         entries += [(i[h.feedthrough.lump], column, h.gain * h.feedthrough.share)
@@ -111,14 +112,14 @@ class Equations:
         warm = self._network[:, n:].sum(axis=1) * self.gradient
         entries += [(int(k), one, warm[k]) for k in np.flatnonzero(warm)]
         rows, columns, values = zip(*entries, strict=True) if entries else ((), (), ())
-        return csr_array(coo_array(
+        return scipy.sparse.csr_array(scipy.sparse.coo_array(
             (np.concatenate([np.array(values, float), to_ambients.data]),
              (np.concatenate([np.array(rows, np.intp), to_ambients.row]),
               np.concatenate([np.array(columns, np.intp), to_ambients.col + self.drives.ambients.start]))),
             shape=(n, self.drives.width)))
 
     @cached_property
-    def settled(self) -> csr_array:
+    def settled(self) -> scipy.sparse.csr_array:
         """`D` with the memory of every hysteresis at rest at the sign of the present current."""
         if not self.drives.signs:
             return self.D
@@ -126,7 +127,7 @@ class Equations:
         for name, column in self.drives.signs.items():
             module = self.system.modules[name]
             found[self.index[module.cold], column] = module.hysteresis.heat if module.hysteresis else 0.0
-        return csr_array(found)
+        return scipy.sparse.csr_array(found)
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -203,7 +204,7 @@ class Equations:
                 add_to_lumps(total, nodes, flow)
         return total
 
-    def jacobian(self, x: ArrayLike, u: ArrayLike) -> csr_array:
+    def jacobian(self, x: ArrayLike, u: ArrayLike) -> scipy.sparse.csr_array:
         """∂f/∂x at one point.
 
         Parameters
@@ -224,9 +225,9 @@ class Equations:
             s = term.slopes(*self.ends(term, x, u))
             parts.append(_matrix((n, n), (term.a, term.a, s.aa), (term.a, term.b, s.ab), (term.b, term.a, s.ba),
                                  (term.b, term.b, s.bb)))
-        return csr_array(sum(parts[1:], start=parts[0]))
+        return scipy.sparse.csr_array(sum(parts[1:], start=parts[0]))
 
-    def input_jacobian(self, x: ArrayLike, u: ArrayLike) -> csr_array:
+    def input_jacobian(self, x: ArrayLike, u: ArrayLike) -> scipy.sparse.csr_array:
         """∂f/∂u at one point.
 
         Parameters
@@ -249,7 +250,7 @@ class Equations:
             if term.drive.size:
                 entries += [(term.a, term.drive, s.a_drive), (term.b, term.drive, s.b_drive)]
             parts.append(_matrix(self.B.shape, *entries))
-        return csr_array(sum(parts[1:], start=parts[0]) @ diags_array(self.drives.slopes(u)))
+        return scipy.sparse.csr_array(sum(parts[1:], start=parts[0]) @ scipy.sparse.diags_array(self.drives.slopes(u)))
 
     def jacobians(self, x: ArrayLike, u: ArrayLike) -> tuple[Array, Array]:
         """∂f/∂x and ∂f/∂u as dense arrays, at one point or many: for small systems much quicker than the sparse ones.
@@ -328,8 +329,8 @@ class Equations:
         return parameter_heat(self, name, np.asarray(x), np.asarray(u))
 
 
-def _matrix(shape: tuple[int, ...], *entries: tuple[Indices, Indices, Array]) -> csr_array:
+def _matrix(shape: tuple[int, ...], *entries: tuple[Indices, Indices, Array]) -> scipy.sparse.csr_array:
     """Sum of entries at (rows, columns), of those inside the shape."""
     rows, columns, values = (np.concatenate([e[k] for e in entries]) for k in range(3))
     keep = (rows < shape[0]) & (columns < shape[1])
-    return csr_array(coo_array((values[keep], (rows[keep], columns[keep])), shape=shape))
+    return scipy.sparse.csr_array(scipy.sparse.coo_array((values[keep], (rows[keep], columns[keep])), shape=shape))

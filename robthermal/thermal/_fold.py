@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ._equations import Equations
@@ -75,7 +74,7 @@ def _groups(eq: Equations, held: Indices, columns: Indices) -> list[list[int]]:
     """Modules (positions among those named) that share a heat sink once the cold faces are held."""
     free = np.setdiff1d(np.arange(len(eq.capacity)), held)
     J = eq.jacobian(eq.initial(), eq.nominal())[free][:, free]
-    _, label = connected_components(J, directed=False)
+    _, label = scipy.sparse.csgraph.connected_components(J, directed=False)
     modules = list(eq.system.modules.values())
     groups: dict[int, list[int]] = {}
     for position, column in enumerate(columns):

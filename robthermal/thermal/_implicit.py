@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import Diverged, InputError
 from ._equations import Equations
@@ -43,15 +42,16 @@ class _Stepper:
     tolerance: float
 
     def __post_init__(self) -> None:
-        self._lu: dict[int, SuperLU] = {}
+        self._lu: dict[int, scipy.sparse.linalg.SuperLU] = {}
 
-    def factor(self, level: int, x: Array, u: Array) -> SuperLU:
+    def factor(self, level: int, x: Array, u: Array) -> scipy.sparse.linalg.SuperLU:
         """LU of E - γ h J for steps of h / 2**level, made at the first state that needs it."""
         if level not in self._lu:
             J = self.eq.jacobian(x, u)
-            matrix = diags_array(self.eq.capacity) - _GAMMA * self.h / 2**level * J
-            self._lu[level] = splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True},
-                                   diag_pivot_thresh=0.01)
+            matrix = scipy.sparse.diags_array(self.eq.capacity) - _GAMMA * self.h / 2**level * J
+            self._lu[level] = scipy.sparse.linalg.splu(
+                scipy.sparse.csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True},
+                diag_pivot_thresh=0.01)
         return self._lu[level]
 
     def refresh(self) -> None:
@@ -77,7 +77,7 @@ class _Stepper:
                           + (_EMBEDDED[2] - _WEIGHTS[1]) * heats[1])
         return new, [first, second], float(np.abs(lu.solve(difference)).max())
 
-    def _stage(self, base: Array, guess: Array, u: Array, h: float, lu: SuperLU) -> Array | None:
+    def _stage(self, base: Array, guess: Array, u: Array, h: float, lu: scipy.sparse.linalg.SuperLU) -> Array | None:
         """Solve E (X - base) = γ h f(X, u) for X."""
         X = guess
         for _ in range(_NEWTON):

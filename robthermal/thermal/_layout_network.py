@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import shortest_path
+import scipy
 
 from .._arrays import Array
 
@@ -37,8 +36,8 @@ def positions(sizes: Array, edges: Sequence[tuple[int, int]]) -> Array:
     if n == 1:
         return np.zeros((1, 2))
     first, second = np.array(edges, dtype=int).reshape(-1, 2).T
-    graph = csr_array((np.ones(len(first)), (first, second)), shape=(n, n))
-    steps = shortest_path(graph, directed=False, unweighted=True, method="D")
+    graph = scipy.sparse.csr_array((np.ones(len(first)), (first, second)), shape=(n, n))
+    steps = scipy.sparse.csgraph.shortest_path(graph, directed=False, unweighted=True, method="D")
     known = np.isfinite(steps)
     steps[~known] = steps[known].max() + 1.0
     return _separated(_relaxed(_scaled(steps), steps) * _APART, sizes)

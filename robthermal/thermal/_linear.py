@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import expm
 
 from .._celsius import LOWEST_KELVIN
 from .._control import control
@@ -66,7 +66,7 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     if sample_time:
         both = np.zeros((A.shape[0] + B.shape[1],) * 2)
         both[:len(A)] = np.hstack([A, B]) * sample_time
-        exact = expm(both)[:len(A)]
+        exact = scipy.linalg.expm(both)[:len(A)]
         A, B = exact[:, :len(A)], exact[:, len(A):]
     C, D, outputs = _outputs(eq, len(A), x, u)
     drives = [system.exogenous_names[column] for column in Layout(eq).drives]

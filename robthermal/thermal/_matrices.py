@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, diags_array, issparse
 
 from .._checks import positive_number
 from ..errors import InputError, Outcome
@@ -124,9 +124,9 @@ def system_from_matrices(E: Any, A: Any, B: Any = None, *, ambients: Mapping[str
     return MatrixImport(system, residual, heat, lumped, _outcome(network, residual, heat, names))
 
 
-def _sparse(values: Any, where: str) -> csr_array:
+def _sparse(values: Any, where: str) -> scipy.sparse.csr_array:
     try:
-        matrix = csr_array(values if issparse(values) else np.asarray(values, float))
+        matrix = scipy.sparse.csr_array(values if scipy.sparse.issparse(values) else np.asarray(values, float))
     except (TypeError, ValueError) as error:
         raise InputError(f"is not a matrix ({error})", where=where,
                          remedy="Pass a sparse matrix or an array.") from None
@@ -141,15 +141,15 @@ def _sparse(values: Any, where: str) -> csr_array:
 
 
 def _capacity(E: Any, lump_mass: bool) -> tuple[NDArray[np.float64], bool]:
-    if not issparse(E) and np.ndim(E) == 1:
-        E = diags_array(np.asarray(E, float))
+    if not scipy.sparse.issparse(E) and np.ndim(E) == 1:
+        E = scipy.sparse.diags_array(np.asarray(E, float))
     matrix = _sparse(E, "argument E")
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise InputError(f"has the shape {matrix.shape}", where="argument E", expected="(n, n) or (n,)",
                          remedy="Pass the heat capacities.")
     values = matrix.diagonal()
-    lumped = bool((matrix - diags_array(values)).count_nonzero())
+    lumped = bool((matrix - scipy.sparse.diags_array(values)).count_nonzero())
     if lumped and not lump_mass:
         raise InputError("is not diagonal: a consistent mass matrix", where="argument E", expected="a lumped mass "
                          "matrix", remedy="Pass lump_mass=True to lump it by row sums, or export a lumped one.")
@@ -163,7 +163,7 @@ def _capacity(E: Any, lump_mass: bool) -> tuple[NDArray[np.float64], bool]:
     return values, lumped
 
 
-def _network(A: Any, n: int) -> csr_array:
+def _network(A: Any, n: int) -> scipy.sparse.csr_array:
     """The matrix A, checked and exactly symmetric; its diagonal is still the given one."""
     matrix = _sparse(A, "argument A")
     if matrix.shape != (n, n):
@@ -198,9 +198,9 @@ def _columns(B: Any, n: int, inputs: tuple[str, ...],
     """Heaters (lump and gain), and the ambient columns if there are any."""
     if not ambients:
         raise InputError("there is no ambient", where="argument ambients", remedy='Pass for example {"room": 298.15}.')
-    if B is not None and not issparse(B) and np.ndim(B) == 1:
+    if B is not None and not scipy.sparse.issparse(B) and np.ndim(B) == 1:
         B = np.reshape(B, (-1, 1))
-    matrix = csr_array((n, 0)) if B is None else _sparse(B, "argument B")
+    matrix = scipy.sparse.csr_array((n, 0)) if B is None else _sparse(B, "argument B")
     wide = len(inputs) + len(ambients)
     if matrix.shape[0] != n or matrix.shape[1] not in (len(inputs), wide):
         raise InputError(f"has the shape {matrix.shape}", where="argument B", expected=f"({n}, {len(inputs)}), the "
@@ -229,7 +229,7 @@ def _heater(column: Any, name: str) -> tuple[int, float]:
     return int(heated[0]), float(column.data[column.data != 0][0])
 
 
-def _close(network: csr_array, to_ambient: NDArray[np.float64] | None, n_ambients: int,
+def _close(network: scipy.sparse.csr_array, to_ambient: NDArray[np.float64] | None, n_ambients: int,
            tolerance: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Conductances to the ambients (n, n_ambients), and the row sums taken as rounding (n,)."""
     sums, diagonal = np.asarray(network.sum(axis=1)).ravel(), network.diagonal()
@@ -253,7 +253,7 @@ def _refuse(bad: NDArray[np.intp], residual: NDArray[np.float64], scale: NDArray
                          f"rounding of printed digits, pass tolerance={2 * part:.1g} and the ambient columns in B.")
 
 
-def _links(network: csr_array, to_ambient: NDArray[np.float64], names: Sequence[str],
+def _links(network: scipy.sparse.csr_array, to_ambient: NDArray[np.float64], names: Sequence[str],
            ambients: Sequence[str]) -> list[Link]:
     upper = network.tocoo()
     above = upper.row < upper.col
@@ -272,7 +272,8 @@ def _names(lump_names: Sequence[str] | None, n: int) -> list[str]:
     return names
 
 
-def _outcome(network: csr_array, residual: NDArray[np.float64], heat: float, names: Sequence[str]) -> Outcome:
+def _outcome(network: scipy.sparse.csr_array, residual: NDArray[np.float64], heat: float,
+             names: Sequence[str]) -> Outcome:
     worst = int(np.argmax(np.abs(residual)))
     if np.abs(residual).max() <= 1e-9 * np.abs(network.diagonal()).max():
         return ThermalCode.CLOSED.outcome()

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, load_npz
 
 from ..errors import InputError
 from ._matrix_market import read_market
@@ -23,8 +23,8 @@ _UNREADABLE = (ValueError, OSError, OverflowError, EOFError, KeyError, Attribute
                MemoryError, zipfile.BadZipFile, zlib.error)
 
 
-def read_matrices(E: str | Path, A: str | Path | None = None,
-                  B: str | Path | None = None) -> tuple[csr_array, csr_array, csr_array | None]:
+def read_matrices(E: str | Path, A: str | Path | None = None, B: str | Path | None = None
+                  ) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array, scipy.sparse.csr_array | None]:
     """Read the matrices of E ẋ = A x + B u.
 
     Parameters
@@ -61,7 +61,8 @@ def read_matrices(E: str | Path, A: str | Path | None = None,
     return _column(_read(Path(E))), _read(Path(A)), None if B is None else _read(Path(B))
 
 
-def _together(path: Path, B: str | Path | None) -> tuple[csr_array, csr_array, csr_array | None]:
+def _together(path: Path, B: str | Path | None
+              ) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array, scipy.sparse.csr_array | None]:
     if path.suffix != ".npz":
         raise InputError("only one file", where=str(path), expected="E and A", remedy="Give the file of A too, or one "
                          ".npz with the arrays E, A and B.")
@@ -75,7 +76,7 @@ def _together(path: Path, B: str | Path | None) -> tuple[csr_array, csr_array, c
             _matrix(arrays["B"], f"{path} B") if "B" in arrays else None)
 
 
-def _read(path: Path) -> csr_array:
+def _read(path: Path) -> scipy.sparse.csr_array:
     if path.name.endswith((".mtx", ".mtx.gz")):
         with _reading(path):
             return read_market(path)
@@ -83,7 +84,7 @@ def _read(path: Path) -> csr_array:
         arrays = _npz(path)
         if _NPZ_SPARSE <= set(arrays):
             with _reading(path):
-                stored = load_npz(path)
+                stored = scipy.sparse.load_npz(path)
                 if hasattr(stored, "check_format"):  # indices outside would crash the interpreter
                     stored.check_format(full_check=True)
             return _matrix(stored, str(path))
@@ -119,10 +120,12 @@ def _reading(path: Path) -> Iterator[None]:
                          remedy="Check the path, and that the file is complete.") from None
 
 
-def _matrix(values: object, where: str) -> csr_array:
+def _matrix(values: object, where: str) -> scipy.sparse.csr_array:
     """Real sparse matrix of whatever was stored."""
     try:
-        matrix = csr_array(values.reshape(-1, 1) if isinstance(values, np.ndarray) and values.ndim == 1 else values)
+        if isinstance(values, np.ndarray) and values.ndim == 1:
+            values = values.reshape(-1, 1)
+        matrix = scipy.sparse.csr_array(values)
     except (TypeError, ValueError) as error:
         raise InputError(f"is not a matrix ({error})", where=where, expected="a real matrix of at most two dimensions",
                          remedy="Write numbers only.") from None
@@ -132,10 +135,10 @@ def _matrix(values: object, where: str) -> csr_array:
     return matrix.astype(np.float64)
 
 
-def _column(E: csr_array) -> csr_array:
+def _column(E: scipy.sparse.csr_array) -> scipy.sparse.csr_array:
     """A stored vector becomes a diagonal."""
     if 1 in E.shape and E.shape != (1, 1):
         values = E.toarray().ravel()
         at = np.arange(values.size)
-        return csr_array((values, (at, at)), shape=(values.size, values.size))
+        return scipy.sparse.csr_array((values, (at, at)), shape=(values.size, values.size))
     return E

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
 
 from ..errors import InputError
 
@@ -33,7 +33,7 @@ class _Head:
     entries: int
 
 
-def read_market(path: Path) -> csr_array:
+def read_market(path: Path) -> scipy.sparse.csr_array:
     """Read a real matrix.
 
     Parameters
@@ -63,7 +63,7 @@ def read_market(path: Path) -> csr_array:
         off = where[0] != where[1]
         values = np.concatenate([values, head.sign * values[off]])
         where = np.concatenate([where, where[::-1, off]], axis=1)
-    return coo_array((values, (where[0], where[1])), shape=(head.rows, head.columns)).tocsr()
+    return scipy.sparse.coo_array((values, (where[0], where[1])), shape=(head.rows, head.columns)).tocsr()
 
 
 def _head(file: gzip.GzipFile | io.BufferedReader, path: Path) -> _Head:

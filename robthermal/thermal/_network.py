@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ..errors import InputError
 from ._parameters import read_parameter
@@ -124,8 +123,8 @@ def _path_to_ambient(system: System) -> None:
     ends += [(m.hot, m.cold) for m in system.modules.values()]
     rows = [index[a] for a, _ in ends]
     columns = [index[b] for _, b in ends]
-    graph = csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
-    _, labels = connected_components(graph, directed=False)
+    graph = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(names), len(names)))
+    _, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     joined = set(labels[len(system.lumps):])
     stranded = [name for name, label in zip(system.lumps, labels, strict=False) if label not in joined]
     if stranded:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from scipy.linalg import eig, solve_continuous_lyapunov, svd
+import scipy
 
 from .._control import control
 from .._drawing import axes_for
@@ -152,9 +152,9 @@ def _named(model: control.StateSpace, A: Array, B: Array, C: Array, D: Array) ->
 
 def _balanced(model: control.StateSpace) -> tuple[Any, Array, Array]:
     """Square-root balanced truncation."""
-    R = _factor(solve_continuous_lyapunov(model.A, -model.B @ model.B.T))
-    L = _factor(solve_continuous_lyapunov(model.A.T, -model.C.T @ model.C))
-    U, sigma, Vh = svd(L.T @ R)
+    R = _factor(scipy.linalg.solve_continuous_lyapunov(model.A, -model.B @ model.B.T))
+    L = _factor(scipy.linalg.solve_continuous_lyapunov(model.A.T, -model.C.T @ model.C))
+    U, sigma, Vh = scipy.linalg.svd(L.T @ R)
     bounds = 2 * np.append(np.cumsum(sigma[::-1])[::-1], 0.0)
 
     def truncate(r: int) -> control.StateSpace:
@@ -172,7 +172,7 @@ def _factor(gramian: Array) -> Array:
 
 def _modal(model: control.StateSpace) -> tuple[Any, Array, Array]:
     """Modal truncation in order of DC contribution; the dropped modes keep their static gain."""
-    values, V = eig(model.A)
+    values, V = scipy.linalg.eig(model.A)
     if np.abs(values.imag).max(initial=0.0) > 1e-9 * np.abs(values).max(initial=1.0):
         raise InputError("the model oscillates", where="argument model", expected="real poles for the modal method",
                          remedy='Use method="balanced".')

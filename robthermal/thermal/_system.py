@@ -6,11 +6,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from scipy.linalg import eigvals
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from .._html import short_table
 from ..errors import InputError
@@ -246,7 +244,7 @@ class System(Part):
         """
         eq = Equations(self)
         J = eq.jacobian(eq.initial(), eq.nominal()).toarray()
-        return np.sort(eigvals(J / eq.capacity[:, None]).real)[::-1]
+        return np.sort(scipy.linalg.eigvals(J / eq.capacity[:, None]).real)[::-1]
 
     def nearest_lumps(self, sources: Iterable[str]) -> dict[str, str]:
         """For every lump, the source lump with the least thermal resistance to it.
@@ -268,8 +266,9 @@ class System(Part):
         edges = [(index[a], index[b], 1.0 / max(g, 1e-12)) for a, b, g in conducting_paths(self)
                  if a in index and b in index]
         rows, columns, weights = zip(*edges, strict=True) if edges else ((), (), ())
-        graph = csr_array((np.array(weights, float), (rows, columns)), shape=(len(names), len(names)))
-        _, _, origin = dijkstra(graph, directed=False, indices=targets, min_only=True, return_predecessors=True)
+        graph = scipy.sparse.csr_array((np.array(weights, float), (rows, columns)), shape=(len(names), len(names)))
+        _, _, origin = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=targets, min_only=True,
+                                                     return_predecessors=True)
         return {names[i]: names[o] for i, o in enumerate(origin) if o >= 0}
 
     def plot(self, ax: Any = None) -> Any:

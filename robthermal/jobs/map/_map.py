@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from joblib import cpu_count
 
 from ..._celsius import ZERO_CELSIUS
+from ..._joblib import joblib
 from ..._pandas import pd
 from ...certify import LimitMap, UsableCurrent, limit_map, runaway
 from ...errors import InputError
@@ -140,7 +140,7 @@ def map_system(system: System, request: MapRequest,
         most = min(runaway(system, setpoint=dict.fromkeys(system.modules, target)).load.values())
         loads = _steps(0.0, max(most, 0.0), _LOADS)
     points = len(request.ambient) * len(request.setpoint)
-    jobs = min(cpu_count(), max(points // 3, 1))  # a process costs as much to start as a point or two
+    jobs = min(joblib.cpu_count(), max(points // 3, 1))  # a process costs as much to start as a point or two
     return limit_map(system, ambient=request.ambient, setpoint=request.setpoint, load=loads,
                      temperature=request.temperature, method=request.method, jobs=jobs, progress=progress)
 

@@ -4,9 +4,9 @@ What estimates or calibrates loads on first use (PEP 562), as in `robthermal.job
 need none of it.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ..._first_use import names_on_first_use
 from ._import import ReadTable as ReadTable
 from ._import import import_reports as import_reports
 from ._import import read_files as read_files
@@ -32,8 +32,4 @@ __all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_respon
            "import_reports", "instruments_from_text", "noise_from_text", "read_files", "read_measured",
            "reading_from_text", "write_excitation"]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+__getattr__ = names_on_first_use(__name__, _HOME)

@@ -27,9 +27,7 @@ from ...errors import InputError
 from ...verification import Certificate, verify
 from ..claims import Checked, loop_title, measure_of
 from ._file import SynthesisJob
-
-METHODS = ("hinf", "h2", "mixed", "mu", "output-feedback", "frf-pid", "polytope", "lpv", "tem",
-           "anti-windup", "mpc")
+from ._methods import METHODS
 
 
 def _lpv(plants: Sequence[Any], n_meas: int, n_ctrl: int, *, scheduling: Mapping[str, Sequence[float]],

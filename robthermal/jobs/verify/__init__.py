@@ -1,10 +1,25 @@
-"""Certificate files checked again, by the second checker too."""
+"""Certificate files checked again, by the second checker too.
 
-from ._check_files import FileCheck as FileCheck
-from ._check_files import verify_files as verify_files
-from ._check_files import write_checks as write_checks
+The checker loads on first use (PEP 562), as in `robthermal.jobs`: looking for the files does not need it.
+"""
+
+from typing import TYPE_CHECKING
+
+from ..._first_use import names_on_first_use
 from ._files import certificate_files as certificate_files
-from ._second import SecondVerdict as SecondVerdict
-from ._second import second_verdicts as second_verdicts
+
+if TYPE_CHECKING:  # what type checkers and editors see of the table below
+    from ._check_files import FileCheck as FileCheck
+    from ._check_files import verify_files as verify_files
+    from ._check_files import write_checks as write_checks
+    from ._second import SecondVerdict as SecondVerdict
+    from ._second import second_verdicts as second_verdicts
+
+_HOME = {  # name: the module it lives in
+    **dict.fromkeys(("FileCheck", "verify_files", "write_checks"), "_check_files"),
+    **dict.fromkeys(("SecondVerdict", "second_verdicts"), "_second"),
+}
 
 __all__ = ["FileCheck", "SecondVerdict", "certificate_files", "second_verdicts", "verify_files", "write_checks"]
+
+__getattr__ = names_on_first_use(__name__, _HOME)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import timedelta
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from ._table import Lines, Table
 
 def is_in_memory(source: Any) -> bool:
     """Whether a source is a frame, a series, a mapping or a structured array."""
+    if isinstance(source, str | Path):  # a missing file is answered before pandas is loaded
+        return False
     return isinstance(source, pd.DataFrame | pd.Series | Mapping) or (
         isinstance(source, np.ndarray) and bool(source.dtype.names)
     )
