@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +72,7 @@ class ObserverModel:
         C = np.array([[float(lump == system.sensors[name].lump) for lump in system.lumps] for name in names])
         return cls(system, names, h, exact[:, :n], exact[:, n:] / E, C)
 
-    @property
+    @cached_property
     def equations(self) -> Equations:
         """Of the system."""
         return Equations(self.system)

@@ -258,7 +258,8 @@ class _Search:
         free = np.setdiff1d(np.arange(len(x)), held)
         x[held], u[columns] = goal, current
         for _ in range(20):
-            Jx, Ju = self.eq.jacobian(x, u).toarray(), self.eq.input_jacobian(x, u).toarray()[:, columns]
+            Jx, every = self.eq.jacobians(x, u)
+            Ju = every[:, columns]
             change = np.linalg.solve(np.hstack([Jx[:, free], Ju]), self.eq.heat(x, u) + self.heat)
             if not np.abs(change).max() < 200.0:
                 return None
