@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
 from .._drawing import axes_for
@@ -269,7 +268,7 @@ class _Search:
                 return (x, u[columns]) if self._stable(Jx, Ju, u[columns], x) else None
         return None
 
-    def _stable(self, Jx: NDArray[np.float64], Ju: NDArray[np.float64], current: Array, x: Array) -> bool:
+    def _stable(self, Jx: Array, Ju: Array, current: Array, x: Array) -> bool:
         """Whether the rest of the network is stable while the currents, below their optimum, hold the cold faces."""
         if not np.isfinite(self.law.gain(current, x)).all():
             return False

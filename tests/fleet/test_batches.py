@@ -79,7 +79,7 @@ def test_slow_cases_among_quick_ones_are_all_done_once(jobs, monkeypatch):
         return x * x
 
     if jobs is None:
-        monkeypatch.setattr(_run, "Parallel", largest_last)
+        monkeypatch.setattr(_run.joblib, "Parallel", largest_last)
     with parallel_config(backend="threading"):
         run = rt.fleet(work, range(200), jobs=jobs, progress=lambda now, total: told.append(now))
     assert run.results == [x * x for x in range(200)] and run.computed == 200
