@@ -8,7 +8,7 @@ from .._celsius import ZERO_CELSIUS
 from ..thermal import System
 from ._judge import Name
 from .effects import AMBIENT_DRIFT, Candidate
-from .fit import FoundAmbient, Refit
+from .fit import FoundAmbient, Refit, found_ambients
 
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
@@ -94,6 +94,25 @@ def ambients_in_words(found: Sequence[FoundAmbient], system: System) -> list[str
         said.append(f"The temperature of {name} was not recorded, and is an unknown of every record: {values}; the "
                     f"system says {_shown(own[0].declared, system)}.")
     return said
+
+
+def held_ambients(nominal: Refit) -> list[str]:
+    """What was assumed of ambients that readings would put above what a heated machine allows, a sentence each.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Fit of the nominal system that was diagnosed.
+    """
+    if not nominal.structure.only_heated:
+        return []
+    warmest: dict[str, float] = {}
+    for one in found_ambients(nominal):
+        warmest[one.ambient] = min(one.warmest, warmest.get(one.ambient, one.warmest))
+    return [f"Left free, {room} came out warmer than the machine's coolest readings, though it is only heated; this "
+            f"answer assumes that {room} stood still, at no more than {_shown(most, nominal.system)}: the coolest "
+            f"reading and 1 K. A machine brought in from the cold is another matter: record {room}."
+            for room, most in warmest.items()]
 
 
 def may_drift(nominal: Refit) -> list[str]:

@@ -11,7 +11,15 @@ from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._changed import changed
-from ._doubts import ambients_in_words, doubts, far_ambients, may_be_the_room, may_drift, place_undecided
+from ._doubts import (
+    ambients_in_words,
+    doubts,
+    far_ambients,
+    held_ambients,
+    may_be_the_room,
+    may_drift,
+    place_undecided,
+)
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
 from ._refine import refine as refined
@@ -32,7 +40,7 @@ from .evidence import (
     sandwich,
     unknown_heat,
 )
-from .fit import Refit, SessionGain, exact, found_ambients, refit
+from .fit import Refit, SessionGain, exact, found_ambients, only_heated, refit, too_warm
 from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
 
@@ -124,8 +132,10 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
     refuse_constant(nominal.system, [path.one for path in nominal.records])
-    judged = lasting_beyond_steps(judge(searched(nominal, names, checked, progress), checked, progress))
-    judged = graded(reconsider_noise(judged, checked), checked, progress)
+    judged = _judged(nominal, names, checked, progress)
+    if too_warm(nominal) and (judged.plain is not None or judged.verdict == "unexplained"):
+        progress("once more, with a room no warmer than beside a machine that is only heated")
+        judged = _judged(only_heated(nominal), names, checked, progress)
     progress("locating the misfit and planning the next experiment")
     found = concluded(judged)
     if not refine:
@@ -138,6 +148,12 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         again=lambda split, chosen: diagnose(split, records, validation=validation, parameters=chosen, effects=names,
                                              noise=noise, operating_point=operating_point, session_gain=session_gain,
                                              progress=progress)))
+
+
+def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> Judged:
+    """Search, verdict, and where something is left beyond the noise the graded verdict."""
+    judged = lasting_beyond_steps(judge(searched(nominal, names, validation, progress), validation, progress))
+    return graded(reconsider_noise(judged, validation), validation, progress)
 
 
 def concluded(judged: Judged) -> Diagnosis:
@@ -188,6 +204,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said = []
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
+    said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     return (*said, *may_be_the_room(nominal, state.fit.structure.effects),
             *doubts(nominal.system, judged.plain is not None))

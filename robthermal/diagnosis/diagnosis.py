@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -223,7 +224,7 @@ class Diagnosis:
 
 
 def _with_unit(one: FoundAmbient) -> dict[str, Any]:
-    return {**vars(one), "unit": "K"}
+    return {**vars(one), "warmest": one.warmest if math.isfinite(one.warmest) else None, "unit": "K"}
 
 
 def _plain(found: Found) -> dict[str, Any]:

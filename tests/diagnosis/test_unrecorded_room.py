@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 from unrecorded_room import ROOM, STEP, TIME, N, model, names, records
 
 import robthermal as rt
+from robthermal.diagnosis.data._record_data import record_data
 from robthermal.diagnosis.effects import AMBIENT_DRIFT
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift, conductances
+from robthermal.diagnosis.fit import found_ambients, too_warm
+from robthermal.diagnosis.search._implausible import implausible
 
 HEAT, DRIFT = ("periodic_load", ("plate",)), ("ambient_drift", ("room",))
 FEW = ["periodic_load", "heat_source", "hidden_mass", "sensor_lag", "conductance_step", "missing_ambient_link"]
@@ -177,3 +181,95 @@ def test_the_answer_says_it_in_words_and_can_be_pickled() -> None:
     assert rt.jobs.explain(AMBIENT_DRIFT)[0].details["Confused with"] == ("periodic_load",)
     said = found.to_dict()["effects"][0]
     assert (said["effect"], said["where"]) == ("ambient_drift", ["room"])
+
+
+def two_heaters(*, room: float = 293.55) -> tuple[rt.System, rt.Record]:
+    """A board from rest: a path between its heaters that the model lacks, a late sensor, 200 samples, own integrator.
+
+    As a measured board whose diagnosis put the room 6 K above every first reading and lost the path.
+    """
+    rng, step, n = np.random.default_rng(5), 3.0, 201
+    heaters = np.zeros((n, 2))
+    heaters[:, 0] = np.repeat([70.0, 97.0, 41.0, 92.0, 30.0, 96.0, 1.0, 96.0, 1.5, 72.0, 85.0], 20)[:n]
+    heaters[50:, 1] = np.repeat([76.0, 49.0, 77.0, 53.0, 15.0, 0.0, 0.0, 0.0], 20)[:n - 50]
+    loss, path, gain = np.array([0.011, 0.0075]), 0.0028, np.array([0.0071, 0.0028])
+    T, sensor, readings = np.full(2, room), np.full(2, room), []
+    for u in heaters:
+        readings.append(sensor)
+        for _ in range(30):
+            heat = gain * u - loss * (T - room) + path * (T[::-1] - T)
+            T, sensor = T + step / 30 * heat / 2.0, sensor + step / 30 * (T - sensor) / np.array([18.7, 0.5])
+    names_of = ("heater_1", "heater_2")
+    fit = {f"links.{one}-room.conductance": {"lower": 1e-4, "upper": 0.05} for one in names_of}
+    board = rt.System(
+        ambients={"room": {"temperature": 293.15}}, lumps={one: {"capacity": 2.0} for one in names_of},
+        links=[{"between": (one, "room"), "conductance": 8e-3} for one in names_of],
+        inputs={f"q{i}": {"lump": one, "gain": g} for i, one, g in zip("12", names_of, (0.0123, 0.0062), strict=True)},
+        sensors={f"T{i}": {"lump": one, "noise": 0.1} for i, one in zip("12", names_of, strict=True)},
+        fit=fit | {f"inputs.q{i}.gain": {"lower": 1e-3, "upper": 0.1} for i in "12"})
+    noisy = np.array(readings) + 0.1 * rng.standard_normal((n, 2))
+    return board, rt.Record(sample_time=step, inputs=heaters, outputs=noisy, input_names=["q1", "q2"],
+                            output_names=["T1", "T2"])
+
+
+def test_a_machine_that_is_only_heated_is_not_colder_than_its_room() -> None:
+    """Left free the room swallows most of the path; an error of the model at T1 keeps "named" from deciding it."""
+    board, record = two_heaters()
+    k = np.arange(len(record))
+    wrong = record.with_outputs(record.outputs + np.column_stack([np.sin(2 * np.pi * k / 67) * k / k[-1], 0 * k]))
+    found = rt.diagnose(board, wrong, effects=["missing_link", "sensor_lag", "heat_source", "hidden_mass"])
+    (room,) = found.ambients
+    assert room.value <= room.warmest < np.percentile(record.outputs, 5, axis=0).min() + 1.001
+    assert any(("missing_link", ("heater_1", "heater_2")) in one for one in names(found))
+    assert found.caveats[0].startswith("Left free, room came out warmer than the machine's coolest readings")
+    free = rt.diagnosis.refit(board, wrong)
+    assert too_warm(free) and found_ambients(free)[0].value > room.warmest + 1.0
+    assert DRIFT not in [one.key for one in found.scores.candidates]
+
+
+def test_a_machine_brought_in_from_the_cold_is_consistent_with_a_warm_room() -> None:
+    """Nothing is missing: then nobody asks how warm the room can have been."""
+    board, _ = two_heaters()
+    warm = board.with_parameters({"ambients.room.temperature": 303.15, "lumps.heater_1.initial": 293.0,
+                                  "lumps.heater_2.initial": 293.0})
+    drive = rt.Record(sample_time=3.0, inputs=10.0 * np.random.default_rng(2).integers(0, 3, (300, 2)).astype(float),
+                      outputs=np.zeros((300, 0)), input_names=["q1", "q2"], output_names=[])
+    run = rt.thermal.simulate(warm, drive)
+    noisy = run.with_outputs(run.outputs + 0.1 * np.random.default_rng(3).standard_normal(run.outputs.shape))
+    found = rt.diagnose(board, noisy, effects=["missing_link", "sensor_lag", "heat_source"])
+    assert found.verdict == "consistent" and not found.nominal.structure.only_heated
+    assert found.ambients[0].value > found.ambients[0].warmest + 3.0
+
+
+@pytest.mark.parametrize("changed", ["cooled", "module", "two ambients", "no thermometer"])
+def test_nothing_is_said_of_the_room_of_a_machine_that_may_be_colder(changed: str) -> None:
+    board, record = two_heaters()
+    if changed == "cooled":
+        record = replace(record, inputs=record.inputs - 5.0)
+    tables = board.model_dump(exclude_unset=True)
+    if changed == "module":
+        tables["modules"] = {"m": {"cold": "heater_1", "hot": "heater_2", "seebeck": 0.05, "resistance": 2.0,
+                                   "conductance": 0.5}}
+    if changed == "two ambients":
+        tables["ambients"]["base"] = {"temperature": 290.0}
+        tables["links"] = [*tables["links"], {"between": ("heater_1", "base"), "conductance": 1e-3}]
+    (one,) = record_data(board, [record], "records")
+    if changed == "no thermometer":
+        one = replace(one, sensors=("other", "another"))
+    assert one.warmest_room(rt.System(**tables)) == np.inf
+
+
+@pytest.mark.parametrize(("period", "difference", "refused"), [(400.0, 1.0, False), (400.0, 3.6, True),
+                                                              (60000.0, 40.0, False)])
+def test_a_room_does_not_change_faster_than_rooms_do(period: float, difference: float, refused: bool) -> None:
+    fit = diagnosed("nothing", both=True).nominal
+    drift = next(one for one in diagnosed("nothing", both=True).scores.candidates if one.key == DRIFT)
+    why = implausible(drift, fit, {"period": period, "difference": difference, "phase": 0.0}, ())
+    assert bool(why) is refused and ("K per minute" in why) is refused
+
+
+def test_what_is_longer_than_the_record_is_not_seen_to_be_periodic() -> None:
+    fit = diagnosed("nothing", both=True).nominal
+    heat = next(one for one in diagnosed("nothing", both=True).scores.candidates if one.key == HEAT)
+    assert "longer than the record" in implausible(heat, fit, {"period": 2000.0, "heat": 1.0, "phase": 0.0}, ())
+    assert not implausible(heat, fit, {"period": 1000.0, "heat": 1.0, "phase": 0.0}, ())

@@ -81,7 +81,7 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
 def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
     """Changes of parameters, and what the catalog adds to them."""
     ranges, system = fit.structure.ranges, fit.system
-    listed = [one for one in fit.testable(candidates(system, names, fit.unrecorded))
+    listed = [one for one in fit.testable(candidates(system, names, fit.drifting))
               if not says_again(one, system, ranges)]
     return [*parameter_changes(system, ranges), *listed]
 

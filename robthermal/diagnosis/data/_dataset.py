@@ -88,6 +88,15 @@ class DataSet(Protocol):
             Effect at a place.
         """
 
+    def warmest_room(self, system: System) -> float:
+        """Upper bound of the ambient's temperature [K] beside a machine that is only heated; infinite if unknown.
+
+        Parameters
+        ----------
+        system : System
+            Nominal model of the data.
+        """
+
     def without_outliers(self, system: System, noise: Mapping[str, float]) -> Self:
         """The data set with isolated outliers marked as missing.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -44,6 +45,10 @@ class ResponseData(MeasuredResponse):
     def hides(self, system: System, candidate: Candidate) -> str:
         """As `DataSet.hides`: what is constant, or not linear and time-invariant."""
         return candidate.effect.hidden(system, candidate.where)
+
+    def warmest_room(self, system: System) -> float:
+        """As `DataSet.warmest_room`: a response has no ambient."""
+        return math.inf
 
     def without_outliers(self, system: System, noise: Mapping[str, float]) -> ResponseData:
         """As `DataSet.without_outliers`: the estimate has averaged them."""

@@ -13,6 +13,7 @@ from ...signals import Record
 from ...thermal import System, trajectory
 from ..effects import Candidate
 from ._glitches import cleaned
+from ._warmest_room import warmest_room
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,10 @@ class RecordData(Data):
     def hides(self, system: System, candidate: Candidate) -> str:
         """As `DataSet.hides`: a record may show every effect."""
         return ""
+
+    def warmest_room(self, system: System) -> float:
+        """As `DataSet.warmest_room`."""
+        return warmest_room(system, self)
 
     def without_outliers(self, system: System, noise: Mapping[str, float]) -> RecordData:
         """As `DataSet.without_outliers`; outliers are interpolated for display."""

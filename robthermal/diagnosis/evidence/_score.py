@@ -198,7 +198,7 @@ def score(fit: Refit, effects: Iterable[str] | None = None) -> Scores:
     >>> scores.candidates[scores.order[0]].label
     'sensor_lag(T)'
     """
-    return score_candidates(fit, fit.testable(candidates(fit.system, effects, fit.unrecorded)))
+    return score_candidates(fit, fit.testable(candidates(fit.system, effects, fit.drifting)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from ._refitting import exact as exact
 from ._refitting import extended as extended
 from ._refitting import filters as filters
 from ._refitting import fitted as fitted
+from ._refitting import only_heated as only_heated
 from ._refitting import refit as refit
 from ._refitting import relinearized as relinearized
 from ._sessions import SessionGain as SessionGain
@@ -23,10 +24,11 @@ from ._structure import Structure as Structure
 from ._structure import structure_of as structure_of
 from ._unknown_ambients import FoundAmbient as FoundAmbient
 from ._unknown_ambients import found_ambients as found_ambients
+from ._unknown_ambients import too_warm as too_warm
 from ._unknown_ambients import with_unknown_ambients as with_unknown_ambients
 from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
-           "fitted", "found_ambients", "refit", "relinearized", "sessions_of", "structure_of", "with_slow_part",
-           "with_unknown_ambients"]
+           "fitted", "found_ambients", "only_heated", "refit", "relinearized", "sessions_of", "structure_of",
+           "too_warm", "with_slow_part", "with_unknown_ambients"]

@@ -96,8 +96,9 @@ class Refit:
     @cached_property
     def basis(self) -> Array:
         """Orthonormal basis (m, r) of what the unknowns can explain."""
-        scale = np.linalg.norm(self.J, axis=0)
-        U, s, _ = np.linalg.svd(self.J / np.where(scale > 0, scale, 1.0), full_matrices=False)
+        J = self.J[:, ~self.structure.at_warmest(self.v)]
+        scale = np.linalg.norm(J, axis=0)
+        U, s, _ = np.linalg.svd(J / np.where(scale > 0, scale, 1.0), full_matrices=False)
         return U[:, s > _FLAT * s[0]]
 
     @cached_property
@@ -191,6 +192,11 @@ class Refit:
         """Whitened residuals of every record with its linearization; without the frequency responses."""
         of = dict(zip(map(id, self.paths), self.innovations(), strict=True))
         return [(of[id(path)], path) for path in self.records]
+
+    @property
+    def drifting(self) -> tuple[str, ...]:
+        """Ambients of which it is tried whether they swing or drift: none where they are held below the readings."""
+        return () if self.structure.only_heated else self.unrecorded
 
     @property
     def unrecorded(self) -> tuple[str, ...]:

@@ -175,6 +175,12 @@ def _exact(fit: Refit) -> Refit:
     return replace(start, levels=replace(fit.levels, disturbance=min(fit.levels.disturbance, 1.0), noise=noise))
 
 
+def only_heated(fit: Refit) -> Refit:
+    """The same structure refitted with unknown ambients no warmer than a machine that is only heated allows."""
+    structure = replace(fit.structure, only_heated=True)
+    return fitted(structure, np.clip(fit.v, *structure.bounds), fit.floor, NoiseScaling(1.0, {}))
+
+
 def relinearized(fit: Refit) -> Refit:
     """The same with linearizations of its own structure; `extended` keeps those of the structure it came from."""
     return replace(fit, paths=fit.structure.paths(fit.v))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...thermal import System
+from ..data import DataSet
 from ..effects import Candidate
 
 Array = NDArray[np.float64]
@@ -68,6 +69,21 @@ class Sessions:
             return system
         return system.with_parameters({name: system.parameter(name) + sigma * float(value)
                                        for name, sigma, value in zip(self.numbers, self.sigma, g, strict=True)})
+
+    def warmest(self, system: System, data: Sequence[DataSet]) -> Array:
+        """Upper bounds of the unknowns of all sessions, in units of their priors: of ambients, others have none.
+
+        Parameters
+        ----------
+        system : System
+            Common to all sessions.
+        data : sequence of DataSet
+            Records, of which each allows no room warmer than its own readings.
+        """
+        rooms = {f"ambients.{name}.temperature": room.temperature for name, room in system.ambients.items()}
+        return np.array([(one.warmest_room(system) - rooms[number]) / sigma if number in rooms else np.inf
+                         for one in data if one.n_sessions
+                         for number, sigma in zip(self.numbers, self.sigma, strict=True)])
 
     def hides(self, candidate: Candidate) -> str:
         """Why an effect cannot be distinguished from the sessions' gains; empty if it can."""

@@ -25,6 +25,7 @@ _KEPT = 2
 _STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
 _FARTHEST = 20.0  # standard deviations of an initial temperature
 _COLDEST, _HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
+_STILL = 1e-6  # standard deviations from a bound
 _COARSEST = 2.5  # times what is usual: a place off by more than half a lump belongs to another lump
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
@@ -60,6 +61,8 @@ class Structure:
     coarse : tuple of ndarray, shape (n, n_sensors, k)
         Changes of the readings of every data set by which a finer network may differ, from `coarse_columns`; their
         sizes are unknowns common to all data, with the prior 0 ± 1. Empty: the network is taken to be right.
+    only_heated : bool
+        Whether unknown ambients are no warmer than `warmest_room`.
     """
 
     base: System
@@ -70,6 +73,7 @@ class Structure:
     tolerance: float = 1e-4
     sessions: Sessions = Sessions()
     coarse: tuple[Array, ...] = ()
+    only_heated: bool = False
     _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -177,13 +181,12 @@ class Structure:
                 log = quantity.lower > 0
                 lower.append(np.log(quantity.lower) if log else quantity.lower)
                 upper.append(np.log(quantity.upper) if log else quantity.upper)
-        n_sessions = sum(one.n_sessions for one in self.data)
-        away = np.tile(self.sessions.reach, n_sessions)
+        away = np.tile(self.sessions.reach, sum(one.n_sessions for one in self.data))
         coldest, hottest = self._starts_within
         q = self.ranges.coordinates
         wide = np.full(self.n_coarse, _COARSEST)
         return (np.concatenate([q(self.ranges.lower), lower, -wide, coldest, -away]),
-                np.concatenate([q(self.ranges.upper), upper, wide, hottest, away]))
+                np.concatenate([q(self.ranges.upper), upper, wide, hottest, np.minimum(away, self._warmest if self.only_heated else np.inf)]))
 
     @property
     def _starts_within(self) -> tuple[Array, Array]:
@@ -194,6 +197,15 @@ class Structure:
                 coldest.append(np.clip((_COLDEST - start.mean) / start.sigma, -_FARTHEST, 0.0))
                 hottest.append(np.clip((_HOTTEST - start.mean) / start.sigma, 0.0, _FARTHEST))
         return np.concatenate(coldest), np.concatenate(hottest)
+
+    @cached_property
+    def _warmest(self) -> Array:
+        return self.sessions.warmest(self.base, self.data if self.only_heated else ())
+
+    def at_warmest(self, v: Array) -> NDArray[np.bool_]:
+        """Which unknowns are ambients as warm as they can be: these hold still under a test."""
+        others = np.full(v.size - self._warmest.size, np.inf)
+        return np.asarray(v >= np.concatenate([others, self._warmest]) - _STILL)
 
     def system(self, v: Array) -> System:
         """Nominal system at these parameters with the effects added."""

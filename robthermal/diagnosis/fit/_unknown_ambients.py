@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -29,6 +30,8 @@ class FoundAmbient:
         Estimate, and its standard deviation: that of the prior, 5 K, where the readings say nothing [K].
     declared : float
         Temperature that the system says [K], the center of the prior.
+    warmest : float
+        Temperature [K] that it cannot exceed beside a machine that is only heated; infinite where nothing is known.
     """
 
     ambient: str
@@ -36,6 +39,7 @@ class FoundAmbient:
     value: float
     std: float
     declared: float
+    warmest: float = math.inf
 
 
 def with_unknown_ambients(sessions: Sessions, system: System, records: Sequence[RecordData],
@@ -80,5 +84,16 @@ def found_ambients(fit: Refit) -> tuple[FoundAmbient, ...]:
             if name is not None and name not in one.record.input_names:
                 declared = structure.base.ambients[name].temperature
                 found.append(FoundAmbient(name, one.label, declared + sigma * float(value), sigma * float(deviation),
-                                          declared))
+                                          declared, one.warmest_room(structure.base)))
     return tuple(found)
+
+
+def too_warm(fit: Refit) -> bool:
+    """Whether an ambient that was not recorded comes out warmer than a machine can have that is only heated.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit to the records, with ambients free.
+    """
+    return not fit.structure.only_heated and any(one.value > one.warmest for one in found_ambients(fit))

@@ -15,6 +15,7 @@ from ...errors import Diverged, InputError
 from ..effects import Candidate
 from ..evidence import BIC_GAP, Scores, Twin, promised
 from ..fit import Refit, extended
+from ._implausible import implausible
 from ._ramp import as_ramp
 from ._scan import retried, scanned
 from ._starts import BEHIND, Origin, in_reach, started
@@ -168,7 +169,15 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
                                     scores.twins(i), best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    return ShortList(fit, tuple(_reconsidered(fit, map(finished, competitive(entries)), tried)), failed)
+    likely = []
+    for entry in _reconsidered(fit, map(finished, competitive(entries)), tried):
+        why = implausible(entry.candidate, entry.fit, {name: value for name, (value, _) in entry.values.items()},
+                          entry.twins)
+        if why:
+            failed[entry.candidate.key] = why
+        else:
+            likely.append(entry)
+    return ShortList(fit, tuple(likely), failed)
 
 
 def beside(short: ShortList, found: Entry) -> ShortList:

@@ -1,0 +1,46 @@
+"""How warm a room that was not recorded can have been, beside a machine that is only heated.
+
+With heats that are never negative and one ambient T, a passive network that has never been colder than T never gets
+colder than T: at the coldest lump every conduction, convection and radiation term is at least that of a lump at T. So
+T is at most the coolest reading, but for what the thermometer reads wrong and for how fast the room itself can have
+warmed up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...fitting import Data
+from ...thermal import System
+
+SLACK = 1.0
+_COOLEST = 5.0  # per cent of the readings: noise makes single ones colder
+
+
+def warmest_room(system: System, one: Data) -> float:
+    """Upper bound of an ambient's temperature [K] that a record allows; infinite where it allows no statement.
+
+    That is the case with a module, a heat that may be negative, several ambients, or no thermometer.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system of the record.
+    one : Data
+        Readings and recorded inputs.
+    """
+    if len(system.ambients) != 1 or not _only_heated(system, one):
+        return np.inf
+    readings = [values[np.isfinite(values)] for name, values in zip(one.sensors, one.readings.T, strict=True)
+                if name in system.thermometers]
+    cool = [float(np.percentile(values, _COOLEST)) for values in readings if values.size]
+    return min(cool) + SLACK if cool else np.inf
+
+
+def _only_heated(system: System, one: Data) -> bool:
+    """Whether no heat into a lump was negative in the record."""
+    if system.modules or any(lump.heat < 0 or lump.periodic or lump.condensation for lump in system.lumps.values()):
+        return False
+    inputs = dict(zip(one.record.input_names, np.asarray(one.record.inputs).T, strict=True))
+    return all(part.gain > 0 and name in inputs and float(np.min(inputs[name])) >= 0.0
+               for name, part in system.inputs.items())

@@ -1,0 +1,41 @@
+"""Refitted candidates that no machine shows: a room faster than rooms are, a heat "periodic" within less than a period.
+
+Bounds of single quantities cannot say this. Such a candidate is an approximation of something else, and as flexible as
+it is it often beats the effect that is really there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from ..effects import AMBIENT_DRIFT, Candidate
+from ..evidence import Twin
+from ..fit import Refit
+
+FASTEST = 3.0 / 60.0  # K/s: air that is cooled or heated by cycling equipment changes by 1 to 2 K per minute
+
+
+def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], twins: Sequence[Twin]) -> str:
+    """Why a refitted candidate is not what it is called; empty if it may be.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        What was added last.
+    fit : Refit
+        Fit with it.
+    values : mapping
+        Quantities of the candidate by name.
+    twins : sequence of Twin
+        Effects with the same change of every reading.
+    """
+    if not candidate.effect.paired or not fit.records:
+        return ""
+    if candidate.effect.name == AMBIENT_DRIFT:
+        rate = 2.0 * math.pi * abs(values["difference"]) / values["period"]
+        return "" if rate <= FASTEST else f"{candidate.where[0]} would change by {60.0 * rate:.2g} K per minute"
+    span = max(path.span for path in fit.records)
+    if values["period"] <= span or any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
+        return ""
+    return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
