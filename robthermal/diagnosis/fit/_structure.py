@@ -18,16 +18,15 @@ from ...thermal import System
 from ..data import DataSet
 from ..effects import Candidate
 from ..path import Linearized, Unknowns, linearize
+from ._derived import STEP, derives, moved_by
 from ._sessions import Sessions
 
 Array = NDArray[np.float64]
 _KEPT = 2
-_STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
 _FARTHEST = 20.0  # standard deviations of an initial temperature
 _COLDEST, _HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
 _STILL = 1e-6  # standard deviations from a bound
 _COARSEST = 2.5  # times what is usual: a place off by more than half a lump belongs to another lump
-_UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
 @dataclass(eq=False)
@@ -183,10 +182,11 @@ class Structure:
                 upper.append(np.log(quantity.upper) if log else quantity.upper)
         away = np.tile(self.sessions.reach, sum(one.n_sessions for one in self.data))
         coldest, hottest = self._starts_within
+        warmest = np.minimum(away, self._warmest) if self.only_heated else away
         q = self.ranges.coordinates
         wide = np.full(self.n_coarse, _COARSEST)
         return (np.concatenate([q(self.ranges.lower), lower, -wide, coldest, -away]),
-                np.concatenate([q(self.ranges.upper), upper, wide, hottest, np.minimum(away, self._warmest if self.only_heated else np.inf)]))
+                np.concatenate([q(self.ranges.upper), upper, wide, hottest, warmest]))
 
     @property
     def _starts_within(self) -> tuple[Array, Array]:
@@ -267,7 +267,7 @@ class Structure:
         """The unknowns as every data set sees them."""
         names, chain = self._chain(v)
         n, coarse = self.n_parameters + self.n_effects, slice(self.n_common - self.n_coarse, self.n_common)
-        steps = _STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
+        steps = STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
         at, gain_at = self.n_common, v.size - (self.n_own - self.n_starts)
         for one, start in zip(self.data, self.starts, strict=True):
             n_gains = self.sessions.n_free * one.n_sessions
@@ -359,42 +359,21 @@ class Structure:
         for group, slope in zip(self.ranges.members, slopes, strict=True):
             columns.append({name: float(slope) for name in group})
         if self.n_effects:
-            values = here.parameters
+            numbers, values = (lambda at: self.system(at).parameters), here.parameters
             for i in range(p, n):
-                moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-6)
+                moved, step = v.copy(), STEP * max(abs(v[i]), 1e-6)
                 step = -step if v[i] + step > self.bounds[1][i] else step
                 moved[i] += step
                 other = self.system(moved).parameters
                 columns.append({name: (other[name] - values[name]) / step for name in values
                                 if other[name] != values[name]})
-            if _derives(self, v, values, columns[:p]):
+            if derives(numbers, v, values, columns[:p]):
                 for i in range(p):  # what an effect derives from a nominal parameter moves with it
-                    columns[i] = _moved_by(self, v, i, values, columns[i])
+                    columns[i] = moved_by(numbers, v, i, values, columns[i])
         for column in columns:
             names |= dict.fromkeys(column)
         return list(names), np.array([[column.get(name, 0.0) for column in columns] for name in names]
                                      ).reshape(len(names), n)
-
-
-def _derives(structure: Structure, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
-    """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?"""
-    p = len(columns)
-    steps = _STEP * np.maximum(np.abs(v[:p]), 1e-3)
-    moved = structure.system(np.concatenate([v[:p] + steps, v[p:]])).parameters
-    known = dict.fromkeys(values, 0.0)
-    for step, column in zip(steps, columns, strict=True):
-        for name, slope in column.items():
-            known[name] += float(step) * slope
-    changes = {name: moved[name] - value for name, value in values.items()}
-    return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
-
-
-def _moved_by(structure: Structure, v: Array, i: int, values: dict[str, float], own: dict[str, float]
-              ) -> dict[str, float]:
-    moved, step = v.copy(), _STEP * max(abs(v[i]), 1e-3)
-    moved[i] += step
-    other = structure.system(moved).parameters
-    return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
 
 
 def structure_of(system: System, ranges: Ranges, data: Sequence[DataSet], starts: Sequence[Initial],

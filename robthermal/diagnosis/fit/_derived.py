@@ -1,0 +1,60 @@
+"""Numbers of a system that an effect derives from nominal parameters: they move with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Numbers = Callable[[Array], dict[str, float]]
+STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+_UNLIKE = 0.01  # of a change: more than the curvature of a step makes
+
+
+def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
+    """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?
+
+    Parameters
+    ----------
+    numbers : callable
+        All numbers of the system at some unknowns.
+    v : ndarray
+        Unknowns of the fit, nominal parameters first.
+    values : dict
+        Numbers of the system at v.
+    columns : list of dict
+        Derivatives of the numbers that each parameter is known to move.
+    """
+    p = len(columns)
+    steps = STEP * np.maximum(np.abs(v[:p]), 1e-3)
+    moved = numbers(np.concatenate([v[:p] + steps, v[p:]]))
+    known = dict.fromkeys(values, 0.0)
+    for step, column in zip(steps, columns, strict=True):
+        for name, slope in column.items():
+            known[name] += float(step) * slope
+    changes = {name: moved[name] - value for name, value in values.items()}
+    return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
+
+
+def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: dict[str, float]) -> dict[str, float]:
+    """Derivatives of all numbers that move with one unknown; those that are known are taken.
+
+    Parameters
+    ----------
+    numbers : callable
+        All numbers of the system at some unknowns.
+    v : ndarray
+        Unknowns of the fit.
+    i : int
+        Place of the unknown that moves.
+    values : dict
+        Numbers of the system at v.
+    own : dict
+        Derivatives that are known.
+    """
+    moved, step = v.copy(), STEP * max(abs(v[i]), 1e-3)
+    moved[i] += step
+    other = numbers(moved)
+    return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
