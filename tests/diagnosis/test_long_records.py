@@ -9,8 +9,12 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.diagnosis.effects import candidates
+from robthermal.diagnosis.evidence import _fewer_trials
 from robthermal.diagnosis.fit import ENOUGH, NoiseScaling, Refit, Structure, exact, fitted
+from robthermal.diagnosis.fit._descent import turned
 from robthermal.diagnosis.fit._refitting import _fitted
+from robthermal.diagnosis.path import LinearizedRecord, Whitener, averaged_record
 from robthermal.diagnosis.path._riccati import filtered, spread
 from robthermal.diagnosis.plan import trial_conditions
 
@@ -115,3 +119,50 @@ def test_a_plan_after_a_long_record_has_two_thousand_samples(heated: Refit) -> N
 
 def test_the_fit_with_the_network_taken_to_be_right_is_made_once(heated: Refit) -> None:
     assert exact(heated) is exact(heated)
+
+
+@pytest.mark.parametrize(("m", "p"), [(3, 6), (700, 5), (1100, 20)])
+def test_rows_turned_piece_by_piece_leave_every_distance_as_it_is(m: int, p: int) -> None:
+    rng = np.random.default_rng(m)
+    J, z, a = rng.standard_normal((m, p)), rng.standard_normal(m), rng.standard_normal((p, 4))
+    rows, right = turned(J, z)
+    assert rows.shape == (p + 1, p)
+    assert np.linalg.norm(right[:, None] - rows @ a, axis=0) == pytest.approx(
+        np.linalg.norm(z[:, None] - J @ a, axis=0), rel=1e-12)
+    assert rows.T @ right == pytest.approx(J.T @ z, rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize("length", [1, 7])  # 5000 samples are no whole number of blocks of 7
+def test_averages_of_constant_heat_are_those_of_its_innovations(heated: Refit, length: int) -> None:
+    (path,), (white,) = heated.paths, heated.whiteners
+    assert isinstance(path, LinearizedRecord) and isinstance(white, Whitener) and white.gains.any()
+    averaged = averaged_record(path, white, length)
+    heat = [one for one in candidates(heated.system, ["heat_source"]) if one.where == ("bar",)]
+    z = heated.whiten([path.columns(heat)])[:5000]
+    rows = -(-5000 // length)
+    mean = np.pad(z, ((0, rows * length - 5000), (0, 0))).reshape(rows, length).sum(axis=1) / np.sqrt(length)
+    found = averaged.columns(heat)
+    assert found is not None
+    assert found[:-1, 0] == pytest.approx(mean[:-1], rel=1e-8)  # the heat fills only a part of the last block
+    assert averaged.of(z[:, None, :])[:, 0] == pytest.approx(mean, rel=1e-12)
+    lag = candidates(heated.system, ["sensor_lag"])[0]
+    assert averaged.columns([replace(lag, shape={"time_constant": 30.0})]) is None
+
+
+@pytest.mark.parametrize("name", ["periodic_load", "conductance_step"])
+def test_a_long_record_scores_the_best_of_all_trials(heated: Refit, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scored: list[int] = []
+    columns = LinearizedRecord.columns
+    monkeypatch.setattr(LinearizedRecord, "columns", lambda self, trials: scored.append(len(trials))
+                        or columns(self, trials))
+    rng = np.random.default_rng(5)
+    noisy = replace(heated, z=heated.z + 0.3 * rng.standard_normal(heated.z.size))  # any residual will do
+    tried = candidates(heated.system, [name])
+    few = rt.diagnosis.evidence.score_candidates(noisy, tried)
+    short, scored[:] = sum(scored), []
+    monkeypatch.setattr(_fewer_trials, "_MANY", 10**6)
+    every = rt.diagnosis.evidence.score_candidates(noisy, tried)
+    assert short <= 12 < sum(scored) and few.n_trials == every.n_trials > 20
+    assert few.candidates[0].shape == pytest.approx(every.candidates[0].shape)
+    assert few.statistic == pytest.approx(every.statistic, rel=1e-9)
+    assert few.p_value == pytest.approx(every.p_value, rel=1e-9)

@@ -16,6 +16,7 @@ from ..._drawing import axes_for
 from ..._pandas import pd
 from ..effects import Candidate, candidates
 from ..fit import Refit
+from ._fewer_trials import FewerTrials
 from ._frequency_tails import inflation, tail
 from ._twin import Twin, possible_size
 
@@ -214,13 +215,14 @@ class _Tried:
     identifiability: Array
     own: Array  # length of the projected signature; 0 where nothing is left of it
     unit: Array
-    n_trials: int
 
 
 def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     """Score these candidates, each at the best of its trial values."""
-    groups = [_tried(fit, trials) for trials in _together(fit, tested)]
-    n_trials = sum(group.n_trials for group in groups)
+    fewer = FewerTrials(fit)
+    chosen = [fewer.of(candidate) for candidate in tested]
+    n_trials = sum(count for _, count in chosen)
+    groups = [_tried(fit, trials) for trials in _together([trials for trials, _ in chosen])]
 
     def joined(name: str) -> Any:
         return np.concatenate([getattr(group, name) for group in groups], axis=-1)
@@ -238,11 +240,11 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
                   joined("identifiability"), limit, unit, n_trials)
 
 
-def _together(fit: Refit, tested: Sequence[Candidate]) -> Iterator[list[Trial]]:
+def _together(tested: Sequence[Sequence[Candidate]]) -> Iterator[list[Trial]]:
     """Trials of some candidates at a time: all signatures of a long record at once would not fit into the memory."""
     some: list[Trial] = []
-    for number, candidate in enumerate(tested):
-        some += [(number, trial) for trial in candidate.trials(fit.paths[0])]
+    for number, trials in enumerate(tested):
+        some += [(number, trial) for trial in trials]
         if len(some) >= _TOGETHER:
             yield some
             some = []
@@ -275,7 +277,7 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
     best = _best_of(trials, statistic, size, possible)
     return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best],
                   (possible & visible)[best], identifiability[best], np.where(visible, own, 0.0)[best],
-                  unit[:, best], len(trials))
+                  unit[:, best])
 
 
 def promising(fit: Refit, scores: Scores) -> bool:

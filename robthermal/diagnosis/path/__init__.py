@@ -1,5 +1,7 @@
 """The system linearized along a record, or beside a frequency response, and the filters that whiten residuals."""
 
+from ._averaged import AveragedRecord as AveragedRecord
+from ._averaged import averaged_record as averaged_record
 from ._coarseness import coarse_names as coarse_names
 from ._heat_splines import N_SPLINES as N_SPLINES
 from ._heat_splines import heat_splines as heat_splines
@@ -19,6 +21,7 @@ from ._whitening import heat_spread as heat_spread
 from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
-__all__ = ["Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise", "Unknowns", "White",
-           "Whitener", "coarse_names", "gathered", "heat_splines", "heat_spread", "linearize", "linearized_record",
-           "linearized_records", "linearized_response", "settled_cost", "whitener"]
+__all__ = ["AveragedRecord", "Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise",
+           "Unknowns", "White", "Whitener", "averaged_record", "coarse_names", "gathered", "heat_splines",
+           "heat_spread", "linearize", "linearized_record", "linearized_records", "linearized_response",
+           "settled_cost", "whitener"]

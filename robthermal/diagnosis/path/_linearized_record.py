@@ -296,6 +296,12 @@ class LinearizedRecord:
         """A, C and M of the middle: their means over the samples."""
         return self.steps[0].mean(axis=0), self.C.mean(axis=0), self.M.mean(axis=0)
 
+    @cached_property
+    def own_heat(self) -> tuple[Array, Array]:
+        """Heat of the system as it is at the start and at the end of every sample (n, n_lumps) [W]."""
+        start, end = (np.asarray(self.equations.heat(x, self.u), np.float64) for x in (self.x, self.end))
+        return start, end
+
     def heat_of(self, system: System) -> tuple[Array, Array]:
         """Extra heat of a changed system, at the start and at the end of every sample.
 
@@ -309,9 +315,8 @@ class LinearizedRecord:
         tuple of ndarray, shape (n, n_lumps)
             [W].
         """
-        other = Equations(system)
-        return (other.heat(self.x, self.u) - self.equations.heat(self.x, self.u),
-                other.heat(self.end, self.u) - self.equations.heat(self.end, self.u))
+        other, (start, end) = Equations(system), self.own_heat
+        return other.heat(self.x, self.u) - start, other.heat(self.end, self.u) - end
 
     def readings_of(self, responses: list[Response]) -> Array:
         """Change of the record's sensors that each response causes.

@@ -64,6 +64,10 @@ class RecordContext(TrialContext, Protocol):
     def equations(self) -> Equations:
         """Equations of the system."""
 
+    @property
+    def own_heat(self) -> tuple[Array, Array]:
+        """Heat of the system as it is at the start and at the end of every sample (n, n_lumps) [W]."""
+
     def heat_of(self, system: System) -> tuple[Array, Array]:
         """Extra heat of a changed system at the start and at the end of every sample (n, n_lumps) [W].
 

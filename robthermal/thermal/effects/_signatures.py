@@ -94,9 +94,8 @@ def driven_by(record: RecordContext, name: str, v: Array, size: float) -> Respon
     """Heat per unit of size when an input has the mean value v (n,) over every sample instead of its own."""
     u = record.u.copy()
     u[:, record.system.exogenous_names.index(name)] = v
-    heat = record.equations.heat
-    return Response(heat=((heat(record.x, u) - heat(record.x, record.u)) / size,
-                          (heat(record.end, u) - heat(record.end, record.u)) / size))
+    heat, (start, end) = record.equations.heat, record.own_heat
+    return Response(heat=((heat(record.x, u) - start) / size, (heat(record.end, u) - end) / size))
 
 
 def reading(record: RecordContext, sensor: str, change: Array) -> Response:
