@@ -33,7 +33,7 @@ class Resolving:
     >>> import robthermal as rt
     >>> what = rt.diagnosis.Resolving("x3", "", "Q1", 200.0, 3000.0)
     >>> print(what)
-    What would resolve it: x3 split in two; Q1 alone, with periods of 2e+02 to 3e+03 s.
+    What would resolve it: x3 split in two; Q1 alone, with periods of 200 to 3000 s.
     """
 
     lump: str
@@ -49,7 +49,7 @@ class Resolving:
             said.append(f"a sensor at {self.sensor}" + (", which explains it as well" if self.sensor in self.others else
                                                        ""))
         if self.input:
-            said.append(f"{self.input} alone, with periods of {self.shortest:.2g} to {self.longest:.2g} s")
+            said.append(f"{self.input} alone, with periods of {_round(self.shortest)} to {_round(self.longest)} s")
         return f"What would resolve it: {'; '.join(said)}."
 
     def to_dict(self) -> dict[str, Any]:
@@ -88,3 +88,8 @@ def _nearest_input(system: System, lump: str) -> str:
     drives |= {name: (one.hot, one.cold) for name, one in system.modules.items()}
     nearest = system.nearest_lumps(dict.fromkeys(place for places in drives.values() for place in places)).get(lump)
     return next((name for name, places in drives.items() if nearest in places), "")
+
+
+def _round(seconds: float) -> str:
+    """Two digits, without an exponent up to a million."""
+    return f"{float(f'{seconds:.2g}'):g}"
