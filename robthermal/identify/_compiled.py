@@ -103,34 +103,44 @@ class CompiledKernel:
         if basis.size > _MOST_SIZE or self._n_u * basis.size + self._n_y > _MOST_COLUMNS:
             raise ValueError("more functions or columns than the compiled kernel holds")
         self._n_bins = spectra[0].n_bins
-        self._U = [_checked(s.U, (self._n_u, self._n_bins)) for s in spectra]
-        self._Y = [_checked(s.Y, (self._n_y, self._n_bins)) for s in spectra]
+        self._U = [_in_rows(s.U, (self._n_u, self._n_bins)) for s in spectra]
+        self._Y = [_in_rows(s.Y, (self._n_y, self._n_bins)) for s in spectra]
         half, size, points = basis.half_width, basis.size, basis.n_points  # functions are even or odd: r >= 0 is enough
         self._products = _checked(basis.real_products()[:, half:].T, (half + 1, 2 * size - 1), float)
         self._functions = _checked(basis.real_functions()[:, half:].T, (half + 1, size), float)
         self._ones = np.ones((half + 1, 1))
         self._poles = _checked(basis.factors_of_denominator(), (basis.poles.size, 2))
-        self._strides = np.full(len(spectra), self._n_bins, dtype=np.int64)
+        pairs = zip(self._U, self._Y, strict=True)
+        self._strides = np.array([[one.strides[0] // 16 for one in pair] for pair in pairs], dtype=np.int64)
         self.degrees_of_freedom = len(spectra) * (points - size) - self._n_u * size
 
-    def solve(self, start: int, stop: int, *, full_noise: bool) -> BlockFit:
-        """Windows centered at bins start ... stop-1, counted from 1; all of them must fit between the edges."""
+    def solve(self, start: int, stop: int, *, full_noise: bool, into: BlockFit | None = None) -> BlockFit:
+        """Windows centered at bins start ... stop-1, counted from 1; all of them must fit between the edges.
+
+        The results are written `into` arrays of the caller, parts of rows of equal length, or into new ones.
+        """
         half, count, n_u, n_y = self._basis.half_width, stop - start, self._n_u, self._n_y
         first = start - 1 - half
         if count < 1 or first < 0 or stop - 1 + half > self._n_bins:
             raise ValueError("windows reach beyond the spectra")
         turn = self._basis.half_turns(start - half, stop + half) if len(self._poles) else np.empty(0, dtype=complex)
-        fit = BlockFit(
+        fit = into or BlockFit(
             response=np.empty((n_y, n_u, count), dtype=complex),
             gram=np.empty((n_u, n_u, count), dtype=complex),
             noise=np.empty((n_y, n_y, count) if full_noise else (n_y, count), dtype=complex if full_noise else float),
             doubtful=np.empty(count, dtype=bool),
+            variance=np.empty((n_y, count)) if full_noise else None,
         )
-        variance = np.empty((n_y, count)) if full_noise else fit.noise
+        stride = fit.response.strides[0] // (16 * n_u)
+        variance = np.asarray(fit.variance) if full_noise else fit.noise
+        for one, shape, kind in ((fit.response, (n_y, n_u), complex), (fit.gram, (n_u, n_u), complex),
+                                 (fit.noise, (n_y, n_y) if full_noise else (n_y,), complex if full_noise else float),
+                                 (variance, (n_y,), float), (fit.doubtful, (), bool)):
+            _check_place(one, (*shape, count), kind, stride)
         pointers = [(ctypes.c_void_p * len(channels))(*(one[:, first:].ctypes.data for one in channels))
                     for channels in (self._U, self._Y)]
         problem = _Problem(
-            len(self._U), n_u, n_y, self._basis.size, half, len(self._poles), count, count,
+            len(self._U), n_u, n_y, self._basis.size, half, len(self._poles), count, stride,
             *(ctypes.addressof(one) for one in pointers), self._strides.ctypes.data,
             turn.ctypes.data, self._poles.ctypes.data,
             self._products.ctypes.data, self._functions.ctypes.data, self._ones.ctypes.data,
@@ -155,3 +165,19 @@ def _checked(values: Array, shape: tuple[int, ...], kind: type = complex) -> Arr
     if found.shape != shape:
         raise ValueError(f"an array of shape {found.shape} where {shape} is needed")
     return found
+
+
+def _in_rows(values: Array, shape: tuple[int, int]) -> Array:
+    """As `_checked`, of complex numbers; rows may lie further apart than they are long."""
+    apart = values.dtype == complex and values.shape == shape and values.strides[1] == 16 and not values.strides[0] % 16
+    return values if apart else _checked(values, shape)
+
+
+def _check_place(values: Array, shape: tuple[int, ...], kind: type, stride: int) -> None:
+    """Whether results can be written to `values`: rows side by side in order, `stride` numbers from one to the next."""
+    size, place = np.dtype(kind).itemsize, [1]
+    for length in shape[-2:0:-1]:
+        place.insert(0, place[0] * length)
+    expected = (*(size * stride * each for each in place), size) if len(shape) > 1 else (size,)
+    if values.dtype != kind or values.shape != shape or values.strides != expected or not values.flags.writeable:
+        raise ValueError(f"results {values.shape} of {values.dtype} do not lie where they are written")

@@ -33,6 +33,7 @@ class BlockFit:
     gram: Array
     noise: Array
     doubtful: Array  # (B,) bool: to be solved again with a rank decision
+    variance: Array | None = None  # (n_y, B): the diagonal, where it was written too
 
 
 class Kernel:

@@ -13,8 +13,8 @@ from robthermal._arrays import Array
 from robthermal.errors import InputError
 
 from ._basis import LocalBasis
-from ._compiled import interior_kernel
-from ._kernel import Kernel
+from ._compiled import CompiledKernel, interior_kernel
+from ._kernel import BlockFit, Kernel
 from ._records import Spectrum
 from ._threads import run_all
 from ._windows import points_per_record, regression, rows_of, solve_windows
@@ -158,14 +158,19 @@ class LocalEstimate:
 
         def solve(a: int) -> None:  # always whole blocks of the record: a bin has the same digits in every request
             b = min(a + block, last)
-            fit = normal.solve(a, b, full_noise=full)
-            if fit.doubtful.mean() > _FEW_WEAK:
-                fit = kernel.solve(a, b, chunk=chunk, full_noise=full)
             low, high = max(a, start), min(b, start + exact.size)
             part, mine = slice(low - start, high - start), slice(low - a, high - a)
-            found.response[..., part], found.gram[..., part] = fit.response[..., mine], fit.gram[..., mine]
-            _store_noise(found, part, fit.noise[..., mine])
-            exact[part] = fit.doubtful[mine]
+            if isinstance(normal, CompiledKernel) and high - low == b - a:
+                there = _place(found, exact, part)
+                fit = normal.solve(a, b, full_noise=full, into=there)
+            else:
+                there, fit = None, normal.solve(a, b, full_noise=full)
+            if fit.doubtful.mean() > _FEW_WEAK:
+                there, fit = None, kernel.solve(a, b, chunk=chunk, full_noise=full)
+            if there is None:
+                found.response[..., part], found.gram[..., part] = fit.response[..., mine], fit.gram[..., mine]
+                _store_noise(found, part, fit.noise[..., mine])
+                exact[part] = fit.doubtful[mine]
 
         before = max(0, start - first) // block * block
         starts = range(first + before, min(last, start + exact.size), block)
@@ -176,6 +181,13 @@ class LocalEstimate:
         found.response[..., place], found.gram[..., place] = fit.response, fit.gram
         _store_noise(found, place, fit.noise)
         found.degrees_of_freedom[place] = fit.degrees_of_freedom
+
+
+def _place(found: LocalArrays, exact: Array, part: slice) -> BlockFit:
+    """Where the results of some bins belong."""
+    variance = found.variance[:, part]
+    noise = variance if found.noise is None else found.noise[..., part]
+    return BlockFit(found.response[..., part], found.gram[..., part], noise, exact[part], variance)
 
 
 def _store_noise(found: LocalArrays, part: Any, noise: Array) -> None:

@@ -18,7 +18,7 @@ typedef struct {
     int64_t n_records, n_u, n_y, size, half, n_poles;
     int64_t count, stride;                            /* windows; from one row of a result to the next */
     const complex_number *const *U, *const *Y;        /* of every record, (n_u, .) and (n_y, .), count + 2 half bins */
-    const int64_t *strides;                           /* of every record: from one channel to the next */
+    const int64_t (*strides)[2];                      /* of every record: from one channel of U, of Y to the next */
     const complex_number *turn;                       /* (count + 2 half,) exp(j theta/2) of every bin, if there are poles */
     const double (*poles)[4];                         /* of every pole alpha and beta: complex numbers */
     const double *products, *functions, *ones;        /* (half+1, 2 size-1), (half+1, size), (half+1, 1): r >= 0 */
@@ -108,8 +108,8 @@ INLINE void prepare(const problem *q, const int n_u, const int n_y, const int64_
     for (int64_t record = 0; record < q->n_records; record++) {
         signal *const own = b.of_records + record * (2 * n + n * n), *const turned = own + n, *const pairs = own + 2 * n;
         for (int a = 0; a < n; a++) {
-            const complex_number *from = a < n_u ? q->U[record] + a * q->strides[record]
-                                                 : q->Y[record] + (a - n_u) * q->strides[record];
+            const complex_number *from = a < n_u ? q->U[record] + a * q->strides[record][0]
+                                                 : q->Y[record] + (a - n_u) * q->strides[record][1];
             side_by_side(from, at, length, own[a]);
             if (!q->n_poles) {
                 turned[a] = own[a];

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 
 from robthermal._arrays import Array
 from robthermal.errors import InputError
@@ -97,19 +96,22 @@ def mean_inputs(records: Sequence[Record]) -> dict[str, float]:
 
 def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: str = "inputs") -> None:
     """Refuse signals (each (n, n_u), one per experiment) that are constant, or combinations of each other."""
+    gram, varies = np.zeros((len(names), len(names))), np.zeros(len(names), dtype=bool)
+    for signal in signals:
+        centered = np.empty(signal.shape[::-1])  # channel by channel: neighboring numbers lie side by side
+        for row, column in zip(centered, signal.T, strict=True):
+            np.subtract(column, column.mean(), out=row)
+        own = centered @ centered.T
+        gram += own
+        varies |= np.sqrt(np.diag(own) / len(signal)) > _SILENT * _largest(signal)
     for i, name in enumerate(names):
-        columns = [signal[:, i] for signal in signals]
-        if all(_is_constant(column) for column in columns):
+        if not varies[i]:
             raise InputError(
-                f"{name!r} is constant ({columns[0][0]:g} throughout): it does not excite the system",
+                f"{name!r} is constant ({signals[0][0, i]:g} throughout): it does not excite the system",
                 where=where,
                 expected="a signal that varies in at least one record",
                 remedy="Excite it (multisine, noise, staircase), or leave it out with record.select(inputs=[...]).",
             )
-    gram = np.zeros((len(names), len(names)))
-    for signal in signals:
-        centered = signal - [column.mean() for column in signal.T]
-        gram += centered.T @ centered
     scale = np.sqrt(np.diag(gram))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     if values[0] < _COPIES:
@@ -121,10 +123,6 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
             expected="inputs that vary independently",
             remedy="Excite them with different phases, or in separate records passed as a list.",
         )
-
-
-def _is_constant(column: Array) -> bool:
-    return bool(column.std() <= _SILENT * np.abs(column).max())
 
 
 @dataclass(frozen=True)
@@ -142,29 +140,30 @@ class Spectrum:
 
 def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
     """Spectra of the deviations from the mean; input bins that hold rounding errors only are set to exactly zero."""
-    U, Y = _half_spectrum(inputs), _half_spectrum(outputs)
-    for row, level in zip(U, rounding_level(inputs), strict=True):
-        row[np.abs(row) <= level] = 0.0
-    return Spectrum(U=U, Y=Y, n_samples=inputs.shape[0])
+    n, n_u, n_y = len(inputs), inputs.shape[1], outputs.shape[1]
+    whole = np.empty((n_u + n_y, n // 2 + 1), dtype=complex)
+    spectra = whole[:, 1 : (n - 1) // 2 + 1]
+    levels = rounding_level(inputs)
+
+    def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
+        column = inputs[:, c] if c < n_u else outputs[:, c - n_u]
+        np.fft.rfft(column - column.mean(), norm="ortho", out=whole[c])
+        if c < n_u:
+            row = spectra[c]
+            row[np.abs(row) <= levels[c]] = 0.0
+
+    run_all(transform, range(n_u + n_y), worth=_SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
+    return Spectrum(U=spectra[:n_u], Y=spectra[n_u:], n_samples=n)
 
 
 def rounding_level(signals: Array) -> Array:
     """Size of a spectral line, per channel of `signals` (n, channels), that may be nothing but rounding."""
-    largest = [max(column.max(), -column.min()) for column in signals.T]  # by column: many times faster than axis=0
-    return np.asarray(_LINE_SILENT * np.finfo(float).eps * np.array(largest))
+    return np.asarray(_LINE_SILENT * np.finfo(float).eps * _largest(signals))
 
 
-def _half_spectrum(signals: Array) -> Array:
-    n, channels = signals.shape
-    bins = (n - 1) // 2
-    half = np.empty((channels, bins), dtype=complex)
-
-    def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
-        column = signals[:, c]
-        half[c] = scipy.fft.rfft(column - column.mean(), norm="ortho")[1 : bins + 1]
-
-    run_all(transform, range(channels), worth=channels > 1 and _SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
-    return half
+def _largest(signals: Array) -> Array:
+    """Largest absolute value per channel of `signals` (n, channels); by column: many times faster than axis=0."""
+    return np.array([max(column.max(), -column.min()) for column in signals.T])
 
 
 def rounding_of(signals: Sequence[Array]) -> Array:

@@ -14,6 +14,7 @@ import pytest
 from robthermal.identify import _compiled
 from robthermal.identify._basis import LocalBasis
 from robthermal.identify._compiled import CompiledKernel, interior_kernel, library, library_name
+from robthermal.identify._kernel import BlockFit
 from robthermal.identify._normal import NormalKernel
 from robthermal.identify._records import Spectrum
 
@@ -101,6 +102,42 @@ def test_wrong_sizes_are_exceptions(built: _compiled.Solver) -> None:
             CompiledKernel(wrong, basis, built)
     with pytest.raises(ValueError, match="more functions or columns"):
         CompiledKernel(spectra, basis_of(14, 5, ()), built)
+
+
+def places(n_u: int, n_y: int, count: int, full: bool) -> dict[str, Any]:
+    """Arrays for the results of more bins than are asked for, filled with not-a-number."""
+    noise = np.full((n_y, n_y, count) if full else (n_y, count), np.nan, dtype=complex if full else float)
+    return {"response": np.full((n_y, n_u, count), np.nan, dtype=complex), "noise": noise,
+            "gram": np.full((n_u, n_u, count), np.nan, dtype=complex), "doubtful": np.ones(count, dtype=bool),
+            "variance": np.full((n_y, count), np.nan)}
+
+
+@pytest.mark.parametrize("full", [True, False])
+@pytest.mark.parametrize("count", [1, 3, 700])
+def test_results_are_written_where_they_belong_and_nowhere_else(full: bool, count: int, built: _compiled.Solver) -> None:
+    spectra, basis = spectra_of(2, 3, 1), basis_of(9, 2, ())
+    kernel = CompiledKernel(spectra, basis, built)
+    there, apart = places(2, 3, 1000, full), kernel.solve(50, 50 + count, full_noise=full)
+    part = BlockFit(**{name: values[..., 200 : 200 + count] for name, values in there.items()})
+    assert kernel.solve(50, 50 + count, full_noise=full, into=part) is part
+    for name in ("response", "gram", "noise", "doubtful"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(apart, name))
+        outside = np.delete(there[name], np.s_[200 : 200 + count], axis=-1)
+        assert outside.all() if name == "doubtful" else np.isnan(outside).all()
+    if full:
+        np.testing.assert_array_equal(part.variance, np.einsum("oob->ob", part.noise).real)
+
+
+@pytest.mark.parametrize("name", ["response", "gram", "noise", "doubtful", "variance"])
+def test_results_that_would_be_written_elsewhere_are_exceptions(name: str, built: _compiled.Solver) -> None:
+    kernel = CompiledKernel(spectra_of(2, 3, 1), basis_of(9, 2, ()), built)
+    good = places(2, 3, 100, True)
+    locked = good[name].copy()
+    locked.flags.writeable = False
+    for wrong in (good[name][..., :99], np.repeat(good[name], 2, axis=-1)[..., ::2], good[name].astype(np.complex64),
+                  locked):
+        with pytest.raises(ValueError, match="do not lie where"):
+            kernel.solve(50, 150, full_noise=True, into=BlockFit(**{**good, name: wrong}))
 
 
 def test_arrays_that_do_not_lie_in_a_row_are_copied(built: _compiled.Solver) -> None:
