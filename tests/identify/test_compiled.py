@@ -114,7 +114,8 @@ def places(n_u: int, n_y: int, count: int, full: bool) -> dict[str, Any]:
 
 @pytest.mark.parametrize("full", [True, False])
 @pytest.mark.parametrize("count", [1, 3, 700])
-def test_results_are_written_where_they_belong_and_nowhere_else(full: bool, count: int, built: _compiled.Solver) -> None:
+def test_results_are_written_where_they_belong(full: bool, count: int, built: _compiled.Solver) -> None:
+    """And nowhere else."""
     spectra, basis = spectra_of(2, 3, 1), basis_of(9, 2, ())
     kernel = CompiledKernel(spectra, basis, built)
     there, apart = places(2, 3, 1000, full), kernel.solve(50, 50 + count, full_noise=full)
