@@ -92,12 +92,13 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
 
 
 def _compared(healthy: Reference, new: Refit) -> Compared:
-    fit, ranges = exact(healthy.fit), healthy.fit.structure.ranges
+    fit, ranges = exact(healthy.fit), healthy.listed
     beyond = max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
     moved = new.v[:new.structure.n_parameters] - healthy.scatter.center
     for candidate, values in zip(new.structure.effects, new.structure.quantities(new.v), strict=True):
         if candidate.effect.name == NAME:
             moved[ranges.members.index(candidate.where)] += values[SIZE]
+    moved = moved[:len(ranges.names)]
     deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / ranges.unit)
     return Compared(len(healthy.each), fit.rms, float(np.sqrt(beyond)), healthy.relative,
                     dict(zip(ranges.names, map(float, deviation), strict=True)))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from two_days import SYSTEM, Day, record
 
 import robthermal as rt
-from robthermal.diagnosis.change import parameter_changes, random_effects
+from robthermal.diagnosis.change import effective_number, parameter_changes, random_effects, reference_of
 from robthermal.fitting import chosen_ranges
 
 SIZES: dict[str, Any] = {"length": 300}
@@ -128,18 +128,51 @@ def test_what_moves_within_the_record_is_no_name(rig: rt.System, seed: int, drif
     assert "something drifts or comes and goes" in found.outcome.text
 
 
+def test_a_heater_ten_percent_weak_is_named(rig: rt.System) -> None:
+    """Three healthy days; nobody lists its gain, and the plate's capacity scatters without being listed."""
+    old = [record(602_000 + i) for i in range(3)]
+    found = rt.diagnose(rig, record(602_999, Day({"power": 0.9})), reference=old, effects=[*FEW, "hidden_mass"])
+    (one,) = found.effects
+    assert (one.effect, one.where, found.alternatives) == ("input_gain", ("heater",), ((),))
+    value, std, _ = one.values["gain"]
+    assert abs(value + 0.1) < 3 * std < 0.2
+    assert found.reference is not None and list(found.reference.scatter) == list(rig.fit)  # the listed ones
+
+
+def test_numbers_that_the_fit_table_leaves_out_scatter_too(rig: rt.System, old: list[rt.Record]) -> None:
+    healthy = reference_of(rig, old, [old[0]])
+    assert healthy.fit.structure.ranges.names == (*rig.fit, "lumps.plate.capacity")
+    assert healthy.listed.names == tuple(rig.fit)
+    bare = reference_of(rig.model_copy(update={"fit": {}}), old, [old[0]])
+    assert bare.fit.structure.ranges.names == ()  # without a table every number is taken to be right
+
+
+@pytest.mark.parametrize("kind", ["independent", "alike", "from one mass"])
+def test_the_effective_number_bounds_the_chance_of_any(kind: str) -> None:
+    """Against drawn t variates: the chance that the largest is beyond a high threshold, and beyond a low one."""
+    rng = np.random.default_rng(5)
+    draws = rng.standard_normal((60, 8))
+    seen = {"independent": np.linalg.qr(draws)[0], "alike": np.repeat(draws[:, :1], 8, axis=1),
+            "from one mass": draws[:, :1] + 0.3 * draws}[kind]
+    unit = seen / np.linalg.norm(seen, axis=0)
+    number = effective_number(np.column_stack([unit, np.zeros(60)]), 3)
+    t2 = (rng.standard_normal((40_000, 60)) @ unit) ** 2 / (rng.chisquare(6, (40_000, 1)) / 6)
+    for alpha in (0.05, 0.01):
+        found = float(np.mean(np.max(t2, axis=1) > scipy.stats.f.isf(alpha / number, 1, 6)))
+        assert 0.6 * alpha < found < 1.15 * alpha  # 0.01: standard deviation 5 % of it
+    least, most = {"independent": (5.0, 8.0), "alike": (0.95, 1.05), "from one mass": (1.0, 4.0)}[kind]
+    assert least < number < most
+
+
 def test_what_comes_nearest_is_said_and_no_name(rig: rt.System) -> None:
-    """A heater that gives 10 % less than its column says: too little for three reference records."""
+    """Gusts, which no effect describes: a weak heater comes nearest, and is too little for three reference records."""
     old = [record(502_000 + i, **SIZES) for i in (1, 2, 3)]
-    new = record(502_999, **SIZES)
-    inputs = new.inputs.copy()
-    inputs[:, new.input_names.index("heater")] /= 0.9
-    found = rt.diagnose(rig, replace(new, inputs=inputs), reference=old, effects=[*FEW, "hidden_mass"])
+    found = rt.diagnose(rig, record(502_999, Day(draught=1.0), **SIZES), reference=old, effects=["input_gain"])
     assert found.verdict == "unexplained" and found.effects == ()
     said = found.outcome.text
-    assert "Nearest to an answer, and no name: parameter_change(lumps.block.capacity) (relative 0.1" in said
+    assert "Nearest to an answer, and no name: input_gain(heater) (gain 0.0" in said
     assert "chance 0.0" in said and "more reference records sharpen it" in said
-    assert found.remainder is not None and dict(found.remainder.where)["block"] > dict(found.remainder.where)["sink"]
+    assert found.remainder is not None and dict(found.remainder.where)["plate"] > dict(found.remainder.where)["block"]
 
 
 def test_what_was_missing_on_all_days_is_no_change(rig: rt.System) -> None:

@@ -35,13 +35,15 @@ from ..fit import (
     with_unknown_ambients,
 )
 from ._held import Held, root_of
-from ._scatter import Scatter, scatter_of
+from ._scatter import ASSUMED, Scatter, scatter_of
 
 Array = NDArray[np.float64]
 _FILTERS = 2  # rounds: a filter is that of the estimate
 _PINNED = 1e3  # times as certain as the scatter says: fixed, with the same unknowns
 _WIDEST = 0.1  # relative scatter of a parameter from one new record to another
 _OF_RECORD = (".temperature", ".initial")  # numbers that are each record's own
+_FARTHEST = 6.0  # factor from its value within which a number stays that the fit table leaves out
+_OF_MACHINE = (".capacity", ".conductance", ".conductance.value", ".seebeck.value", ".resistance.value")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +58,21 @@ class Reference:
         What differs from record to record.
     each : tuple of Refit
         Every reference record as if it were new: parameters held near those of a healthy day.
+    listed : Ranges
+        Parameters of the fit table, which come first among those of the fits; the others are the machine's numbers
+        that the table leaves out, and scatter as well.
     """
 
     fit: Refit
     scatter: Scatter
     each: tuple[Refit, ...]
+    listed: Ranges
 
     @property
     def relative(self) -> dict[str, float]:
-        """Scatter of every parameter from record to record, relative to it; to its range, if it may be negative."""
-        ranges = self.fit.structure.ranges
-        return dict(zip(ranges.names, map(float, self.scatter.std / ranges.unit), strict=True))
+        """Scatter of every listed parameter from record to record, relative to it; to its range, if that has signs."""
+        std = self.scatter.std[:len(self.listed.names)]
+        return dict(zip(self.listed.names, map(float, std / self.listed.unit), strict=True))
 
 
 def reference_of(system: System, records: Measured | Sequence[Measured], new: Sequence[Measured], *,
@@ -94,7 +100,8 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
     sessions = with_unknown_ambients(sessions_of(system, session_gain), system, records_of([*data, *later]))
     starts = [one.initial(system, "free") for one in data]
-    structure = structure_of(system, _lasting(ranges), data, starts, sessions)
+    listed = _lasting(ranges)
+    structure = structure_of(system, _with_others(listed, system), data, starts, sessions)
     try:
         fit = fitted(structure, structure.start(structure.ranges.start, []), floor, NoiseScaling(1.0, {}))
     except Diverged as error:
@@ -102,7 +109,7 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
                          remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
     fit = _declared(fit)
     scatter = scatter_of(fit)
-    return Reference(fit, scatter, tuple(held(fit, scatter, [one], floor) for one in data))
+    return Reference(fit, scatter, tuple(held(fit, scatter, [one], floor) for one in data), listed)
 
 
 def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEstimate) -> Refit:
@@ -176,3 +183,16 @@ def _lasting(ranges: Ranges) -> Ranges:
     return Ranges(tuple(ranges.names[i] for i in kept), tuple(ranges.members[i] for i in kept), ranges.start[kept],
                   ranges.lower[kept], ranges.upper[kept], ranges.sigma[kept], ranges.logarithmic[kept])
 
+
+def _with_others(listed: Ranges, system: System) -> Ranges:
+    """With every other capacity, conductance and property of a module: known to the scatter of healthy days, not more.
+
+    Without a fit table all numbers are taken to be right.
+    """
+    others = {name: value for name, value in system.parameters.items()
+              if listed.names and value > 0 and name.endswith(_OF_MACHINE) and name not in listed.flat}
+    value = np.array(list(others.values()), np.float64)
+    return Ranges((*listed.names, *others), (*listed.members, *((name,) for name in others)),
+                  np.r_[listed.start, value], np.r_[listed.lower, value / _FARTHEST],
+                  np.r_[listed.upper, value * _FARTHEST], np.r_[listed.sigma, ASSUMED * value],
+                  np.r_[listed.logarithmic, np.ones(value.size, np.bool_)])

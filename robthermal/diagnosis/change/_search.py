@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...fitting import Ranges
 from ..effects import Candidate, candidates
 from ..evidence import ALIAS, Scores, score_candidates
 from ..fit import Refit, relinearized
@@ -16,7 +17,7 @@ from ..search import Accepted, Entry, refit_short_list
 from ._excess import excess_of
 from ._parameter_change import NAME, parameter_changes, relative, says_again
 from ._reference import Reference
-from ._yardstick import chance, inflation, squares, within_scatter
+from ._yardstick import chance, effective_number, inflation, squares, within_scatter
 
 MOST_CHANGES = 2
 _ALPHA_PARAMETERS, _ALPHA_CATALOG = 0.03, 0.01  # family-wise
@@ -60,7 +61,7 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
         Effects of the catalog to try; default all.
     """
     catalog = None if names is None else list(names)
-    tested = _tested(new, catalog)
+    tested = _tested(new, reference.listed, catalog)
     first = scores = score_candidates(new, tested)
     fit, rounds, nearest = new, list[Accepted](), ""
     while True:
@@ -74,13 +75,14 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
         if len(rounds) == MOST_CHANGES or not excess_of(fit, reference).reasons:
             break  # what is left is within the scatter of healthy records: nothing more to find
         taken = {candidate.key for candidate in fit.structure.effects}
-        scores = score_candidates(fit, [candidate for candidate in _tested(fit, catalog) if candidate.key not in taken])
+        scores = score_candidates(fit, [candidate for candidate in _tested(fit, reference.listed, catalog)
+                                        if candidate.key not in taken])
     return Search(fit, tuple(rounds), first, nearest)
 
 
-def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
-    """Changes of parameters, and what the catalog adds to them."""
-    ranges, system = fit.structure.ranges, fit.system
+def _tested(fit: Refit, ranges: Ranges, names: Sequence[str] | None) -> list[Candidate]:
+    """Changes of listed parameters, and what the catalog adds to them."""
+    system = fit.system
     listed = [one for one in fit.testable(candidates(system, names, fit.drifting))
               if not says_again(one, system, ranges)]
     return [*parameter_changes(system, ranges), *listed]
@@ -89,8 +91,7 @@ def _tested(fit: Refit, names: Sequence[str] | None) -> list[Candidate]:
 def _all_refitted(fit: Refit, scores: Scores, reference: Reference) -> list[_Tried]:
     """Candidates worth a refit: changes of parameters, and what the catalog adds to them."""
     own = np.array([candidate.effect.name == NAME for candidate in scores.candidates], bool)
-    n_own = int(own.sum())
-    parameters, catalog = _part(scores, own, n_own), _part(scores, ~own, max(scores.n_trials - n_own, 1))
+    parameters, catalog = _part(scores, own), _part(scores, ~own)
     return [*_refitted(fit, parameters, reference, _ALPHA_PARAMETERS),
             *_refitted(fit, _without_repeats(catalog, parameters), reference, _ALPHA_CATALOG)]
 
@@ -136,23 +137,29 @@ class _Tried:
 
 def _refitted(fit: Refit, scores: Scores, reference: Reference, alpha: float) -> Iterator[_Tried]:
     """Candidates refitted, with the chance that healthy records give, for the family; none where none is promising."""
-    n, trials = len(reference.each), max(scores.n_trials, 1)
-    if not any(trials * chance(_HOPE * squares(fit, scores, i), 1, 1.0, n) < alpha for i in scores.order):
+    n = len(reference.each)
+    family = effective_number(scores.signatures, n)
+    if not any(family * chance(_HOPE * squares(fit, scores, i), 1, 1.0, n) < alpha for i in scores.order):
         return
     for entry in refit_short_list(fit, scores).entries:
         kappa = inflation(entry.candidate, reference.each, fit.n_readings)
         dimension, decrease = len(entry.candidate.effect.free), fit.rss - entry.fit.rss
-        p = min(trials * chance(decrease, dimension, kappa, n), 1.0)
+        p = min(family * _trials(entry.candidate, fit) * chance(decrease, dimension, kappa, n), 1.0)
         bic = decrease - dimension * math.log(fit.n_readings)  # the noise is known: no logarithm of the sum of squares
         yield _Tried(replace(entry, p_value=p, delta_bic=bic), kappa, p < alpha)
 
 
-def _part(scores: Scores, some: NDArray[np.bool_], n_trials: int) -> Scores:
+def _trials(candidate: Candidate, fit: Refit) -> int:
+    """Trial values of a candidate; of a pair the phase is none, it is a second quantity."""
+    return max(len(list(candidate.trials(fit.paths[0]))) // (2 if candidate.effect.paired else 1), 1)
+
+
+def _part(scores: Scores, some: NDArray[np.bool_]) -> Scores:
     """Some of the candidates."""
     at = np.flatnonzero(some)
     return Scores(tuple(scores.candidates[i] for i in at), scores.size[at], scores.std[at], scores.statistic[at],
                   scores.p_value[at], scores.possible[at], scores.identifiability[at], scores.limit[at],
-                  scores.signatures[:, at], n_trials)
+                  scores.signatures[:, at], scores.n_trials)
 
 
 def _without_repeats(catalog: Scores, parameters: Scores) -> Scores:
@@ -160,7 +167,7 @@ def _without_repeats(catalog: Scores, parameters: Scores) -> Scores:
     alike = 1.0 - (parameters.signatures.T @ catalog.signatures) ** 2 < ALIAS**2
     repeats = [any(alike[i, j] and _same_part(candidate, change) for i, change in enumerate(parameters.candidates))
                for j, candidate in enumerate(catalog.candidates)]
-    return _part(catalog, ~np.array(repeats, bool), catalog.n_trials)
+    return _part(catalog, ~np.array(repeats, bool))
 
 
 def _same_part(candidate: Candidate, change: Candidate) -> bool:

@@ -41,7 +41,8 @@ def unsteady(fit: Refit, rounds: Sequence[Accepted], reference: Reference) -> li
         noise = 1.0 / reference.scatter.inflation
         usual = max(float(np.mean(healthy)), noise) if healthy else 1.0  # 1: the raised noise level
         freedom = (segments - 1) * len(healthy) or _MANY
-        if segments > 1 and moves > usual * more * scipy.stats.f.isf(_SURE, segments - 1, freedom):
+        expected = noise + more * (usual - noise)  # noise is no larger where the machine is hotter
+        if segments > 1 and moves > expected * scipy.stats.f.isf(_SURE, segments - 1, freedom):
             out.append(round_.best.candidate.label)
     return out
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from ..effects import Candidate
 from ..evidence import Scores, score_candidates
@@ -14,6 +17,7 @@ from ._scatter import COUNTS
 
 _TIED = 0.01  # chance below which the difference of two candidates is no scatter
 _LEAST = 10.0  # of the sum of squares, as ΔBIC elsewhere
+_DRAWS, _SEED = 4000, 1
 
 
 def squares(fit: Refit, scores: Scores, i: int) -> float:
@@ -59,6 +63,30 @@ def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> f
         Number of reference records.
     """
     return float(scipy.stats.f.sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
+
+
+def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float:
+    """How many independent candidates have the same chance to show anything on a healthy day as these together.
+
+    The largest of correlated t variates exceeds a high threshold E max|g|^ν / E|g|^ν times as often as one of them,
+    with g normal and of their correlations: they share the yardstick, and therefore the large values.
+
+    Parameters
+    ----------
+    signatures : ndarray, shape (m, k)
+        Of the candidates, of unit length; one of length 0 is none.
+    n_reference : int
+        Number of reference records.
+    """
+    seen = signatures[:, np.linalg.norm(signatures, axis=0) > 0.0]
+    if seen.shape[1] < 2:
+        return 1.0
+    freedom = COUNTS + n_reference - 1
+    values, vectors = np.linalg.eigh(seen.T @ seen)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    g = np.random.default_rng(_SEED).standard_normal((_DRAWS, seen.shape[1])) @ root.T
+    one = 2.0 ** (freedom / 2.0) * math.gamma((freedom + 1.0) / 2.0) / math.sqrt(math.pi)
+    return float(np.clip(np.mean(np.max(np.abs(g), axis=1) ** freedom) / one, 1.0, seen.shape[1]))
 
 
 def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
