@@ -13,7 +13,7 @@ from ..thermal import System
 from ._judge import Judged, Progress, Validation, Verdict, alternatives
 from ._outcomes import DiagnosisCode
 from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched, unsteady
-from .data import DataSet, Measured, as_measured, noise_floor, records_of, without_outliers
+from .data import DataSet, Measured, as_measured, noise_floor, records_of, refuse_constant, without_outliers
 from .evidence import Gap, adequacy, expected_rms, left
 from .fit import Refit, SessionGain, exact
 from .search import SearchState, ShortList
@@ -84,6 +84,7 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     healthy = reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
                            noise=noise, session_gain=session_gain)
     progress("comparing the new records with them")
+    refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
     new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
     progress("trying every change of a parameter, and every effect of the catalog")

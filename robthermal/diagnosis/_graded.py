@@ -29,6 +29,7 @@ from .search import (
 )
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
+_NOISE = 2.0  # whitened variance that a finer network must leave, to be all that is missing
 _CLOSED_SQUARE = 1.0 - (1.0 - 0.3) ** 2  # of the excess mean square of the validation records: 30 % of its rms
 
 
@@ -237,7 +238,7 @@ def _closes(gaps: Sequence[Gap]) -> bool:
 def _nothing_lasts(judged: Judged, finer: Refit) -> Judged:
     """The answer as it was; it says so if a finer network alone explains most of what is left."""
     nominal = exact(judged.state.nominal)
-    if not finer.structure.n_coarse or nominal.variance < 1.0:
+    if not finer.structure.n_coarse or nominal.variance < 1.0 or finer.variance > _NOISE:
         return judged
     share = 1.0 - max(finer.variance - 1.0, 0.0) / max(judged.state.nominal.variance - 1.0, 1e-9)
     if share < 1.0 - NEEDED:

@@ -133,6 +133,25 @@ def reconsider_noise(judged: Judged, validation: Validation) -> Judged:
         outcome=DiagnosisCode.CONSISTENT.outcome(text + ("" if fit.levels.share else " Declare it.")))
 
 
+def without_names_of_noise(judged: Judged) -> Judged:
+    """No name, and no network to refine, on records whose readings never leave their noise.
+
+    Where the model moves and the readings do not, effects at their bounds would follow: a mass or a conductance beyond
+    measure. Returned as it is if there is nothing to withdraw.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer of the search.
+    """
+    if judged.verdict == "consistent" or not judged.state.nominal.floor.quiet:
+        return judged
+    text = ("The model moves and the readings do not. Which effect holds them where they are cannot be told from such "
+            "records: a heater that is off, a sensor that is not attached, a wrong column.")
+    return replace(judged, verdict="unexplained", evidence=(), outcome=DiagnosisCode.UNEXPLAINED.outcome(
+        text, remedy="See that heaters and sensors are connected."))
+
+
 def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[str]:
     """Reasons, a sentence each, why nothing may be named and nothing called consistent."""
     faults = [] if checks.outcome.ok else [checks.outcome.text]

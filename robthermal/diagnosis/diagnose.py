@@ -21,7 +21,7 @@ from ._doubts import (
     place_undecided,
 )
 from ._graded import evidence_of, graded, lasting_beyond_steps
-from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise
+from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative
@@ -164,6 +164,7 @@ def concluded(judged: Judged) -> Diagnosis:
     judged : Judged
         State of the search with its tests and verdict.
     """
+    judged = without_names_of_noise(judged)
     state, nominal = judged.state, judged.state.nominal
     named = judged.verdict in ("named", "named_with_remainder", "ambiguous")
     unexplained = judged.verdict == "unexplained" and bool(nominal.records)

@@ -16,7 +16,7 @@ from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ._glitches import counted
 from ._measured import as_measured, records_of, responses_of
-from ._remarks import remarks
+from ._remarks import quiet, remarks
 
 Array = NDArray[np.float64]
 _SHORTEST = 50  # samples
@@ -48,6 +48,8 @@ class NoiseEstimate:
     remarks : tuple of str
         What the records cannot show whatever the model, a sentence each: stuck, held or saturated readings, inputs that
         never change, restarts.
+    quiet : bool
+        Whether no thermometer ever leaves its noise: then nothing can be named.
     """
 
     noise: dict[str, float]
@@ -59,6 +61,7 @@ class NoiseEstimate:
     quantized: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    quiet: bool = False
 
     def __str__(self) -> str:
         lines = [f"{'sensor':<12} {'noise':>10} {'differences':>12}  unit"]
@@ -150,7 +153,8 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
     return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
                          _outcome(noise_of, rough, unknown, units), glitches, _quantized(data, noise_of),
-                         {**units, **dict.fromkeys(relative, "-")}, remarks(system, data, noise_of))
+                         {**units, **dict.fromkeys(relative, "-")}, remarks(system, data, noise_of),
+                         quiet(system, data, noise_of))
 
 
 def _refuse_short(data: Sequence[Data]) -> None:

@@ -18,6 +18,7 @@ _OFTEN = 0.05  # of the samples at the extreme reading: saturated
 _LEAST = 10  # samples there
 _ALIKE = 0.8  # of the runs of equal readings that are as long as most: a sensor slower than its log
 _JUMP = 8.0  # times the largest change between other samples nearby
+_BEYOND = 0.5  # of the width of an input's limits: farther outside, the column has another unit
 
 
 def remarks(system: System, data: Sequence[Data], noise: Mapping[str, float]) -> tuple[str, ...]:
@@ -32,11 +33,14 @@ def remarks(system: System, data: Sequence[Data], noise: Mapping[str, float]) ->
     noise : mapping
         Standard deviation of every sensor [K or V].
     """
-    said = [*_quiet(system, data, noise), *_constant_inputs(system, data)]
+    said = [*_constant_inputs(system, data), *_beyond_limits(system, data)]
+    if quiet(system, data, noise):
+        said.insert(0, "The readings never leave their noise: these records hold next to nothing about the machine, "
+                       "and cannot show what is missing. Apply larger inputs.")
     for one in data:
         for name, y in zip(one.sensors, one.readings.T, strict=True):
             said += _of_reading(system, name, y, one)
-        said += _jumps(one, noise)
+        said += [*_copies(one), *_jumps(one, noise)]
     return tuple(dict.fromkeys(said))
 
 
@@ -59,12 +63,44 @@ def refuse_constant(system: System, data: Sequence[Data]) -> None:
                          remedy="See that the sensors are connected and within their range.")
 
 
-def _quiet(system: System, data: Sequence[Data], noise: Mapping[str, float]) -> Iterator[str]:
+def quiet(system: System, data: Sequence[Data], noise: Mapping[str, float]) -> bool:
+    """Whether no thermometer ever leaves its noise.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system of the records.
+    data : sequence of Data
+        Records that are diagnosed.
+    noise : mapping
+        Standard deviation of every sensor [K or V].
+    """
     spread = [float(np.std(y)) / noise[name] for one in data
               for name, y in zip(one.sensors, one.readings.T, strict=True) if name in system.thermometers]
-    if spread and max(spread) < _QUIET:
-        yield ("The readings never leave their noise: these records hold next to nothing about the machine, and cannot "
-               "show what is missing. Apply larger inputs.")
+    return bool(spread) and max(spread) < _QUIET
+
+
+def _beyond_limits(system: System, data: Sequence[Data]) -> Iterator[str]:
+    """Inputs far outside the limits that the system gives: in percent or counts."""
+    for name, limits in {**system.input_limits, **system.current_limits}.items():
+        columns = [one.record[name] for one in data if limits and name in one.record.input_names]
+        if limits and columns:
+            far = _BEYOND * (limits[1] - limits[0])
+            low, high = min(float(x.min()) for x in columns), max(float(x.max()) for x in columns)
+            if low < limits[0] - far or high > limits[1] + far:
+                yield (f"{name} is between {low:.4g} and {high:.4g} in the records; the system's limits are "
+                       f"{limits[0]:.4g} and {limits[1]:.4g}: percent or counts? Give the system its gain, or convert "
+                       "the column.")
+
+
+def _copies(one: Data) -> Iterator[str]:
+    """Sensors that read the same in every sample: one column twice."""
+    for j, name in enumerate(one.sensors):
+        y = one.readings[:, j]
+        same = [one.sensors[k] for k in range(j) if np.array_equal(one.readings[:, k], y)]
+        if same and np.ptp(y) > 0.0:
+            yield (f"{name} and {same[0]} read the same in every sample of record {one.label!r}: one column twice? "
+                   "Leave the copy out.")
 
 
 def _constant_inputs(system: System, data: Sequence[Data]) -> Iterator[str]:
