@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge
+from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge, no_names
 from ._outcomes import DiagnosisCode
 from ._searching import coarsely_searched, validated
 from .evidence import NEEDED, SURE, Evidence, Gap, Stability, expected_rms, left, reproducible, score, stability
@@ -208,7 +208,7 @@ def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
 
 def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:
     """The verdict on what lasts."""
-    if not state.rounds:
+    if not state.rounds or no_names(state):
         return judged
     fit, nominal = state.fit, judged.state.nominal
     plain, bare = exact(fit), exact(nominal)

@@ -13,7 +13,7 @@ from ._outcomes import DiagnosisCode
 from .data import Measured
 from .evidence import Adequacy, Evidence, HoldOut, adequacy, hold_out
 from .fit import Refit, Whitened
-from .search import Accepted, SearchState, ShortList, ruled_out, with_wider_noise
+from .search import Accepted, SearchState, ShortList, implausible_names, ruled_out, with_wider_noise
 
 Verdict = Literal["named", "named_with_remainder", "ambiguous", "consistent", "unexplained"]
 Name = tuple[str, tuple[str, ...]]
@@ -148,8 +148,19 @@ def without_names_of_noise(judged: Judged) -> Judged:
         return judged
     text = ("The model moves and the readings do not. Which effect holds them where they are cannot be told from such "
             "records: a heater that is off, a sensor that is not attached, a wrong column.")
-    return replace(judged, verdict="unexplained", evidence=(), outcome=DiagnosisCode.UNEXPLAINED.outcome(
+    return replace(judged, verdict="unexplained", evidence=(), plain=None, outcome=DiagnosisCode.UNEXPLAINED.outcome(
         text, remedy="See that heaters and sensors are connected."))
+
+
+def no_names(state: SearchState) -> list[str]:
+    """Why accepted effects are not what they are called, a sentence each.
+
+    Parameters
+    ----------
+    state : SearchState
+        What was accepted, and the fit with it.
+    """
+    return list(implausible_names(state.fit, {one.best.candidate.key: one.best.twins for one in state.rounds}))
 
 
 def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[str]:
@@ -160,6 +171,7 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
     if held is not None and not held.outcome.ok:
         faults.append(held.outcome.text)
     if state.rounds:
+        faults += no_names(state)
         if not independent_of_step(state.fit):
             faults.append("An effect moves when the integration is refined: it may be the solver's own error.")
         if not state.fit.outcome.ok:

@@ -205,3 +205,43 @@ def test_a_clock_that_begins_again_names_the_remedy(run: Run, tmp_path: Path) ->
     u, y = oven(stepped())
     status, _, err = diagnosed(run, tmp_path, u, y, np.r_[TIME[:N // 2], TIME[:N // 2]])
     assert status == 2 and "time runs backward" in err and 'restarts = "split"' in err
+
+
+@pytest.mark.usefixtures("few")
+def test_a_model_that_moves_beside_readings_that_do_not_gets_no_name(run: Run, tmp_path: Path) -> None:
+    """The heater's column says 20 W, the heater is off: a mass of 100 kJ/K and 1000 W/K were named."""
+    _, y = oven(np.zeros(N))
+    status, found, _ = diagnosed(run, tmp_path, stepped(), y)
+    assert (status, found["verdict"], found["effects"]) == (1, "unexplained", [])
+    said = found["outcome"]["text"]
+    assert "The model moves and the readings do not." in said and "never leave their noise" in said
+    assert "Refine the network" not in said
+
+
+@pytest.mark.usefixtures("few")
+def test_one_column_twice_and_counts_are_said(run: Run, tmp_path: Path) -> None:
+    u, y = oven(stepped())
+    status, found, _ = diagnosed(run, tmp_path, 2.55 * u, y[:, [0, 0]])
+    said = found["outcome"]["text"]
+    assert (status, found["verdict"]) == (1, "unexplained")
+    assert "T_plate and T_block read the same in every sample of record 'log.csv': one column twice?" in said
+    assert "q is between 0 and 255 in the records; the system's limits are 0 and 100: percent or counts?" in said
+    assert "Refine the network" not in said  # a finer network leaves most of it
+
+
+def test_constant_readings_are_refused_beside_healthy_days() -> None:
+    u, y = oven(stepped())
+    day = partial(rt.Record, sample_time=STEP, inputs=u, input_names=["q"], output_names=["T_block", "T_plate"])
+    with pytest.raises(rt.InputError, match="no reading ever changes"):
+        rt.diagnose(rt.thermal.parse_system(SYSTEM), day(outputs=np.full((N, 2), 303.15)), reference=day(
+            outputs=y + 273.15))
+
+
+def test_a_sensor_that_is_stuck_is_no_slow_sensor() -> None:
+    """Without the rule: sensor_lag(T_plate) of 1e5 s."""
+    u, y = stuck()
+    stuck_day = rt.Record(sample_time=STEP, inputs=u, outputs=y + 273.15, input_names=["q"],
+                          output_names=["T_block", "T_plate"])
+    found = rt.diagnose(rt.thermal.parse_system(SYSTEM), stuck_day, effects=["sensor_lag"])
+    assert (found.verdict, found.effects) == ("unexplained", ())
+    assert "stuck, saturated" in found.outcome.text

@@ -4,6 +4,7 @@ from ._contradicted import without_contradicted as without_contradicted
 from ._decide import Accepted as Accepted
 from ._decide import Decision as Decision
 from ._decide import decide as decide
+from ._implausible import implausible_names as implausible_names
 from ._joint import JointSelection as JointSelection
 from ._joint import select_jointly as select_jointly
 from ._joint_check import JointCheck as JointCheck
@@ -35,7 +36,7 @@ from ._state import SearchState as SearchState
 from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
-           "ShortList", "accept", "begin", "beside", "checked_jointly", "compare", "decide", "leaves_large_misfit",
-           "needed", "one_place", "quantities_of", "refit_candidates", "refit_set", "refit_short_list",
-           "resolve_alternatives", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
-           "with_neighbors", "with_wider_noise", "without", "without_contradicted"]
+           "ShortList", "accept", "begin", "beside", "checked_jointly", "compare", "decide", "implausible_names",
+           "leaves_large_misfit", "needed", "one_place", "quantities_of", "refit_candidates", "refit_set",
+           "refit_short_list", "resolve_alternatives", "revise", "revised", "ruled_out", "select_jointly", "shortlist",
+           "validate", "with_neighbors", "with_wider_noise", "without", "without_contradicted"]
