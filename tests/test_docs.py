@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import commands
 import numpy as np
 import pytest
 from axe import needs_axe, violations
@@ -138,6 +139,14 @@ def run_blocks(page: str) -> dict[str, Any]:
     for block in re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.M | re.S):
         exec(compile(block, page, "exec"), names)  # noqa: S102  (our own documentation)
     return names
+
+
+def test_the_script_of_the_start_page_runs_on_the_starter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gain of the loop with integral action is 1 at rest: not below it, and not above 1.1 without a resonance."""
+    monkeypatch.chdir(tmp_path)
+    commands.command("new", "mine")
+    names = run_blocks("start.md")
+    assert 1.0 <= rt.certify.hinf(names["loop"]).upper < 1.1 and names["stage"].dcgain() < 0
 
 
 @pytest.mark.parametrize("page", ["from_matlab.md", "from_simscape.md", "from_tec_tool.md"])

@@ -330,9 +330,18 @@ def licence_of(distribution: metadata.Distribution) -> str:
     return " ".join(texts) or (fields.get("License") or "").strip().split("\n")[0]
 
 
+def test_solvers_that_nothing_calls_are_not_installed() -> None:
+    """cvxpy brings six packages, 244 MB; only the formulations that the fast methods are compared with need it."""
+    found = set(installed_dependencies())
+    assert not found & {"cvxpy", "scs", "osqp", "highspy", "qdldl", "sparsediffpy"} and "clarabel" in found
+    users = [str(path.relative_to(ROOT / "robthermal")) for path in (ROOT / "robthermal").rglob("*.py")
+             if re.search(r"^\s*(import|from) cvxpy", path.read_text(encoding="utf-8"), re.M)]
+    assert users == ["synthesis/_formulations.py"]
+
+
 def test_no_dependency_is_gpl() -> None:
     licences = {name: licence_of(distribution) for name, distribution in installed_dependencies().items()}
-    assert {"numpy", "cvxpy", "python-flint"} <= set(licences)
+    assert {"numpy", "clarabel", "python-flint"} <= set(licences)
     lesser = re.compile(r"LGPL|Lesser General Public", re.I)
     strong = re.compile(r"GPL|General Public License", re.I)
     assert not {name: text for name, text in licences.items() if strong.search(lesser.sub("", text))}

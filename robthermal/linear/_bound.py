@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 
 from ..verification import Certificate
 
@@ -18,7 +19,7 @@ class GainBound:
     lower : float
         Largest singular value at ``frequency``, in floats [output unit per input unit].
     frequency : float
-        Where that is attained [rad/s]; may be infinity in continuous time.
+        Where that is attained [rad/s]; may be infinity in continuous time; NaN of a system that is not stable.
     certificate : Certificate
         Proof of the upper bound, checked when it was made; `rt.verify` checks it again.
 
@@ -41,5 +42,6 @@ class GainBound:
         return self.certificate.holds
 
     def __str__(self) -> str:
-        attained = f"attained: {self.lower:.6g} at {self.frequency:.6g} rad/s"
+        attained = ("no gain is attained" if isnan(self.frequency)  # of a system that is not stable
+                    else f"attained: {self.lower:.6g} at {self.frequency:.6g} rad/s")
         return f"proven: {self.upper:.6g}, {attained}" if self.holds else f"not proven, {attained}\n{self.certificate}"

@@ -62,7 +62,8 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
         Norm that is enough [output unit per input unit]; the controller is then made for it, not for the optimum.
     method : {"auto", "riccati", "reference"}
         Riccati equations; "reference": the optimum by the matrix inequalities of Gahinet and Apkarian in cvxpy, slow
-        and for comparison, the controller for a little more by the same equations.
+        and for comparison, the controller for a little more by the same equations
+        (``pip install "robthermal[reference]"``).
     tolerance : float
         Allowed excess of the proven value over the optimum, relative [-].
     region : mapping, optional
@@ -86,7 +87,7 @@ def hinf(P: control.StateSpace, n_meas: int, n_ctrl: int, *, gamma: float | None
     ------
     InputError
         Numbers that are not finite, impossible n_meas or n_ctrl, a mode that is not stabilisable or not detectable (it
-        is named), unknown keys.
+        is named), unknown keys; "reference" without cvxpy.
 
     References
     ----------
@@ -139,7 +140,11 @@ def _by_inequalities(plant: GeneralizedPlant, best: Reached, asked: float | None
 
 def _reference(P: Any, plant: GeneralizedPlant, tolerance: float, start: float) -> Design:
     """The optimum of the cvxpy program, and a controller for a little more."""
-    formulations = import_module("._formulations", __package__)  # cvxpy is slow to import
+    try:
+        formulations = import_module("._formulations", __package__)  # cvxpy: an optional dependency, slow to import
+    except ModuleNotFoundError as error:
+        raise InputError(f"cvxpy is not there ({error})", where='method="reference"', expected="an installed cvxpy",
+                         remedy="Install it with: pip install 'robthermal[reference]', or take another.") from None
     level: float = formulations.hinf_level(to_continuous(plant)[0] if plant.dt else plant)
     best, _ = best_of(plant, tolerance, level * (1 + 0.6 * tolerance), {}, None)
     found = _finished(plant, best, None, {})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import control
 import numpy as np
 import pytest
@@ -51,6 +53,13 @@ def test_reference_method_of_hinf():
     d = rt.design.hinf(scherer(), 1, 1, method="reference")
     assert d.holds and d.lower == pytest.approx(9.508085, rel=1e-4) and d.value <= 1.005 * d.lower
     assert rt.verify(d.certificates[0]).valid and "inequalities" in d.method
+
+
+def test_reference_method_without_cvxpy_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cvxpy", None)
+    monkeypatch.delitem(sys.modules, "robthermal.synthesis._formulations", raising=False)
+    with pytest.raises(rt.InputError, match=r"cvxpy is not there.*pip install 'robthermal\[reference\]'"):
+        rt.design.hinf(scherer(), 1, 1, method="reference")
 
 
 @pytest.mark.parametrize("seed", range(3))
