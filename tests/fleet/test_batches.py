@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 
 import pytest
@@ -12,6 +11,20 @@ import robthermal as rt
 from robthermal._fleet import _batches, _run
 from robthermal._fleet._batches import Batch, Batches, answer_batch
 from robthermal._fleet._store import Answer
+
+
+class Clock:
+    """Stands still but for what is told: a busy machine changes nothing."""
+
+    def __init__(self, monkeypatch):
+        self.now = 0.0
+        monkeypatch.setattr(_batches, "time", self)
+
+    def perf_counter(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
 
 
 def test_size_follows_the_time_of_a_case():
@@ -36,9 +49,10 @@ def test_towards_the_end_every_worker_has_work():
 
 
 def test_a_slow_case_gives_back_the_others(monkeypatch):
-    monkeypatch.setattr(_batches, "SPAN", 0.01)
-    batch = answer_batch(lambda x: time.sleep(x) or x, 7, [0.0, 0.02, 0.0, 0.0])
-    assert [answer.result for answer in batch.answers] == [0.0, 0.02] and batch.number == 7 and batch.seconds >= 0.01
+    clock = Clock(monkeypatch)
+    batch = answer_batch(lambda x: clock.sleep(x) or x, 7, [0.1, 0.6, 0.0, 0.0])
+    assert [answer.result for answer in batch.answers] == [0.1, 0.6] and batch.number == 7
+    assert batch.seconds == pytest.approx(0.35)
 
 
 def test_what_comes_back_after_the_last_batch_waits_for_another_round():
@@ -59,8 +73,7 @@ def test_what_comes_back_after_the_last_batch_waits_for_another_round():
 @pytest.mark.parametrize("jobs", [1, 2, None])
 def test_slow_cases_among_quick_ones_are_all_done_once(jobs, monkeypatch):
     """Also when the largest batch comes back last, when all others have been handed out."""
-    monkeypatch.setattr(_batches, "SPAN", 0.01)
-    rounds, done, told = [], [], []
+    clock, rounds, done, told = Clock(monkeypatch), [], [], []
 
     def largest_last(**_):
         def run(tasks):
@@ -75,7 +88,7 @@ def test_slow_cases_among_quick_ones_are_all_done_once(jobs, monkeypatch):
 
     def work(x: int) -> int:
         done.append(x)
-        time.sleep(0.012 if x % 8 == 0 else 0.0)
+        clock.sleep(0.6 if x % 8 == 0 else 0.0)
         return x * x
 
     if jobs is None:
@@ -88,13 +101,12 @@ def test_slow_cases_among_quick_ones_are_all_done_once(jobs, monkeypatch):
 
 
 def test_an_interrupt_costs_one_batch(tmp_path, monkeypatch):
-    monkeypatch.setattr(_batches, "SPAN", 0.02)
-    store, stopped = tmp_path / "runs.jsonl", [30]
+    clock, store, stopped = Clock(monkeypatch), tmp_path / "runs.jsonl", [30]
 
     def work(x: int) -> int:
         if x in stopped:
             raise KeyboardInterrupt
-        time.sleep(0.005)
+        clock.sleep(0.125)
         return x
 
     with pytest.raises(KeyboardInterrupt):
