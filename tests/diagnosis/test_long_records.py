@@ -166,3 +166,17 @@ def test_a_long_record_scores_the_best_of_all_trials(heated: Refit, name: str, m
     assert few.candidates[0].shape == pytest.approx(every.candidates[0].shape)
     assert few.statistic == pytest.approx(every.statistic, rel=1e-9)
     assert few.p_value == pytest.approx(every.p_value, rel=1e-9)
+
+
+def test_a_finished_fit_keeps_what_it_found_only(heated: Refit) -> None:
+    structure, v = replace(heated.structure), heated.v
+    structure.paths(v + 1e-3)
+    kept = structure.paths(v)
+    structure.keep_only(v)
+    assert structure.paths(v) is kept and len(structure._last) == 1
+    assert len(heated.structure._last) <= 1  # and so did the fit itself
+    (path,) = heated.records
+    A, by_start, by_end = path.steps  # one matrix in memory where all samples have the same
+    assert A.strides[0] == by_start.strides[0] == by_end.strides[0] == path.C.strides[0] == 0
+    leaves = np.exp(-0.5 * 10.0 / heated.system.lumps["bar"].capacity * heated.system.links[0].conductance / 0.5)
+    assert A[-1, 0, 0] == pytest.approx(leaves, rel=1e-9)

@@ -138,12 +138,14 @@ def _fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseS
         levels = new
     paths, whiteners = filters(structure, v, floor, levels)
     z = Whitened(structure, whiteners).residual(v)
+    structure.keep_only(v)
     return Refit(structure, v, floor, levels, paths, whiteners, z, _outcome(found))
 
 
 def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
     """Fit another structure with the same filters, so that sums of squares can be compared."""
     found = minimized(structure, v, fit.whiteners, limit)
+    structure.keep_only(found.at.v)
     return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
 
 

@@ -263,6 +263,17 @@ class Structure:
             self._last[key] = _Computed(tuple(paths))
         return self._last[key]
 
+    def keep_only(self, v: Array) -> None:
+        """Forget what was computed at other unknowns than these: megabytes for every fit to a long record.
+
+        Parameters
+        ----------
+        v : ndarray
+            Values of the unknowns.
+        """
+        for key in [key for key in self._last if key != v.tobytes()]:
+            del self._last[key]
+
     def _unknowns(self, v: Array) -> Iterator[Unknowns]:
         """The unknowns as every data set sees them."""
         names, chain = self._chain(v)

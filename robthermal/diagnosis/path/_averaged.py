@@ -95,7 +95,7 @@ def averaged_record(path: LinearizedRecord, white: Whitener, length: int) -> Ave
     length : int
         Samples of a block.
     """
-    n_z, n_lumps = path.M.shape[1], path.x.shape[1]
+    n_z, n_lumps = path.steps[0].shape[1], path.x.shape[1]
     blocks = [_in_blocks(one, length) for one in (*path.steps, path.C, white.A, white.C, white.gains, white.roots)]
     inside = (np.arange(len(path.x) + -len(path.x) % length) < len(path.x)).reshape(-1, length)
     n = n_z + white.A.shape[1]

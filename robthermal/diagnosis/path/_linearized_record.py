@@ -25,6 +25,7 @@ from ._coarseness import coarse_responses
 from ._draw_residuals import draw_residuals
 from ._heat_splines import heat_splines
 from ._linearized import Unknowns
+from ._rates import each, heat_slopes
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
@@ -142,7 +143,7 @@ class LinearizedRecord:
         return whitener(self, *noise(self))
 
     def bands(self, z: Array) -> list[str]:
-        """As `Linearized.bands`: the conditions of records are looked at together.
+        """As `Linearized.bands`: conditions of records are looked at together.
 
         Parameters
         ----------
@@ -240,13 +241,13 @@ class LinearizedRecord:
         """Sensors with a state of their own."""
         return [name for name, sensor in self.system.sensors.items() if sensor.time_constant > 0]
 
-    @cached_property
+    @property
     def M(self) -> Array:
         """Rate of the deviations of lumps and lagged sensors, (n, n_z, n_z) [1/s]."""
         n, nl = self.x.shape
         nz = nl + len(self.lags)
         M = np.zeros((n, nz, nz))
-        slopes = _heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u)
+        slopes = heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u)
         M[:, :nl, :nl] = slopes / self.equations.capacity[:, None]
         for row, name in enumerate(self.lags, start=nl):
             sensor = self.system.sensors[name]
@@ -260,9 +261,10 @@ class LinearizedRecord:
 
         Rates that differ by less than 1e-4 of a sample are one: a held current has one matrix, not one per sample.
         """
-        rounded = np.round(self.M * (self.h / _SAME)).reshape(len(self.M), -1)
+        M = self.M
+        rounded = np.round(M * (self.h / _SAME)).reshape(len(M), -1)
         _, first, kind = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-        return self.M[first], kind.reshape(-1)
+        return M[first], kind.reshape(-1)
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array]:
@@ -275,12 +277,14 @@ class LinearizedRecord:
         phi2 = np.linalg.solve(Mh, phi1 - one)
         nl = self.x.shape[1]
         per_watt = self.h / self.equations.capacity
-        return A[kind], ((phi1 - phi2)[..., :nl] * per_watt)[kind], (phi2[..., :nl] * per_watt)[kind]
+        by_end = phi2[..., :nl] * per_watt
+        return each(A, kind), each(phi1[..., :nl] * per_watt - by_end, kind), each(by_end, kind)
 
     @cached_property
     def C(self) -> Array:
         """What the sensors in the record read of the states, (n, n_sensors, n_z); that of voltages varies."""
-        C = np.zeros((len(self.x), len(self.one.sensors), self.M.shape[1]))
+        varies = any(self.system.sensors[name].module for name in self.one.sensors)
+        C = np.zeros((len(self.x) if varies else 1, len(self.one.sensors), self.x.shape[1] + len(self.lags)))
         for i, name in enumerate(self.one.sensors):
             sensor = self.system.sensors[name]
             if sensor.module:
@@ -289,7 +293,7 @@ class LinearizedRecord:
             state = (self.x.shape[1] + self.lags.index(name) if name in self.lags
                      else self.system.lump_names.index(sensor.lump))
             C[:, i, state] = sensor.gain
-        return C
+        return C if varies else np.broadcast_to(C[0], (len(self.x), *C.shape[1:]))
 
     @cached_property
     def mean(self) -> tuple[Array, Array, Array]:
@@ -385,16 +389,3 @@ def linearized_record(system: System, one: RecordData, run: Trajectory | None = 
         raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
     return LinearizedRecord(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
                  np.column_stack(columns), run)
-
-
-def _heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
-    """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
-    nl = x.shape[1]
-    out = np.broadcast_to(equations.A.toarray(), (len(x), nl, nl)).copy()
-    for term in equations.terms:
-        s = term.slopes(*equations.ends(term, x, u))
-        for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
-            for row, column, slope in ((a, a, s.aa), (a, b, s.ab), (b, a, s.ba), (b, b, s.bb)):
-                if row < nl and column < nl:
-                    out[:, row, column] += slope[..., pair]
-    return out

@@ -60,12 +60,17 @@ class Entry:
         """Exact aliases whose own size is possible, linearized or at the size found here: no conductance below zero."""
         if not self.twins:
             return ()
-        size = self.fit.structure.quantities(self.fit.v)[self._place][self.candidate.effect.size.name]
+        size = self.found[self.candidate.effect.size.name]
         return tuple(twin.candidate for twin in self.twins if twin.possible_beside(size))
 
     @property
     def _place(self) -> int:
         return [c.key for c in self.fit.structure.effects].index(self.candidate.key)
+
+    @property
+    def found(self) -> dict[str, float]:
+        """Value of every quantity; their deviations cost derivatives of all readings."""
+        return self.fit.structure.quantities(self.fit.v)[self._place]
 
     @property
     def values(self) -> dict[str, tuple[float, float]]:
@@ -171,8 +176,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
             failed[scores.candidates[i].key] = str(error)
     likely = []
     for entry in _reconsidered(fit, map(finished, competitive(entries)), tried):
-        why = implausible(entry.candidate, entry.fit, {name: value for name, (value, _) in entry.values.items()},
-                          entry.twins)
+        why = implausible(entry.candidate, entry.fit, entry.found, entry.twins)
         if why:
             failed[entry.candidate.key] = why
         else:

@@ -1,0 +1,29 @@
+"""Rates of the deviations along a record: derivatives of the heats, and the matrices of its samples."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...thermal import Equations
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+def each(kinds: Array, kind: Places) -> Array:
+    """The matrix of every sample; one in memory where all are the same."""
+    return kinds[kind] if len(kinds) > 1 else np.broadcast_to(kinds[0], (len(kind), *kinds.shape[1:]))
+
+
+def heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
+    """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
+    nl = x.shape[1]
+    out = np.broadcast_to(equations.A.toarray(), (len(x), nl, nl)).copy()
+    for term in equations.terms:
+        s = term.slopes(*equations.ends(term, x, u))
+        for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
+            for row, column, slope in ((a, a, s.aa), (a, b, s.ab), (b, a, s.ba), (b, b, s.bb)):
+                if row < nl and column < nl:
+                    out[:, row, column] += slope[..., pair]
+    return out
