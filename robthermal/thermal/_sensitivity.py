@@ -118,7 +118,10 @@ class Sensitivity:
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
             F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
-            P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
+            if own.all() and self._acting == self.names[:acting.size]:  # views are several times as fast
+                P[..., :acting.size] = by_acting
+            else:
+                P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
         return Transitions(F, P)
 
     def rate_slopes(self, states: Array, w: Array, slopes: Array, held: Mapping[str, Array]) -> Array:
@@ -186,11 +189,15 @@ class Sensitivity:
                 G: Array) -> Array:
         """Derivative of all rows with respect to the parameters that act on a step, at fixed port states."""
         step, rows = self.by.step(kind, level), DEGREE * self.by.ports.size + self.n_free
-        out = np.zeros((len(z), rows, len(self._acting)))
+        out: Array = np.zeros((len(z), rows, len(self._acting)))
         if self._linear:
             d = self._step_slopes(kind, level)
             by = np.concatenate([z[:, :self.n_free], w, q.reshape(len(z), -1)], axis=1)
-            out[..., self._columns] = (by @ d.reshape(len(d), -1)).reshape(len(z), rows, -1)
+            linear = (by @ d.reshape(len(d), -1)).reshape(len(z), rows, -1)
+            if linear.shape == out.shape:
+                out = linear
+            else:
+                out[..., self._columns] = linear
         for column, name in enumerate(self._acting):
             heat = self.by.port_heat.parameter(name, V)
             if name in held:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..effects import Candidate
 from ..fit import Refit
-from ..path import AveragedRecord, LinearizedRecord, Whitener, averaged_record
+from ..path import AveragedRecord, Whitener, averaged_record
 from ._twin import possible_size
 
 Array = NDArray[np.float64]
@@ -81,9 +81,8 @@ class FewerTrials:
 
     @cached_property
     def _averaged(self) -> list[AveragedRecord]:
-        return [averaged_record(path, white, self.length) for path, white in zip(self.fit.paths, self.fit.whiteners,
-                                                                                 strict=True)
-                if isinstance(path, LinearizedRecord) and isinstance(white, Whitener)]
+        of_records = zip(self.fit.records, self.fit.whiteners, strict=True)  # there is nothing but records
+        return [averaged_record(path, white, self.length) for path, white in of_records if isinstance(white, Whitener)]
 
     def _rows(self, columns: Array) -> Array:
         """Whitened columns (m, k), averaged; priors as they are."""

@@ -2,6 +2,7 @@
 
 from ._descent import Point as Point
 from ._descent import descend as descend
+from ._descent import turned as turned
 from ._noise_scaling import LARGEST_FACTOR as LARGEST_FACTOR
 from ._noise_scaling import WIDE as WIDE
 from ._noise_scaling import NoiseScaling as NoiseScaling
@@ -31,4 +32,4 @@ from ._whitened import Whitened as Whitened
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
            "fitted", "found_ambients", "only_heated", "refit", "relinearized", "sessions_of", "structure_of",
-           "too_warm", "with_slow_part", "with_unknown_ambients"]
+           "too_warm", "turned", "with_slow_part", "with_unknown_ambients"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...errors import Diverged, InputError
 from ..effects import Candidate
 from ..evidence import BIC_GAP
-from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended
+from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended, turned
 
 Array = NDArray[np.float64]
 _SETTLING = 2  # evaluations before what shapes an effect is moved
@@ -153,7 +153,7 @@ def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float
     """Optimum of the linearized problem for a size within its bounds, and its sum of squares."""
     size = _believable(candidate, size)
     target = fit.z - size * fit.whiten([path.columns([candidate]) for path in fit.paths])[:, 0]
-    shift = np.linalg.lstsq(fit.J, target, rcond=1e-9)[0]
+    shift = np.linalg.lstsq(*turned(fit.J, target), rcond=1e-9)[0]
     left = target - fit.J @ shift
     return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
 
