@@ -121,7 +121,8 @@ SURFACE = {
         fit_in_kelvin fold format_modelica format_system hinf_error invert_datasheet linearize load_curve materials
         module_from_datasheet module_from_polynomials module_point
         parameter_in_words parameter_label parse_system read_matrices read_system reduce
-        simulate size_sink split_lump steady_state system_from_matrices time_constants trajectory voltage_slopes
+        simulate size_sink split_lump state_matrices steady_state system_from_matrices time_constants trajectory
+        voltage_slopes
         ways_to_split write_modelica write_system
     """,
     "verification": """

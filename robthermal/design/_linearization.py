@@ -143,17 +143,17 @@ class FeedbackLinearization:
         """
         wanted = self.modules.vector(v, "v", "W")
         p = self.modules.properties(temperatures)
-        asked = _stable_root(wanted - p.K * (p.hot - p.cold), p)
-        current, limit = asked, np.where(wanted < _bounds(p).heat, "optimum", np.full(asked.shape, "", dtype="<U7"))
+        asked, least_heat = _stable_root(wanted - p.K * (p.hot - p.cold), p), _bounds(p).heat
+        current, limit = asked, np.where(wanted < least_heat, "optimum", np.full(asked.shape, "", dtype="<U7"))
         low, high = self._slew_range(previous, sample_time, asked.shape)
         # in this order: a later limit is the harder one, and wins
         for name, least, most in (("slew", low, high), ("optimum", -np.inf, p.S * p.cold / p.R),
                                   ("voltage", *self._voltage_range(p)),
                                   ("current", self.current_low, self.current_high)):
-            clipped = np.clip(current, least, most)
+            clipped = np.minimum(np.maximum(current, least), most)  # np.clip, four times as fast
             limit = np.where(clipped != current, name, limit)
             current = clipped
-        heat = np.where(current == asked, np.maximum(wanted, _bounds(p).heat), _heat(current, p))
+        heat = np.where(current == asked, np.maximum(wanted, least_heat), _heat(current, p))
         return Command(current, p.S * (p.hot - p.cold) + p.R * current, heat, np.where(heat == wanted, "", limit))
 
     def heat(self, current: ArrayLike | Mapping[str, ArrayLike], temperatures: Temperatures) -> Array:

@@ -55,12 +55,12 @@ class PID(Controller):
         return np.concatenate([heat, given.cold])
 
     def heat(self, state: Array, given: ControllerInput) -> Array:
-        z, filtered = np.split(state, 2)
+        z, filtered = state[:self.count], state[self.count:]
         slope = (given.cold - filtered) / self.filter_time
         return self.proportional * (given.reference - given.cold) + z - self.derivative * slope
 
     def advance(self, state: Array, given: ControllerInput, wanted: Array, achieved: Array) -> Array:
-        z, filtered = np.split(state, 2)
+        z, filtered = state[:self.count], state[self.count:]
         z = z + self.sample_time * self.integral * (given.reference - given.cold)
         z = z + -np.expm1(-self.sample_time / self.tracking_time) * (achieved - wanted)
         keep = np.exp(-self.sample_time / self.filter_time)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ..errors import InputError
-from ..thermal import System, linearize
+from ..thermal import System, state_matrices
 from ._controller import Controller
 from ._discrete import delayed
 from ._linearization import FeedbackLinearization
@@ -130,11 +130,10 @@ class LoopParts:
             Currents, heaters and ambients in steady state [A], [unit], [K].
         """
         h, n, names = self.controller.sample_time, len(plant.lumps), plant.lump_names
-        linear = linearize(plant, temperatures, inputs)
-        A, B = np.asarray(linear.A, float), np.asarray(linear.B, float)
+        A, B, states = state_matrices(plant, temperatures, inputs)
         drive = B[:, [plant.exogenous_names.index(name) for name in self.law.names]]
         read = [*self.points, *self._observed()]
-        C = np.array([_row(point, plant, linear.state_labels) for point in read])
+        C = np.array([_row(point, plant, states) for point in read])
         delays = [plant.sensors[point.name].delay if point.kind == "sensor" else 0.0 for point in read]
         Phi, Gamma, out = delayed(A, drive, C, delays, h)
         believed: Array = np.eye(n, len(Phi))
@@ -199,7 +198,7 @@ class LoopParts:
         return SampledLoop(A, np.vstack([Gamma, np.zeros((memory, Gamma.shape[1]))]), heat, M.sample_time)
 
 
-def _row(point: RegulatedPoint, plant: System, states: list[str]) -> Array:
+def _row(point: RegulatedPoint, plant: System, states: tuple[str, ...]) -> Array:
     """Row of C that reads a sensor of the plant without its delay, or a lump."""
     row = np.zeros(len(states))
     if point.kind == "lump":

@@ -17,6 +17,7 @@ from ._geometry import Assembly as Assembly
 from ._geometry import Contact as Contact
 from ._geometry import Layer as Layer
 from ._linear import linearize as linearize
+from ._linear import state_matrices as state_matrices
 from ._linear import time_constants as time_constants
 from ._materials import Material as Material
 from ._materials import materials as materials
@@ -91,5 +92,5 @@ __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "Dat
            "invert_datasheet", "linearize", "load_curve", "materials", "module_from_datasheet",
            "module_from_polynomials", "module_point", "parameter_in_words", "parameter_label", "parse_system",
            "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink", "split_lump",
-           "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes", "ways_to_split",
-           "write_modelica", "write_system"]
+           "state_matrices", "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes",
+           "ways_to_split", "write_modelica", "write_system"]

@@ -60,6 +60,7 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
     eq = equations(system)
     x, u = _point(eq, temperatures), exogenous_point(eq, inputs or {})
     A, B = _matrices(eq, x, u)
+    states = _states(eq)
     if not (np.isfinite(sample_time) and sample_time >= 0):
         raise InputError(f"sample_time = {sample_time}", where="argument sample_time",
                          expected="0 or a positive number [s]")
@@ -69,10 +70,37 @@ def linearize(system: System, temperatures: ArrayLike | Mapping[str, float] | No
         exact = scipy.linalg.expm(both)[:len(A)]
         A, B = exact[:, :len(A)], exact[:, len(A):]
     C, D, outputs = _outputs(eq, len(A), x, u)
-    drives = [system.exogenous_names[column] for column in Layout(eq).drives]
-    states = [*system.lump_names, *(f"{name}_lag" for name in (*Layout(eq).sensors, *drives))]
     return control.ss(A, B, C, D, dt=sample_time, name=system.name,
-                      inputs=list(system.exogenous_names), outputs=outputs, states=states)
+                      inputs=list(system.exogenous_names), outputs=outputs, states=list(states))
+
+
+def state_matrices(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
+                   inputs: Mapping[str, float] | None = None) -> tuple[Array, Array, tuple[str, ...]]:
+    """A and B of `linearize` in continuous time, and the names of the states: arrays, without python-control.
+
+    Parameters
+    ----------
+    system, temperatures, inputs
+        As in `linearize`.
+
+    Returns
+    -------
+    A : ndarray, shape (n, n)
+        Deviations of the states among each other [1/s].
+    B : ndarray, shape (n, n_u)
+        What heaters [K/s per unit], currents [K/s per A] and ambients [K/s per K] do to them.
+    states : tuple of str
+        Lumps in file order, then "NAME_lag" of lagged sensors and drives.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> A, B, states = rt.thermal.state_matrices(rt.systems.tclab_two_state())
+    >>> A.shape, B.shape, states
+    ((2, 2), (2, 3), ('heater_1', 'heater_2'))
+    """
+    eq = equations(system)
+    return *_matrices(eq, _point(eq, temperatures), exogenous_point(eq, inputs or {})), _states(eq)
 
 
 def time_constants(system: System, temperatures: ArrayLike | Mapping[str, float] | None = None,
@@ -118,6 +146,12 @@ def _point(eq: Equations, temperatures: ArrayLike | Mapping[str, float] | None) 
         raise InputError(f"shape {x.shape}, smallest value {x.min(initial=np.inf):.6g}", where="argument temperatures",
                          expected=f"{len(names)} finite temperatures in kelvin")
     return x
+
+
+def _states(eq: Equations) -> tuple[str, ...]:
+    """Names of the lumps, then of the lags of sensors and drives."""
+    drives = [eq.system.exogenous_names[column] for column in Layout(eq).drives]
+    return (*eq.system.lump_names, *(f"{name}_lag" for name in (*Layout(eq).sensors, *drives)))
 
 
 def _matrices(eq: Equations, x: Array, u: Array) -> tuple[Array, Array]:

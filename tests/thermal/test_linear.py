@@ -25,6 +25,22 @@ def test_small_deviations_follow_the_linear_model(full):
     assert np.abs(moved - still - linear).max() < 2e-3 * np.abs(linear).max()
 
 
+def test_the_matrices_are_derivatives_of_the_rates(full):
+    """Central differences of ẋ = E⁻¹ f(x, u); the lag of the thermometer is a state of its own."""
+    inputs = {"heater": 2.0, "tem": 0.8, "room": 296.0, "sink": 290.0}
+    (rest,) = rt.thermal.steady_state(full, inputs).equilibria
+    A, B, states = rt.thermal.state_matrices(full, rest.temperatures, inputs)
+    eq, x, u = rt.thermal.Equations(full), np.array(list(rest.temperatures.values())), np.array(list(inputs.values()))
+    n, step = len(x), 1e-3
+    assert states[:n] == full.lump_names and states[-1] == "T_sample_lag"
+    by_x = np.array([eq.rate(x + step * e, u) - eq.rate(x - step * e, u) for e in np.eye(n)]).T / (2 * step)
+    by_u = np.array([eq.rate(x, u + step * e) - eq.rate(x, u - step * e) for e in np.eye(len(u))]).T / (2 * step)
+    assert np.abs(A[:n, :n] - by_x).max() < 1e-7 * np.abs(by_x).max()
+    assert np.abs(B[:n] - by_u).max() < 1e-7 * np.abs(by_u).max()
+    sensor = full.sensors["T_sample"]
+    assert A[-1, -1] == -1 / sensor.time_constant and A[-1, states.index(sensor.lump)] == 1 / sensor.time_constant
+
+
 def test_published_time_constants():
     # notes: coupled network with K = 0.2968 W/K, slowest 225 s, fastest 0.24 s
     table = rt.thermal.time_constants(rt.systems.two_module())
