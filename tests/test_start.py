@@ -50,33 +50,36 @@ def test_help_loads_no_numerics(tmp_path: Path) -> None:
     assert all(status == 0 and "Example: robthermal" in said for _, status, said, _ in found)
 
 
-def test_a_measured_file_or_a_result_that_is_missing_is_answered_before_anything_is_loaded(tmp_path: Path) -> None:
+def test_a_missing_input_is_answered_before_anything_is_loaded(tmp_path: Path) -> None:
     lines = [["check", str(MACHINE), "lost.csv"], ["simulate", str(MACHINE), "lost.csv", "--out", "out.csv"],
              ["calibrate", str(MACHINE), "lost.csv"],
              ["diagnose", str(MACHINE), str(MACHINE), "--validation", "lost.csv"],
              ["diagnose", str(MACHINE), str(MACHINE), "--reference", "lost.csv"],
-             ["frf", "lost.csv", "--system", str(MACHINE)], ["report", "lost.csv"],
-             ["explain", "lost.csv"]]
+             ["frf", "lost.csv", "--system", str(MACHINE)], ["report", "lost.csv"], ["explain", "lost.csv"],
+             *([name, "lost.csv"] for name in ("run", "certify", "design", "map", "couple")),
+             *([name, "lost.csv", str(MACHINE)] for name in ("check", "simulate", "calibrate", "diagnose"))]
+    lines[-3] += ["--out", "out.csv"]
     found = after(lines, NOTHING, tmp_path)
     assert [(words, loaded) for words, _, _, loaded in found] == [(words, []) for words in lines]
     assert [(words, status) for words, status, _, _ in found] == [(words, 2) for words in lines]
     assert all("lost.csv" in said for *_, said, _ in found)
 
 
-def test_a_system_or_a_project_that_is_missing_is_answered_with_its_reader_alone(tmp_path: Path) -> None:
-    record = tmp_path / "record.csv"
+def test_a_file_that_cannot_be_read_is_answered_with_its_reader_alone(tmp_path: Path) -> None:
+    record, broken = tmp_path / "record.csv", tmp_path / "broken.toml"
     record.write_text("time,T\n0,20\n1,20\n", encoding="utf-8")
-    lines = [["run", "lost.toml"], ["check", "lost.toml", str(record)],
-             ["simulate", "lost.toml", str(record), "--out", "out.csv"], ["calibrate", "lost.toml", str(record)],
-             ["diagnose", "lost.toml", str(record)], ["frf", str(record), "--system", "lost.toml"],
-             ["certify", "lost.toml"], ["design", "lost.toml"], ["design", "lost.toml", "--method", "hinf"],
-             ["map", "lost.toml"], ["couple", "lost.toml"], ["datasheet", "lost.csv"],
+    broken.write_text("[lumps\n", encoding="utf-8")
+    lines = [["run", "broken.toml"], ["check", "broken.toml", "record.csv"],
+             ["simulate", "broken.toml", "record.csv", "--out", "out.csv"], ["calibrate", "broken.toml", "record.csv"],
+             ["diagnose", "broken.toml", "record.csv"], ["frf", "record.csv", "--system", "broken.toml"],
+             ["certify", "broken.toml"], ["design", "broken.toml"], ["design", "broken.toml", "--method", "hinf"],
+             ["map", "broken.toml"], ["couple", "broken.toml"], ["datasheet", "broken.csv"],
              ["excitation", "m", "--period", "100", "--sample-time", "1", "--band", "0.01", "0.1", "--amplitude", "1",
-              "--system", "lost.toml"]]
+              "--system", "broken.toml"]]
     found = after(lines, SLOW, tmp_path)
     assert [(words, loaded) for words, _, _, loaded in found] == [(words, []) for words in lines]
     assert [(words, status) for words, status, _, _ in found] == [(words, 2) for words in lines]
-    assert all("lost." in said for *_, said, _ in found)
+    assert all("broken." in said for *_, said, _ in found)
 
 
 def test_a_missing_certificate_is_answered_with_the_checker_alone(tmp_path: Path) -> None:

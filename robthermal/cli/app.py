@@ -91,6 +91,7 @@ def run(project: Annotated[Path, typer.Argument(help="Project file.", metavar="P
 
     Example: robthermal run project.toml --out results
     """
+    there(project)
     job = rt.jobs.read_project(project)
     job = rt.jobs.request.gate_from_text(job, confidence=confidence, tolerance=tolerance or [])
     _run(job, out, as_json, [name.strip() for name in only.split(",") if name.strip()], start, force)
@@ -116,7 +117,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
     Example: robthermal check setup.toml run1.csv run2.csv
     """
     system = files[0] if files[0].suffix.lower() == ".toml" else None
-    there(*files[bool(system):])
+    there(*files)
     found = rt.read_system(system) if system else None
     tables = reading(record, column)
     measured = files[1:] if system else files
@@ -144,7 +145,7 @@ def simulate(system: SystemFile, record: Annotated[Path, typer.Argument(help="Re
 
     Example: robthermal simulate setup.toml inputs.csv --out simulated.csv
     """
-    there(record)
+    there(system, record)
     found = rt.read_system(system)
     with progress() as stage:
         stage("reading the record")
@@ -174,7 +175,7 @@ def calibrate(system: SystemFile,
 
     Example: robthermal calibrate setup.toml train.csv --validation held_out.csv --out calibrated.toml
     """
-    there(*records, *(validation or []))
+    there(system, *records, *(validation or []))
     found = rt.read_system(system)
     point = rt.jobs.request.point_from_text(found, operating_point or [])
     with progress() as stage:
@@ -217,6 +218,7 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
 
     Example: robthermal certify setup.toml --current m1=0:1.5 --current m2=0:1.5 --out certified
     """
+    there(system)
     found = rt.read_system(system)
     boxes = rt.jobs.request.boxes_from_text(found, temperature=temperature, current=current or [],
                                             ambient=ambient or [], setpoint=setpoint or [], method=method,
@@ -270,6 +272,7 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
 
     Example: robthermal design setup.toml --setpoint m1=5 --setpoint m2=5 --bandwidth 0.02 --out design
     """
+    there(system)
     if method in rt.jobs.synthesize.METHODS:
         job = rt.jobs.read_plant_file(system)
         free(out)
@@ -314,6 +317,7 @@ def limit_map(system: SystemFile, out: Out = Path("robthermal-map"),
 
     Example: robthermal map setup.toml --ambient 15,35,5 --load 0,5,6 --setpoint 5,15,3 --out map
     """
+    there(system)
     found = rt.read_system(system)
     wanted = rt.jobs.map.map_from_text(found, ambient=ambient, load=load, setpoint=setpoint, temperature=temperature,
                                        method=method)
@@ -331,6 +335,7 @@ def couple(spec: Annotated[Path, typer.Argument(help="Two subsystems and their d
 
     Example: robthermal couple SPEC.toml --out coupled
     """
+    there(spec)
     job = rt.jobs.read_coupling(spec)
     free(out)
     with progress() as stage:

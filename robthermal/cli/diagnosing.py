@@ -47,7 +47,7 @@ def diagnose(system: SystemFile,
 
     Example: robthermal diagnose setup.toml train.csv --validation held_out.csv --out diagnosed
     """
-    there(*records, *(validation or []), *(reference or []))
+    there(system, *records, *(validation or []), *(reference or []))
     found = rt.read_system(system)
     tables = reading(record, column)
     point = rt.jobs.request.point_from_text(found, operating_point or [])

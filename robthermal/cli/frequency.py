@@ -50,7 +50,7 @@ def frf(records: Annotated[list[Path], typer.Argument(help="Records of one machi
 
     Example: robthermal frf run1.csv run2.csv --system setup.toml --method lrmp --out frf.json --plot frf.svg
     """
-    there(*records)
+    there(*records, *([system] if system else []))
     model = rt.read_system(system) if system else None
     with progress() as stage:
         stage("estimating the frequency response")
@@ -88,6 +88,7 @@ def excitation(names: Annotated[list[str], typer.Argument(help="Input columns.",
 
     Example: robthermal excitation m1 m2 --period 7200 --sample-time 1 --band 0.0005 0.1 --amplitude 0.5
     """
+    there(*([system] if system else []))
     model = rt.read_system(system) if system else None
     u = rt.jobs.measured.design_excitation(names, period=period, sample_time=sample_time, band=band,
                                            amplitude=amplitude, periods=periods, nonnegative=nonnegative,

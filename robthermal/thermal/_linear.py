@@ -97,7 +97,7 @@ def state_matrices(system: System, temperatures: ArrayLike | Mapping[str, float]
     >>> import robthermal as rt
     >>> A, B, states = rt.thermal.state_matrices(rt.systems.tclab_two_state())
     >>> A.shape, B.shape, states
-    ((2, 2), (2, 3), ('heater_1', 'heater_2'))
+    ((2, 2), (2, 2), ('heater', 'sensor'))
     """
     eq = equations(system)
     return *_matrices(eq, _point(eq, temperatures), exogenous_point(eq, inputs or {})), _states(eq)
