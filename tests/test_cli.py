@@ -610,7 +610,7 @@ def test_version(run: Run) -> None:
     (["demo", "--nonsense"], ["--nonsense", "demo --help"]),
     (["check"], ["SYSTEM.toml", "check --help"]),
     (["certify", "x.toml", "--temperature", "warm", "5"], ["--temperature"]),
-    (["check", "none.toml"], ["none.toml", "No such file"]),
+    (["check", "none.toml"], ["none.toml", "no such file", "Check the path."]),
 ])
 def test_wrong_command_lines(run: Run, args: list[str], words: list[str]) -> None:
     refused(run(*args), *words)

@@ -75,7 +75,7 @@ def there(*files: Path) -> None:
     """Refuse input files that do not exist: said before the work, not after a part of it."""
     for file in files:
         if not file.exists():
-            raise InputError("there is no such file", where=str(file))
+            raise InputError("there is no such file", where=str(file), remedy="Check the path.")
 
 
 def place(file: Path | None) -> Path | None:
