@@ -176,7 +176,7 @@ class LinearizedRecord:
                    if unknowns.start.stop > unknowns.start.start else [])
         J = self.run.derivative([*names, *own, *initial])[:, self.one.columns]
         out = np.zeros((*J.shape[:2], unknowns.v.size))
-        common = np.ascontiguousarray(J[..., :len(names)]).reshape(-1, len(names)) @ chain  # one product
+        common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
         out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
