@@ -349,11 +349,14 @@ def _unknown(table: Table, places: Mapping[str, int], time: Sequence[int]) -> li
 def _refuse_misspelt(table: Table, name: str, role: str, unknown: Sequence[str]) -> None:
     for header in unknown:
         if misspelt(split_header(header)[0], [name]) is not None:
+            others = ", ".join(repr(other) for other in unknown if other != header)
+            others = others if len(others) <= _LISTED else others[:_LISTED] + " …"
             raise InputError(
                 f"there is no column {name!r} ({_KINDS[role]}), but {header!r}",
                 where=table.where,
                 expected="the names of the system file",
-                remedy=f"Write --column '{name}={header}' if it is the same; else give it a name less alike.",
+                remedy=f"Write --column '{name}={header}' (or [columns]) if it is the same; else the column that "
+                f"{name!r} is: {others or 'there is no other'}. If it is none, give {header!r} a name less alike.",
             )
 
 
