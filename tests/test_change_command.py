@@ -11,6 +11,7 @@ from commands import Run
 from two_days import SYSTEM, Day, record
 
 import robthermal as rt
+from robthermal.jobs.diagnose._change_words import gain_in_words
 
 FAN = "links.sink-room.conductance"
 CELSIUS = ["T_block", "T_plate", "T_sink", "room"]
@@ -57,3 +58,10 @@ def test_a_reference_without_files_is_refused(run: Run, folder: Path) -> None:
 def test_all_files_after_the_option_are_reference(run: Run, folder: Path) -> None:
     status, _, err = run("diagnose", folder / "setup.toml", "--reference", folder / "old1.csv", folder / "new.csv")
     assert status == 2 and "TRAIN.csv" in err
+
+
+@pytest.mark.parametrize(("gain", "words"), [(-0.1, "heater gives 10 % less than its record column says (± 2 %)"),
+                                             (0.25, "heater gives 25 % more than its record column says (± 2 %)")])
+def test_a_weak_heater_in_words(gain: float, words: str) -> None:
+    one = rt.diagnosis.Found("input_gain", ("heater",), {"gain": (gain, 0.02, "-")}, 1e-4, 50.0, None)
+    assert gain_in_words(one) == words

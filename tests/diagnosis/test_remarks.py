@@ -216,6 +216,8 @@ def test_a_model_that_moves_beside_readings_that_do_not_gets_no_name(run: Run, t
     said = found["outcome"]["text"]
     assert "The model moves and the readings do not." in said and "never leave their noise" in said
     assert "Refine the network" not in said
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Something is missing in the model" not in page  # the sentence on top does not say so either
 
 
 @pytest.mark.usefixtures("few")
@@ -227,6 +229,8 @@ def test_one_column_twice_and_counts_are_said(run: Run, tmp_path: Path) -> None:
     assert "T_plate and T_block read the same in every sample of record 'log.csv': one column twice?" in said
     assert "q is between 0 and 255 in the records; the system's limits are 0 and 100: percent or counts?" in said
     assert "Refine the network" not in said  # a finer network leaves most of it
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert " K. q is between 0 and 255 in the records" in page  # on top
 
 
 def test_constant_readings_are_refused_beside_healthy_days() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found, Gap
-from ._change_words import change_in_words, nothing_changed
+from ._change_words import change_in_words, gain_in_words, nothing_changed
 from ._effect_words import in_words, labels_in_words
 
 
@@ -19,17 +19,21 @@ def answer_sentence(found: Diagnosis) -> str:
     if found.effects:
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
             f"The model lacks {accepted_in_words(found)}")
-        falls = f"With it the error on {records} falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}."
+        both = f"{gap.before:.2g} to {gap.after:.2g} {gap.unit}"
+        falls = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records} falls from {both}."
         return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])
     if found.verdict == "consistent":
         if found.reference:
             return nothing_changed(found)
         text = "The model explains the records: its error is no larger than the noise of the sensors allows."
         return " ".join([text, *found.noise_floor.remarks[:1], *found.caveats])
+    remarks = found.noise_floor.remarks[:1]
+    if found.noise_floor.quiet:
+        return " ".join(["The model moves and the readings do not.", *remarks])
     what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
             "Something is missing in the model that no effect of the catalog explains")
-    return (f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "
-            f"{gap.unit}.")
+    return " ".join([f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
+                     f"{gap.noise:.2g} {gap.unit}.", *remarks])
 
 
 def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
@@ -69,4 +73,6 @@ def _shown(found: Diagnosis) -> tuple[Gap, str]:
 def _accepted(effect: Found, changed: bool) -> str:
     if changed and effect.effect == "parameter_change":
         return change_in_words(effect)
+    if changed and effect.effect == "input_gain":
+        return gain_in_words(effect)
     return in_words(effect.effect, effect.where)

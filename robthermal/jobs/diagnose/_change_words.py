@@ -20,6 +20,19 @@ def change_in_words(found: Found) -> str:
             f"{'lower' if value < 0 else 'higher'} (± {100 * std:.0f} %)")
 
 
+def gain_in_words(found: Found) -> str:
+    """A heater or amplifier that no longer gives what its column says, as "heater gives 10 % less ...".
+
+    Parameters
+    ----------
+    found : Found
+        An accepted `input_gain`.
+    """
+    value, std, _ = found.values["gain"]
+    return (f"{found.where[0]} gives {100 * abs(value):.0f} % {'less' if value < 0 else 'more'} than its record column "
+            f"says (± {100 * std:.0f} %)")
+
+
 def nothing_changed(found: Diagnosis) -> str:
     """The answer where the new records are within the scatter.
 
