@@ -25,10 +25,12 @@ HEADER = SOURCE.with_name("_vectors.h")
 # Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor
 # has instructions for. Neither -ffast-math: numbers that are not numbers must stay so.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-Wno-psabi", "-fPIC")
-PARTS = {  # by the width of a vector; the first has to succeed
+X86 = {  # by the width of a vector; the first has to succeed
     4: ("-mavx2", "-mfma"),
     8: ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mfma", "-mprefer-vector-width=512"),
 }
+ARM: dict[int, tuple[str, ...]] = {2: ()}  # every 64-bit one has vectors of two
+PARTS = {"x86_64": X86, "amd64": X86, "aarch64": ARM, "arm64": ARM}
 LONGEST = 300  # seconds that the compiler may take: 20 where nothing else runs
 
 
@@ -67,17 +69,18 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
 
 def build(source: Path, library: Path) -> None:
     """Compile `source` to `library`, which appears whole or not at all."""
-    if sys.platform == "win32" or platform.machine().lower() not in ("x86_64", "amd64"):
-        raise RuntimeError(f"it is for x86-64 without Windows, this is {sys.platform} on {platform.machine()}")
+    parts = PARTS.get(platform.machine().lower())
+    if sys.platform == "win32" or not parts:
+        raise RuntimeError(f"it is for x86-64 and ARM64, not Windows; this is {sys.platform} on {platform.machine()}")
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
     if not compiler or not shutil.which(compiler[0]):
         compiler = ["cc"]
     unfinished = library.with_suffix(f".{os.getpid()}.tmp")
     with tempfile.TemporaryDirectory() as folder:
-        objects = [Path(folder, f"{lanes}.o") for lanes in PARTS]
+        objects = [Path(folder, f"{lanes}.o") for lanes in parts]
         with ThreadPoolExecutor() as pool:
-            failed = [*pool.map(lambda lanes, target: _run([*compiler, *FLAGS, *PARTS[lanes], f"-DLANES={lanes}", "-c",
-                                                            "-o", str(target), str(source)]), PARTS, objects)]
+            failed = [*pool.map(lambda lanes, target: _run([*compiler, *FLAGS, *parts[lanes], f"-DLANES={lanes}", "-c",
+                                                            "-o", str(target), str(source)]), parts, objects)]
         if failed[0]:
             raise RuntimeError(failed[0])
         whole = [str(target) for target, message in zip(objects, failed, strict=True) if not message]
