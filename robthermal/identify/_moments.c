@@ -321,9 +321,16 @@ INLINE int solve_sized(const problem *q, const int n_u, const int n_y, const int
         prepare(q, n_u, n_y, at, (int)stretch + 2 * half, b);
         for (int j = 0; j < stretch; j += 2) {
             vec Hr[2][columns][columns], Hi[2][columns][columns], energy[2][n];
-            memset(Hr, 0, sizeof Hr);
-            memset(Hi, 0, sizeof Hi);
-            memset(energy, 0, sizeof energy);
+            for (int v = 0; v < 2 && n == 2; v++) {     /* few: faster than a call */
+                for (int d = 0; d < columns; d++)
+                    for (int e = 0; e < columns; e++) Hr[v][d][e] = Hi[v][d][e] = fill(0.0);
+                energy[v][0] = energy[v][1] = fill(0.0);
+            }
+            if (n > 2) {
+                memset(Hr, 0, sizeof Hr);
+                memset(Hi, 0, sizeof Hi);
+                memset(energy, 0, sizeof energy);
+            }
             if (q->n_poles) {
                 sums(b.energy_of_w + j, half, q->products, 2 * size - 1, moments);
                 for (int v = 0; v < 2; v++) least[v] = factorize(moments, v, size, &factors[v][0][0]);

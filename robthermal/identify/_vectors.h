@@ -38,17 +38,16 @@ INLINE void multiply(signal a, signal b, int length, signal out)
     }
 }
 
-/* Stretches of a sequence side by side. */
+/* Stretches of a sequence side by side: number by number, for no instruction gathers them faster. */
 INLINE void side_by_side(const complex_number *from, const int64_t *at, int length, signal to)
 {
-    for (int j = 0; j < length; j++) {
-        vec re, im;
-        for (int k = 0; k < LANES; k++) {
-            re[k] = from[at[k] + j][0];
-            im[k] = from[at[k] + j][1];
+    for (int k = 0; k < LANES; k++) {
+        const complex_number *own = from + at[k];
+        double *re = (double *)to.re + k, *im = (double *)to.im + k;
+        for (int j = 0; j < length; j++) {
+            re[j * LANES] = own[j][0];
+            im[j * LANES] = own[j][1];
         }
-        to.re[j] = re;
-        to.im[j] = im;
     }
 }
 
