@@ -98,10 +98,7 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
     """Refuse signals (each (n, n_u), one per experiment) that are constant, or combinations of each other."""
     gram, varies = np.zeros((len(names), len(names))), np.zeros(len(names), dtype=bool)
     for signal in signals:
-        centered = np.empty(signal.shape[::-1])  # channel by channel: neighboring numbers lie side by side
-        for row, column in zip(centered, signal.T, strict=True):
-            np.subtract(column, column.mean(), out=row)
-        own = centered @ centered.T
+        own = _gram(signal)
         gram += own
         varies |= np.sqrt(np.diag(own) / len(signal)) > _SILENT * _largest(signal)
     for i, name in enumerate(names):
@@ -125,6 +122,18 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
         )
 
 
+def _gram(signal: Array) -> Array:
+    """Products of the deviations from the mean (n_u, n_u), of a signal (n, n_u)."""
+    n, channels = signal.shape
+    centered = np.empty((channels, n))  # neighboring numbers of a channel lie side by side
+
+    def center(c: int) -> None:
+        np.subtract(signal[:, c], signal[:, c].mean(), out=centered[c])
+
+    run_all(center, range(channels), worth=channels > 1 and n > _SIDE_BY_SIDE[0])
+    return np.asarray(centered @ centered.T)
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """DFT of one record, normalized by 1/sqrt(N), bins 1 ... (N-1)//2: Evers (4.2). Bin 0 and Nyquist are left out."""
@@ -143,14 +152,13 @@ def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
     n, n_u, n_y = len(inputs), inputs.shape[1], outputs.shape[1]
     whole = np.empty((n_u + n_y, n // 2 + 1), dtype=complex)
     spectra = whole[:, 1 : (n - 1) // 2 + 1]
-    levels = rounding_level(inputs)
 
     def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
         column = inputs[:, c] if c < n_u else outputs[:, c - n_u]
         np.fft.rfft(column - column.mean(), norm="ortho", out=whole[c])
         if c < n_u:
             row = spectra[c]
-            row[np.abs(row) <= levels[c]] = 0.0
+            row[np.abs(row) <= rounding_level(inputs[:, c : c + 1])] = 0.0
 
     run_all(transform, range(n_u + n_y), worth=_SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
     return Spectrum(U=spectra[:n_u], Y=spectra[n_u:], n_samples=n)
