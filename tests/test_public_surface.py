@@ -12,6 +12,7 @@ import pytest
 import robthermal as rt
 
 MACHINE = Path(rt.__file__).parent / "systems" / "two_module.toml"
+ROOT = Path(__file__).parents[1]
 
 SURFACE = {
     "robthermal": """
@@ -137,6 +138,15 @@ def test_public_names_are_the_listed_ones(package: str) -> None:
     gone, new = sorted(listed - found), sorted(found - listed)
     assert not gone, f"{package}: a public name went. A script may use it: keep it, or say so in the changelog: {gone}"
     assert not new, f"{package}: list the new public names here, and in the changelog: {new}"
+
+
+@pytest.mark.parametrize("package", sorted(
+    ".".join(path.parent.relative_to(ROOT).parts) for path in (ROOT / "robthermal").rglob("__init__.py")
+    if "__getattr__" in path.read_text(encoding="utf-8")))
+def test_names_that_load_on_first_use_are_listed_before(package: str) -> None:
+    """The site, notebooks and editors ask dir(), which knows no __getattr__."""
+    module = import_module(package)
+    assert "__dir__" in vars(module) and set(module.__all__) <= set(module.__dir__())
 
 
 def test_every_package_is_listed() -> None:

@@ -26,3 +26,7 @@ __all__ = ["Coupling", "CouplingJob", "couple_subsystems", "coupling_from_tables
            "save_coupling", "write_coupling"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__

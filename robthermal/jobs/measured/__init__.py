@@ -33,3 +33,7 @@ __all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_respon
            "reading_from_text", "write_excitation"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -39,3 +39,7 @@ __all__ = ["Boxes", "CoupleTable", "DesignTable", "Gate", "Identification", "Met
            "read_project", "read_text", "read_toml", "refusal", "write_calibrated"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -26,3 +26,7 @@ _HOME = {  # name: the module it lives in
 __all__ = ["METHODS", "Synthesis", "SynthesisJob", "read_plant_file", "synthesize_plant", "write_synthesis"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -23,3 +23,7 @@ _HOME = {  # name: the module it lives in
 __all__ = ["FileCheck", "SecondVerdict", "certificate_files", "second_verdicts", "verify_files", "write_checks"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
+
+
+def __dir__() -> list[str]:
+    return __all__
