@@ -66,7 +66,7 @@ def test_status_says_whether_the_point_is_held(run: Run, options: list[str], sta
 
 @pytest.mark.parametrize(("arguments", "message"), [
     ([], "no datasheet is given.*--rating 'Th=27"), (["TM 12"], "there is no datasheet 'TM 12'.*TM 127-1.4-4.0"),
-    (["no.csv"], "no.csv: cannot be read"),
+    (["no.csv"], "no.csv: there is no such file"),
     (["--rating", "Th=300, Vmax=15.5, Imax=3.9, dTmax=70"], "looks like kelvin.*Th=300K"),
     (["--rating", "Th=27K, Vmax=15.5, Imax=3.9, dTmax=70"], "looks like degrees Celsius.*without K"),
     (["--rating", "Th=27, Vmax=15.5, Imax=3900, dTmax=70"], "--rating, Imax: .*milliampere"),

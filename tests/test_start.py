@@ -56,7 +56,7 @@ def test_a_missing_input_is_answered_before_anything_is_loaded(tmp_path: Path) -
              ["diagnose", str(MACHINE), str(MACHINE), "--validation", "lost.csv"],
              ["diagnose", str(MACHINE), str(MACHINE), "--reference", "lost.csv"],
              ["frf", "lost.csv", "--system", str(MACHINE)], ["report", "lost.csv"], ["explain", "lost.csv"],
-             *([name, "lost.csv"] for name in ("run", "certify", "design", "map", "couple")),
+             *([name, "lost.csv"] for name in ("run", "certify", "design", "map", "couple", "datasheet")),
              *([name, "lost.csv", str(MACHINE)] for name in ("check", "simulate", "calibrate", "diagnose"))]
     lines[-3] += ["--out", "out.csv"]
     found = after(lines, NOTHING, tmp_path)

@@ -10,7 +10,7 @@ import typer
 
 import robthermal as rt
 
-from .terminal import Json, answer, exit_unless, place, say
+from .terminal import Json, answer, exit_unless, place, say, there
 
 
 def new(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to make.")], as_json: Json = False) -> None:
@@ -60,6 +60,7 @@ def datasheet(
 
     Example: robthermal datasheet "TM 127-1.4-4.0" --cold 10 --ambient 25 --load 8 --out module.toml
     """
+    there(*(Path(one) for one in sheets or [] if one.lower().endswith(".csv")))
     wanted = rt.jobs.datasheet.wanted_in_celsius(cold=cold, hot=hot, ambient=ambient, load=load, current=current,
                                                  sink=sink)
     found = rt.jobs.compare_modules(rt.jobs.read_sheets(sheets or [], rating or [], name), wanted,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -166,24 +167,31 @@ class _Problem:
     target: Array  # their set-points [K]
     heat: Array
 
+    @cached_property  # asked for at every step along the curve
     def free(self) -> Indices:
+        """Lumps that are not regulated."""
         return np.setdiff1d(np.arange(len(self.eq.capacity)), self.held)
 
+    @cached_property
     def columns(self) -> Indices:
         """Columns of u that hold the currents of the regulating modules."""
         return len(self.eq.system.inputs) + self.modules
 
+    @cached_property
+    def start(self) -> Array:
+        """Exogenous values at rest."""
+        return self.eq.nominal()
+
     def pack(self, x: Array, currents: Array) -> Array:
-        return np.concatenate([x[self.free()], currents[self.modules]])
+        return np.concatenate([x[self.free], currents[self.modules]])
 
     def state(self, y: Array, share: float, rest: Array) -> tuple[Array, Array]:
         """Temperatures and exogenous values at a share of the way."""
-        x, free = np.empty(len(self.eq.capacity)), self.free()
+        x, free = np.empty(len(self.eq.capacity)), self.free
         x[free] = y[:free.size]
         x[self.held] = rest[self.held] + share * (self.target - rest[self.held])
-        start = self.eq.nominal()
-        u = start + share * (self.u - start)
-        u[self.columns()] = y[free.size:]
+        u = self.start + share * (self.u - self.start)
+        u[self.columns] = y[free.size:]
         return x, u
 
     def residual(self, rest: Array) -> Any:
@@ -193,23 +201,23 @@ class _Problem:
         def J(y: Array, share: float) -> Array:
             x, u = self.state(y, share, rest)
             Jx, Ju = self.eq.jacobians(x, u)
-            du = self.u - self.eq.nominal()
-            du[self.columns()] = 0.0
+            du = self.u - self.start
+            du[self.columns] = 0.0
             along = Ju @ du + Jx[:, self.held] @ (self.target - rest[self.held]) + self.heat
-            return np.column_stack([Jx[:, self.free()], Ju[:, self.columns()], along])
+            return np.column_stack([Jx[:, self.free], Ju[:, self.columns], along])
         return J
 
     def scale(self) -> Array:
-        return np.concatenate([np.full(self.free().size, 50.0), np.full(self.modules.size, 2.0)])
+        return np.concatenate([np.full(self.free.size, 50.0), np.full(self.modules.size, 2.0)])
 
     def inside(self, y: Array) -> bool:
-        x = y[:self.free().size]
+        x = y[:self.free.size]
         return bool(x.min(initial=_HOTTEST) > _COLDEST and x.max(initial=_COLDEST) < _HOTTEST)
 
     def equilibrium(self, y: Array) -> Equilibrium:
         x, u = self.state(y, 1.0, np.zeros(len(self.eq.capacity)))
         if self.held.size:
-            slowest = slowest_regulated(self.eq, x, u, self.held, self.columns())
+            slowest = slowest_regulated(self.eq, x, u, self.held, self.columns)
         else:
             slowest = float(np.linalg.eigvals(self.eq.jacobians(x, u)[0] / self.eq.capacity[:, None]).real.max())
         first = len(self.eq.system.inputs)
