@@ -88,15 +88,15 @@ class PortHeat:
 
     def parameter(self, name: str, V: Array) -> Array | None:
         """Derivative (..., n_q) with respect to a parameter of the terms; None where it acts on none."""
-        flows, found = np.zeros((*V.shape[:-1], len(self.scatter))), False
+        flows: Array | None = None
         first = np.concatenate([[0], np.cumsum([2 * len(term.a) for term in self.eq.terms])]).astype(np.intp)
         for number, pair, field in touched(self.eq, name):
+            flows = np.zeros((*V.shape[:-1], len(self.scatter))) if flows is None else flows
             term, (a, b, drive) = self.eq.terms[number], self.places[number]
             sides = term_derivative(term, field, V[..., a], V[..., b], V[..., drive])
             for side, flow in enumerate(sides):
                 flows[..., first[number] + side * len(a) + pair] += flow[..., pair]
-            found = True
-        return flows @ self.scatter if found else None
+        return None if flows is None else flows @ self.scatter
 
 
 def _view(place: Indices) -> Indices | slice:
