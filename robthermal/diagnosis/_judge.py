@@ -18,6 +18,7 @@ from .search import Accepted, SearchState, ShortList, implausible_names, ruled_o
 Verdict = Literal["named", "named_with_remainder", "ambiguous", "consistent", "unexplained"]
 Name = tuple[str, tuple[str, ...]]
 Progress = Callable[[str], None]
+_LARGE = 1.5  # whitened variance
 _FAR = 5.0  # whitened variance that no noise within the limits explains
 
 
@@ -167,7 +168,9 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
     """Reasons, a sentence each, why nothing may be named and nothing called consistent."""
     faults = [] if checks.outcome.ok else [checks.outcome.text]
     if state.misfit_left:
-        faults.append(f"A large misfit stays (whitened variance {state.fit.variance:.3g}).")
+        raised = state.fit.variance < _LARGE  # 1 beside noise levels at their limits says nothing of the misfit
+        how = "for which noise levels were raised" if raised else f"whitened variance {state.fit.variance:.3g}"
+        faults.append(f"A large misfit stays ({how}).")
     if held is not None and not held.outcome.ok:
         faults.append(held.outcome.text)
     if state.rounds:
