@@ -163,6 +163,29 @@ def test_the_share_promised_is_the_share_explained_where_all_is_linear(plant: rt
     assert explains(fit, scores) == pytest.approx(got, abs=0.01)
 
 
+# Where a refit starts
+
+
+def test_a_lag_far_shorter_than_a_sample_is_found_by_its_refit(
+        plant: rt.System, rate: Callable, inputs_of: Callable, integrated: Callable, recorded: Callable) -> None:
+    """Of 0.15 s at samples of 5 s; begun near the shortest trial value, 3 or 10 s, refits were given up one by one."""
+    def late(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.append(rate(T[:2], u), (T[1] - T[2]) / 0.15)
+
+    u = inputs_of(600, 1) * [10.0, 1.0]
+    T = integrated(late, np.full(3, 298.15), u)
+    train = recorded(T[:, [0, 2]], u, ["heater", "room"], ["Tp", "Tb"], 1)
+    fit = rt.diagnosis.refit(plant, train)
+    names = ["sensor_lag", "input_lag", "input_delay"]
+    short = rt.diagnosis.refit_short_list(fit, rt.diagnosis.score(fit, names))
+    found = {entry.candidate.label: entry for entry in short.entries}
+    assert {"sensor_lag(Tb)", "input_lag(heater)", "input_delay(heater)"} <= set(found)
+    value, std = found["sensor_lag(Tb)"].values["time_constant"]
+    assert abs(value - 0.15) < 3.0 * std < 0.1
+    lag, delay = found["input_lag(heater)"], found["input_delay(heater)"]
+    assert abs(lag.delta_bic - delay.delta_bic) < 10.0  # within a sample a heater with a lag is one with a delay
+
+
 # What is not tried further
 
 

@@ -6,7 +6,8 @@ truth. The declared parameters are wrong by their priors only.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -151,18 +152,29 @@ def _further_iterations(fit: Refit, tried: list[Refit], least: float, stands: fl
 
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
     """Optimum of the linearized problem for a size within its bounds, and its sum of squares."""
-    size = _believable(candidate, size)
+    size = _believable(candidate, size, _smallest(candidate.trials(fit.paths[0])))
     target = fit.z - size * fit.whiten([path.columns([candidate]) for path in fit.paths])[:, 0]
     shift = np.linalg.lstsq(*turned(fit.J, target), rcond=1e-9)[0]
     left = target - fit.J @ shift
     return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
 
 
-def _believable(candidate: Candidate, size: float) -> float:
-    """Within the bounds; near the trial value, if the signature holds only there."""
+def _believable(candidate: Candidate, size: float, smallest: float) -> float:
+    """Within the bounds; near the trial value, if the signature holds only there.
+
+    Below the smallest trial value the signature, the change of the readings per size, is all that is known: a lag much
+    shorter than a sample is found there, and started from the trial value it would need more evaluations than it gets.
+    """
     bounds, trial = candidate.effect.size, candidate.shape.get(candidate.effect.size.name)
-    low, high = (bounds.lower, bounds.upper) if trial is None else (0.7 * trial, 1.4 * trial)
-    return float(np.clip(size, low, high))
+    if trial is None:
+        return float(np.clip(size, bounds.lower, bounds.upper))
+    low = bounds.lower if trial == smallest and bounds.typical < trial else 0.7 * trial
+    return float(np.clip(size, low, 1.4 * trial))
+
+
+def _smallest(trials: Sequence[Candidate]) -> float:
+    """Smallest size that is tried; infinite for effects whose signature holds for every size."""
+    return min((one.shape.get(one.effect.size.name, math.inf) for one in trials), default=math.inf)
 
 
 def _best_trial(fit: Refit, candidate: Candidate) -> tuple[Candidate, float]:
@@ -170,7 +182,8 @@ def _best_trial(fit: Refit, candidate: Candidate) -> tuple[Candidate, float]:
     trials = [candidate] if candidate.effect.paired else candidate.trials(fit.paths[0])
     J = fit.project(fit.whiten([path.columns(trials) for path in fit.paths]))
     power, along = np.sum(J**2, axis=0), J.T @ fit.rest
-    sizes = np.array([_believable(trial, size) for trial, size in zip(trials, along / np.maximum(power, 1e-300),
-                                                                      strict=True)])
+    smallest = _smallest(trials)
+    sizes = np.array([_believable(trial, size, smallest)
+                      for trial, size in zip(trials, along / np.maximum(power, 1e-300), strict=True)])
     best = int(np.argmax(2 * sizes * along - sizes**2 * power))
     return trials[best], float(sizes[best])
