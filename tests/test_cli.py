@@ -311,7 +311,7 @@ def test_interrupt_while_writing_leaves_nothing(run: Run, system: Path, tmp_path
         seen.append(everything(tmp_path))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robthermal.jobs.evidence.write_html", interrupt)
+    monkeypatch.setattr("robthermal.jobs.report_files.write_html", interrupt)
     before = everything(tmp_path)
     done = run("certify", system, "--current", "m1=0:1", "--out", tmp_path / "out")
     assert done.status == 130 and "interrupted" in done.err

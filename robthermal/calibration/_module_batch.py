@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ADD_ZERO, ZERO_CELSIUS
+from .._distributions import chi2_isf, t_isf
 from .._drawing import line_of
 from .._pandas import pd
 from ..errors import InputError
@@ -142,7 +143,7 @@ class ModuleBatch:
                              expected="a number between 0 and 1")
         n = len(self.modules)
         many = len(PROPERTIES) * machines
-        factor = float(scipy.stats.t.isf((1.0 - confidence) / (2 * many), n - 1)) * math.sqrt(n + 1)
+        factor = float(t_isf((1.0 - confidence) / (2 * many), n - 1)) * math.sqrt(n + 1)
         found = {}
         for name, row in self.table.iterrows():
             ends = (float(row["mean"] - factor * row["std"]), float(row["mean"] + factor * row["std"]))
@@ -174,7 +175,7 @@ class ModuleBatch:
             every = np.concatenate([table["temperature"] for table in tables])
             grid = np.linspace(every.min(), every.max(), 30)
             rows = pd.DataFrame([self.at(T).loc[kind] for T in grid])
-            wide = float(scipy.stats.t.isf(0.025, len(tables) - 1)) * np.sqrt(len(tables) + 1) * rows["std"]
+            wide = float(t_isf(0.025, len(tables) - 1)) * np.sqrt(len(tables) + 1) * rows["std"]
             for i, (one, table) in enumerate(zip(self.modules, tables, strict=True)):
                 law, style = getattr(one, kind), line_of(i)
                 ax.plot(table["temperature"] - ZERO_CELSIUS, table[kind], ".", color=style["color"])
@@ -277,7 +278,7 @@ def _row(x: Floats, v: Floats) -> dict[str, float]:
     n = len(x)
     between = _between(x, v, n - 1.0)
     weights = 1.0 / (v + between)
-    lower, upper = (_between(x, v, float(scipy.stats.chi2.isf(tail, n - 1)))
+    lower, upper = (_between(x, v, float(chi2_isf(tail, n - 1)))
                     for tail in ((1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2))
     return {"mean": float(weights @ x / weights.sum()), "std": float(weights.sum() ** -0.5),
             "spread": math.sqrt(between), "spread_low": math.sqrt(lower), "spread_high": math.sqrt(upper),

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ADD_ZERO
 from .._control import control
+from .._distributions import chi2_sf
 from .._pandas import pd
 from ..errors import InputError
 from ..thermal import System, linearize, parameter_label
@@ -182,5 +182,5 @@ def _line(A: Floats, value: Floats, std: Floats) -> tuple[float, float, float, f
     estimate = covariance @ weighted.T @ (value / std)
     freedom = len(value) - 2
     scatter = float(np.sum(((value - A @ estimate) / std) ** 2))
-    p_value = float(scipy.stats.chi2.sf(scatter, freedom)) if freedom else float("nan")
+    p_value = float(chi2_sf(scatter, freedom)) if freedom else float("nan")
     return float(estimate[0]), float(estimate[1]), float(np.sqrt(covariance[1, 1])), p_value

@@ -26,6 +26,7 @@ from .terminal import (
     SeveralFiles,
     SystemFile,
     answer,
+    calibrations,
     exit_unless,
     free,
     place,
@@ -218,7 +219,8 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
 
     Example: robthermal certify setup.toml --current m1=0:1.5 --current m2=0:1.5 --out certified
     """
-    there(system)
+    given = calibrations(parameters)
+    there(system, *given)
     found = rt.read_system(system)
     boxes = rt.jobs.request.boxes_from_text(found, temperature=temperature, current=current or [],
                                             ambient=ambient or [], setpoint=setpoint or [], method=method,
@@ -229,7 +231,6 @@ def certify(system: SystemFile, out: Out = Path("robthermal-certified"),
     with progress() as stage:
         result = rt.jobs.certify_system(found, boxes, stage, parameters=ranges or None)
         stage("writing the report")
-        given = [Path(text) for text in parameters or [] if text.endswith(".json")]
         report = rt.jobs.write_certify(result, (system, *given), out)
     show_report(report, out, as_json)
 
@@ -283,6 +284,8 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
             report = rt.jobs.write_synthesis(synthesis, out)
         show_report(report, out, as_json, controller=str(out / "design.json"))
         return
+    given = calibrations(parameters)
+    there(*given)
     found = rt.read_system(system)
     wanted = rt.jobs.design.design_from_text(
         found, setpoint=setpoint or [], current=current or [], ambient=ambient or [], temperature=temperature,
@@ -293,7 +296,6 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
     with progress() as stage:
         result = rt.jobs.design_system(found, wanted, stage)
         stage("writing the report")
-        given = [Path(text) for text in parameters or [] if text.endswith(".json")]
         report = rt.jobs.write_design(result, (system, *given), out)
     show_report(report, out, as_json, controller=str(out / "design.json"))
 

@@ -78,6 +78,11 @@ def there(*files: Path) -> None:
             raise InputError("there is no such file", where=str(file), remedy="Check the path.")
 
 
+def calibrations(parameters: list[str] | None) -> list[Path]:
+    """The files among the values of --parameters."""
+    return [Path(text) for text in parameters or [] if text.endswith(".json")]
+
+
 def place(file: Path | None) -> Path | None:
     """An output file whose folder exists: said before the work, not after it, as is a file that is replaced."""
     if file is not None and not file.parent.is_dir():

@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from . import now as now
     from . import provenance as provenance
     from . import rebuild as rebuild
+    from . import report_files as report_files
     from . import request as request
     from . import run as run
     from . import starter as starter
@@ -61,8 +62,8 @@ if TYPE_CHECKING:  # what type checkers and editors see of the two tables below
     from .verify import verify_files as verify_files
 
 _PACKAGES = ("certify", "chain", "claims", "couple", "datasheet", "design", "diagnose", "evidence",
-             "explanations", "folder", "map", "network", "measured", "now", "provenance", "rebuild", "request",
-             "run", "starter", "synthesize", "verify")
+             "explanations", "folder", "map", "network", "measured", "now", "provenance", "rebuild", "report_files",
+             "request", "run", "starter", "synthesize", "verify")
 
 _HOME = {  # public name: the package inside that it lives in
     "Boxes": "request",

@@ -8,19 +8,10 @@ from math import isfinite
 from pathlib import Path
 
 from ..errors import InputError
-from ..report import (
-    Claim,
-    Evidence,
-    Report,
-    file_hash,
-    versions,
-    write_content,
-    write_html,
-    write_json,
-    write_junit,
-)
+from ..report import Claim, Evidence, Report, file_hash, versions
 from ..verification import Certificate, Verdict, machine_hash
 from .claims import Checked, kind_assumptions
+from .report_files import write_report
 from .verify import SecondVerdict, second_verdicts
 
 
@@ -123,23 +114,6 @@ def machine_of(certificate: Certificate) -> str:
         return machine_hash(certificate.system)
     except InputError:  # a claim that is not proven may come without a system
         return ""
-
-
-def write_report(report: Report, folder: Path) -> Report:
-    """Page, JUnit and summary, and everything from which they can be written again.
-
-    Parameters
-    ----------
-    report : Report
-        What to show.
-    folder : Path
-        Existing folder to write into.
-    """
-    write_html(report, folder / "report.html")
-    write_junit(report, folder / "junit.xml")
-    write_json(report, folder / "summary.json")
-    write_content(report, folder / "report.json")
-    return report
 
 
 def checker() -> str:

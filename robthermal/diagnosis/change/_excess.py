@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
+from ..._distributions import f_sf, t_isf
 from ..fit import Refit
 from ._held import Held
 from ._reference import Reference
@@ -76,7 +76,7 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
     logs = np.log([max(_variance(fit), noise) for fit in each])
     freedom = COUNTS + n - 1
     spread = math.sqrt((COUNTS * _ASSUMED**2 + float(np.sum((logs - logs.mean()) ** 2))) / freedom * (1.0 + 1.0 / n))
-    limit = math.exp(float(scipy.stats.t.isf(_SURE, freedom)) * spread)
+    limit = math.exp(float(t_isf(_SURE, freedom)) * spread)
     structure, usual = new.structure, math.exp(float(logs.mean()))
     expected = noise + (usual - noise) * louder(new, each)
     if not isinstance(structure, Held) or not structure.n_parameters:
@@ -84,7 +84,7 @@ def excess_of(new: Refit, reference: Reference) -> Excess:
     rows = slice(new.n_readings, new.n_readings + structure.n_priors)
     far = float(np.sum(new.z[rows] ** 2))
     return Excess(_variance(new) / expected, limit,
-                  float(scipy.stats.f.sf(far / structure.n_priors, structure.n_priors, freedom)))
+                  float(f_sf(far / structure.n_priors, structure.n_priors, freedom)))
 
 
 def louder(new: Refit, each: Sequence[Refit]) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 
+from ..._distributions import f_isf
 from ..effects import Candidate
 from ..evidence import score_candidates, wandering
 from ..fit import Refit
@@ -42,7 +42,7 @@ def unsteady(fit: Refit, rounds: Sequence[Accepted], reference: Reference) -> li
         usual = max(float(np.mean(healthy)), noise) if healthy else 1.0  # 1: the raised noise level
         freedom = (segments - 1) * len(healthy) or _MANY
         expected = noise + more * (usual - noise)  # noise is no larger where the machine is hotter
-        if segments > 1 and moves > expected * scipy.stats.f.isf(_SURE, segments - 1, freedom):
+        if segments > 1 and moves > expected * f_isf(_SURE, segments - 1, freedom):
             out.append(round_.best.candidate.label)
     return out
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
+from ..._distributions import f_isf, f_sf
 from ..effects import Candidate
 from ..evidence import Scores, score_candidates
 from ..fit import Refit
@@ -62,7 +62,7 @@ def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> f
     n_reference : int
         Number of reference records.
     """
-    return float(scipy.stats.f.sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
+    return float(f_sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
 
 
 def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float:
@@ -91,7 +91,7 @@ def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float
 
 def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
     """Whether two candidates differ by no more than the scatter may make."""
-    return bool(difference < max(_LEAST, kappa * scipy.stats.f.isf(_TIED, 1, COUNTS + n_reference - 1)))
+    return bool(difference < max(_LEAST, kappa * f_isf(_TIED, 1, COUNTS + n_reference - 1)))
 
 
 def with_held_shape(candidate: Candidate) -> Candidate:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..._digits import probability
+from ..._distributions import chi2_sf, f_sf
 from ..._drawing import axes_for
 from ...errors import Outcome
 from .._outcomes import DiagnosisCode
@@ -101,14 +101,14 @@ def adequacy(fit: Refit) -> Adequacy:
     tested = [statistics[name] for name in statistics if name not in fit.floor.quantized]  # steps are never white
     together = (sum(Q for Q, _ in tested), sum(lags for _, lags in tested))
     lumps = {name: p for name, (_, p) in spline_tests(fit).items()}
-    white = float(scipy.stats.chi2.sf(*together)) if tested else 1.0
+    white = float(chi2_sf(*together)) if tested else 1.0
     p = min(1.0, 2.0 * min(white, min(lumps.values()) * len(lumps)))
     ok = p > SMALLEST_P
     outcome = DiagnosisCode.ADEQUATE.outcome(f"Nothing is left to explain ({probability(p)}).") if ok else (
         DiagnosisCode.INADEQUATE.outcome(
             f"Something is left ({probability(p)}): the model with these effects does not explain the records.",
             remedy=""))
-    return Adequacy({name: float(scipy.stats.chi2.sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p,
+    return Adequacy({name: float(chi2_sf(Q, lags)) for name, (Q, lags) in statistics.items()}, lumps, p,
                     fit.variance, outcome)
 
 
@@ -156,4 +156,4 @@ def f_test(fit: Refit, J: Array) -> tuple[float, float]:
     explained = float(np.sum((U.T @ fit.rest) ** 2))
     F = (explained / q) / (max(float(fit.rest @ fit.rest) - explained, 1e-300) / nu)
     F /= float(np.mean(inflation(fit, U)))
-    return F, float(scipy.stats.f.sf(F, q * relative_degrees_of_freedom(fit, U), nu))
+    return F, float(f_sf(F, q * relative_degrees_of_freedom(fit, U), nu))

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..._digits import probability
+from ..._distributions import f_sf
 from ...errors import Diverged, InputError, Outcome
 from ...fitting import Start, counted, free_run, refuse_same, rmse
 from ...thermal import System
@@ -242,7 +242,7 @@ def predicted(fit: Refit, reference: Refit, data: Sequence[DataSet]) -> tuple[fl
     left = only.z - only.J @ np.linalg.lstsq(only.J, only.z, rcond=None)[0]
     rss = float(left @ left) / max(reference.variance, 1e-12)
     known = reference.degrees_of_freedom * reference.structure.certainty
-    return float(only.z @ only.z) / n, float(scipy.stats.f.sf(rss / n, n * structure.certainty, known))
+    return float(only.z @ only.z) / n, float(f_sf(rss / n, n * structure.certainty, known))
 
 
 def negative_log_predictive_density(fits: Sequence[Refit], reference: Refit, data: Sequence[DataSet]) -> list[float]:

@@ -9,9 +9,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+from scipy import special
 
+from ..._distributions import f_sf
 from ..._drawing import axes_for
 from ..._pandas import pd
 from ..effects import Candidate, candidates
@@ -230,11 +231,10 @@ def score_candidates(fit: Refit, tested: Sequence[Candidate]) -> Scores:
     unit, n_columns, own = joined("unit"), joined("n_columns"), joined("own")
     nu = max(fit.degrees_of_freedom - 1, 1)
     # the phase of a pair was chosen by the data: two degrees of freedom
-    chance = scipy.stats.f.sf(joined("statistic") / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
-    normal = scipy.stats.norm
-    threshold = math.sqrt(max(normal.isf(ALPHA / 2 / max(n_trials, 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
+    chance = f_sf(joined("statistic") / n_columns, n_columns, np.minimum(tail(fit, unit), nu))
+    threshold = math.sqrt(max(special.ndtri(ALPHA / 2 / max(n_trials, 1)) ** 2, BIC_GAP + math.log(fit.n_readings)))
     # unit noise, whatever is missing
-    limit = np.where(own > 0, (threshold + normal.ppf(POWER)) / np.where(own > 0, own, 1.0), np.inf)
+    limit = np.where(own > 0, (threshold + special.ndtri(POWER)) / np.where(own > 0, own, 1.0), np.inf)
     return Scores(tuple(trial for group in groups for _, trial in group.trials), joined("size"), joined("std"),
                   joined("statistic"), np.minimum(chance * max(n_trials, 1), 1.0), joined("possible"),
                   joined("identifiability"), limit, unit, n_trials)

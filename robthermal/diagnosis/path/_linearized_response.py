@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..._residual import residual
@@ -18,6 +17,7 @@ from ...thermal import Input, System
 from ..data import Complex, ResponseData
 from ..effects import Candidate
 from ._coarseness import coarse_names
+from ._heat_splines import cubic_splines
 from ._linearized import Unknowns
 
 Array = NDArray[np.float64]
@@ -188,6 +188,4 @@ def log_splines(frequencies: Array) -> Array:
     count = max(4, min(_MOST_SPLINES, frequencies.size // 6))
     t = np.log(frequencies)
     t = (t - t[0]) / max(t[-1] - t[0], 1e-12)
-    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, count - 2), [1.0] * 3])
-    basis = scipy.interpolate.BSpline.design_matrix(np.minimum(t, 1.0 - 1e-12), knots, 3)
-    return np.asarray(basis.toarray(), np.float64)
+    return cubic_splines(t, count)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
+from scipy import special
 
 from ...errors import Diverged, InputError
 from ...signals import Record
@@ -48,7 +48,7 @@ def _worth(pairs: Mapping[Pair, float], times: int = 1) -> float:
     The gain of ΔBIC is normal with mean λ and variance 4 λ, and has to exceed 10; λ grows about as the record.
     """
     gain = times * np.array(list(pairs.values()))
-    apart = scipy.stats.norm.cdf((gain - BIC_GAP) / (2.0 * np.sqrt(np.maximum(gain, 1e-9))))
+    apart = special.ndtr((gain - BIC_GAP) / (2.0 * np.sqrt(np.maximum(gain, 1e-9))))
     least = float(gain.min()) if gain.size else 0.0
     return float(np.sum(apart + _LITTLE * np.minimum(gain, _ENOUGH))) + _TIE * least
 

@@ -11,9 +11,9 @@ from threadpoolctl import threadpool_limits
 
 from ...errors import Diverged, InputError
 from ...report import Report, Stage, versions
-from ..evidence import write_report
 from ..folder import check_free
 from ..rebuild import checked_again
+from ..report_files import write_report
 from ..request import Project
 from ._assemble import assemble
 from ._cache import clear_other, commit, drop_report, forget, read_cached, staging, still_there

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ...diagnosis import Diagnosis, LinearizedRecord, diagnose
@@ -16,6 +15,7 @@ from ...errors import InputError
 from ...identify import FrequencyResponse
 from ...signals import Record
 from ...thermal import System
+from ._welch import welch
 
 Array = NDArray[np.float64]
 
@@ -59,8 +59,7 @@ class Residuals:
 
     def _welch(self, values: Array) -> tuple[Array, Array]:
         n = values.size
-        f, power = scipy.signal.welch(values, fs=1.0 / float(self.time[1] - self.time[0]),
-                                      nperseg=max(min(n, 8), n // 4))
+        f, power = welch(values, float(self.time[1] - self.time[0]), max(min(n, 8), n // 4))
         return f[1:], power[1:]
 
 

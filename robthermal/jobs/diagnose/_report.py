@@ -16,11 +16,11 @@ from ...report import Figure, Reason, Report, Section, Table, house_style, resid
 from ...signals import Record
 from ...thermal import write_system
 from ..claims import GateCode
-from ..evidence import write_report
 from ..folder import output_folder
 from ..network import network_section
 from ..now import now
 from ..provenance import provenance, simulated_label, subtitle
+from ..report_files import write_report
 from ._answer import answer_sentence, number_that_matters
 from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims

@@ -13,18 +13,19 @@ from ._import import read_files as read_files
 from ._import import reading_from_text as reading_from_text
 
 if TYPE_CHECKING:  # what type checkers and editors see of the table below
-    from ._frequency import calibrate_files as calibrate_files
+    from ._calibrate import calibrate_files as calibrate_files
     from ._frequency import design_excitation as design_excitation
     from ._frequency import estimate_response as estimate_response
-    from ._frequency import read_measured as read_measured
     from ._frequency import write_excitation as write_excitation
+    from ._measured import read_measured as read_measured
     from ._reference import import_report_beside as import_report_beside
     from ._reference import instruments_from_text as instruments_from_text
     from ._reference import noise_from_text as noise_from_text
 
 _HOME = {  # name: the module it lives in
-    **dict.fromkeys(("calibrate_files", "design_excitation", "estimate_response", "read_measured", "write_excitation"),
-                    "_frequency"),
+    **dict.fromkeys(("design_excitation", "estimate_response", "write_excitation"), "_frequency"),
+    "calibrate_files": "_calibrate",
+    "read_measured": "_measured",
     **dict.fromkeys(("import_report_beside", "instruments_from_text", "noise_from_text"), "_reference"),
 }
 

@@ -9,19 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...calibration import Fit, calibrate
 from ...errors import InputError
 from ...identify import (
     FrequencyResponse,
     IdentifyCode,
     etfe,
-    is_response,
     lpm,
     lrm,
     lrmp,
     mean_inputs,
     pole_sensitivity,
-    read_response,
     spectral,
 )
 from ...signals import Excitation, Record, multisines
@@ -264,100 +261,3 @@ def write_excitation(u: Excitation, names: Sequence[str], path: Path) -> list[Pa
                output_names=[]).save(file)
         written.append(file)
     return written
-
-
-def read_measured(paths: Sequence[Path], system: System, *, median_filter: float | None = None,
-                  tables: Sequence[ReadTable] = ()) -> list[Record | FrequencyResponse]:
-    """Read what a calibration or a diagnosis takes: records, and frequency responses as `robthermal frf` writes them.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Records and responses in any order; the content tells which is which.
-    system : System
-        Gives the columns of records.
-    median_filter : float, optional
-        Length of a median filter over the sensors of records [s].
-    tables : sequence
-        How the files are read, from `reading_from_text`.
-
-    Returns
-    -------
-    list of Record or FrequencyResponse
-
-    Raises
-    ------
-    InputError
-        As the readers; also for a response without covariance, whose misfit cannot be weighed.
-
-    Examples
-    --------
-    >>> import robthermal as rt
-    >>> rt.jobs.measured.read_measured([], rt.systems.two_module())
-    []
-    """
-    found: list[Record | FrequencyResponse] = []
-    for path in paths:
-        found += [_response(path)] if is_response(path) else read_files([path], system, tables=tables,
-                                                                        median_filter=median_filter)
-    return found
-
-
-def _response(path: Path) -> FrequencyResponse:
-    found = read_response(path)
-    if not found.has_covariance:
-        raise InputError("is a frequency response without covariance and without names of channels", where=str(path),
-                         expected="the .json, .npz or .mat file that robthermal frf writes",
-                         remedy="Without a covariance no misfit can be called large.")
-    return found
-
-
-def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
-                    median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
-                    tables: Sequence[ReadTable] = (), max_iterations: int = 50) -> Fit:
-    """Calibrate a system with files of records and of frequency responses together.
-
-    Parameters
-    ----------
-    system : System
-        With starting values and a [fit] table.
-    records : sequence of Path
-        Training records and frequency responses, in any order.
-    validation : sequence of Path
-        Records and responses that the fit does not see.
-    median_filter : float, optional
-        Length of a median filter over the sensors of records [s].
-    operating_point : mapping, optional
-        Of the frequency responses: means of heaters [unit], module currents [A] and ambients [K], instead of those in
-        their files.
-    tables : sequence
-        How the files are read, from `reading_from_text`.
-    max_iterations : int
-        After how many iterations the calibration stops.
-
-    Returns
-    -------
-    Fit
-
-    Raises
-    ------
-    InputError
-        As the readers and `rt.calibrate`; for an operating point of records.
-
-    Examples
-    --------
-    >>> import robthermal as rt
-    >>> rt.jobs.measured.calibrate_files(rt.systems.two_module(), [])
-    Traceback (most recent call last):
-    ...
-    robthermal.errors.InputError: records: no file is given. Expected records, frequency responses or both.
-    """
-    if not records:
-        raise InputError("no file is given", where="records", expected="records, frequency responses or both")
-    train, held_out = (read_measured(paths, system, median_filter=median_filter, tables=tables)
-                       for paths in (records, validation))
-    if operating_point and not any(isinstance(one, FrequencyResponse) for one in (*train, *held_out)):
-        raise InputError("an operating point is given with records", where="--operating-point",
-                         remedy="Leave it out: a record brings its own inputs.")
-    return calibrate(system, train, validation=held_out or None, operating_point=operating_point or None,
-                     max_iterations=max_iterations)

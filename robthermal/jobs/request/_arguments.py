@@ -7,10 +7,12 @@ from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
+from ..._first_use import OnFirstUse
 from ...errors import InputError
 from ...thermal import System, drivable_range
-from ._calibrated import read_calibrated
 from ._schema import METHODS, STRUCTURES, Boxes, Project, in_kelvin, range_in_kelvin
+
+_calibrated = OnFirstUse(f"{__package__}._calibrated")  # few command lines name a calibration
 
 
 def boxes_from_text(system: System, *, temperature: tuple[float, float] | None = None, current: Sequence[str] = (),
@@ -157,7 +159,7 @@ def ranges_from_text(system: System, texts: Sequence[str], confidence: float = 0
     confidence = checked_confidence(confidence)
     ranges: dict[str, tuple[float, float]] = {}
     for text in filter(_is_file, texts):
-        ranges |= read_calibrated(Path(text), system).ranges(confidence)
+        ranges |= _calibrated.read_calibrated(Path(text), system).ranges(confidence)
     return ranges | dict(_range(text, "--parameters") for text in texts if not _is_file(text))
 
 

@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+
+from ..._distributions import chi2_sf
 
 Array = NDArray[np.float64]
 SIGNIFICANT = 1e-3  # p below it: noise does not explain the residual
@@ -83,7 +84,7 @@ def misfit(kind: str, record: str, sensor: str, residual: Array, noise: float, t
     e = residual[np.isfinite(residual)]
     power = float(np.mean(e**2)) if e.size else 0.0
     count = effective_count(e)
-    p = float(scipy.stats.chi2.sf(count * power / noise**2, count)) if e.size else 1.0
+    p = float(chi2_sf(count * power / noise**2, count)) if e.size else 1.0
     return Misfit(kind, record, sensor, float(e.mean()) if e.size else 0.0, power**0.5, noise,
                   max(power - noise**2, 0.0) ** 0.5, tolerance, p, unit)
 
