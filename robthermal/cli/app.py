@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 import warnings
@@ -45,6 +46,7 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
 # A wrong command line. It has no public name that all versions share: newer ones of typer bring their own click.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
+_OBJECTS = 5_000  # made between two searches for cycles: a command keeps most, and 700 cost it a tenth of its time
 
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
 
@@ -356,6 +358,7 @@ for _known in app.registered_commands:  # whole sentences in the list of command
 
 def main() -> None:
     """Entry point: one clear message on standard error and exit status 2 for bad input; with --json also as JSON."""
+    gc.set_threshold(_OBJECTS)
     warnings.simplefilter("always", UserWarning)
     warnings.showwarning = lambda message, *rest, **kwargs: typer.echo(f"note: {message}", err=True)
     try:

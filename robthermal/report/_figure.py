@@ -9,8 +9,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import InputError
+from ._powers import plain_powers
 
 _ENLARGED = 1.25  # so much larger than drawn a figure may be shown; its letters are then as large as the text
+_PAD = 0.04  # inch, around what is drawn
 _FORBIDDEN = {"script", "style", "foreignObject", "iframe", "animate", "set"}
 
 
@@ -91,10 +93,31 @@ class Figure:
         text = io.StringIO()
         # Letters as paths look the same on every machine; a fixed salt and no date make the file reproducible.
         with matplotlib.rc_context({"svg.fonttype": "path", "svg.hashsalt": "robthermal"}):
-            figure.savefig(text, format="svg", facecolor="none", edgecolor="none", bbox_inches="tight", pad_inches=0.04,
+            plain_powers(figure)
+            figure.savefig(text, format="svg", facecolor="none", edgecolor="none", bbox_inches=_laid_out(figure),
                            metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
         plt.close(figure)
         return cls(_bare(text.getvalue()), alt, caption)
+
+
+def _laid_out(figure: Any) -> Any:
+    """Arrange a matplotlib figure for good, and say which part of it is drawn on.
+
+    What ``bbox_inches="tight"`` finds by drawing once more into nothing.
+    """
+    # Imported here: matplotlib is slow to load, and a summary without figures does not need it.
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    resolution, layout = figure.dpi, figure.get_layout_engine()
+    FigureCanvasSVG(figure)  # measures letters as they are drawn
+    if layout is not None:
+        layout.execute(figure)
+        with matplotlib.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
+            figure.set_layout_engine(None)  # done
+    box = figure.get_tightbbox().padded(_PAD)
+    figure.set_dpi(resolution)  # which that canvas has changed
+    return box
 
 
 def inline(figure: Figure, prefix: str) -> str:

@@ -14,6 +14,7 @@ from ._appendix import margins, numbered_assumptions, resting
 from ._content import Claim, Report, Section
 from ._figure import Figure, inline
 from ._save import printable, save_text
+from ._table import printed
 from ._usable import LIMITED_BY, Bound, rounded_down, shown
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def write_html(report: Report, path: str | Path) -> Path:
     bounds = next((i for i, (_, section) in enumerate(sections) if section.chapter == BOUNDS), 0)
     page = _template("report.html").render(
         report=report, sections=sections, first=first, chapters=_chapters(sections), bounds=bounds,
-        drawing=drawing, ranges=_ranges, margins=margins,
+        drawing=drawing, printed=printed, ranges=_ranges, margins=margins,
         assumptions=numbered_assumptions(report), resting=resting(report), usable=shown(report.usable),
         amps=_amps, least=lambda row: "–" if row.current is None else rounded_down(row.current),
         cards=_cards(report.claims),

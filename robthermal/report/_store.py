@@ -18,7 +18,7 @@ from ._figure import Figure
 from ._reasons import Reason
 from ._save import printable, save_json
 from ._stages import Stage
-from ._table import Printed, Table
+from ._table import Printed, printed
 from ._usable import UsableRange
 
 STORE = "robthermal-report-content/2"
@@ -142,7 +142,7 @@ def _digest(content: dict[str, Any]) -> str:
 
 def _stored(sections: Sequence[Section]) -> list[dict[str, Any]]:
     return [{"title": one.title, "text": one.text, "figures": [asdict(figure) for figure in one.figures],
-             "tables": [asdict(_printed(table)) for table in one.tables], "anchor": one.anchor, "chapter": one.chapter}
+             "tables": [asdict(printed(table)) for table in one.tables], "anchor": one.anchor, "chapter": one.chapter}
             for one in sections]
 
 
@@ -190,10 +190,6 @@ def read_content(path: str | Path) -> Report:
                   stored.assumptions, stored.generated, stored.answer, stored.evidence, stored.checker, stored.gate,
                   stored.gates, stored.usable, first, stored.data, stored.stages, stored.headline, stored.numbers,
                   stored.identity, stored.kind)
-
-
-def _printed(table: Table | Printed) -> Printed:
-    return table.printed if isinstance(table, Table) else table
 
 
 def _claim(claim: Claim) -> dict[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -92,9 +93,9 @@ class Table:
             raise InputError(f"digits is {self.digits!r}", where=f"table {self.caption!r}",
                              expected="a whole number ≥ 1")
 
-    @property
+    @cached_property
     def printed(self) -> Printed:
-        """As it stands on the page."""
+        """As it stands on the page, which asks for every cell: written once."""
         return Printed(self.caption, self.header, self.rows, self.numeric, self.left_out)
 
     @property
@@ -128,6 +129,11 @@ class Table:
         index = self.frame.index
         levels = [pd.Series(index.get_level_values(i), name=name or "") for i, name in enumerate(index.names)]
         return pd.concat([*levels, self.frame.reset_index(drop=True)], axis=1)
+
+
+def printed(table: Table | Printed) -> Printed:
+    """A table as it stands on the page."""
+    return table.printed if isinstance(table, Table) else table
 
 
 def _cell(value: object, digits: int) -> str:
