@@ -18,7 +18,7 @@ def plain_powers(figure: Any) -> None:
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         for formatter in (axis.get_major_formatter(), axis.get_minor_formatter()):
             if isinstance(formatter, LogFormatterMathtext):
-                formatter.format_ticks = partial(_plain, formatter.format_ticks)
+                vars(formatter).update(format_ticks=partial(_plain, formatter.format_ticks))
 
 
 def _plain(format_ticks: Callable[[Any], list[str]], places: Any) -> list[str]:
