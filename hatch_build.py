@@ -1,4 +1,4 @@
-"""Compile the kernel of the local methods beside its source where there is a C compiler; without one nothing is lost.
+"""Compile the kernels in C beside their sources where there is a C compiler; without one nothing is lost.
 
 The package computes the same with numpy, slower. Whatever goes wrong here is one line of note and a pure package.
 """
@@ -20,8 +20,10 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-SOURCE = Path("robthermal", "identify", "_moments.c")
-HEADER = SOURCE.with_name("_vectors.h")
+KERNELS = {  # sources, each with the headers that belong to it
+    Path("robthermal", "identify", "_moments.c"): ("_vectors.h",),
+    Path("robthermal", "thermal", "_march.c"): (),
+}
 # Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor
 # has instructions for. -O2 with peeled loops is as fast as -O3 and takes 10 s instead of 24. Not -ffast-math: numbers
 # that are not numbers must stay so.
@@ -43,25 +45,31 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
         """Called before a wheel is put together; `version` is "standard" or "editable"."""
         if self.target_name != "wheel":
             return
-        source = Path(self.root, SOURCE)
-        text = source.read_bytes() + source.with_name(HEADER.name).read_bytes()
-        name = f"_moments_{hashlib.sha256(text).hexdigest()[:16]}.so"  # as _compiled.py looks for it
-        editable = version == "editable"
-        self._folder = source.parent if editable else Path(tempfile.mkdtemp())
-        try:
-            build(source, self._folder / name)
-        except (OSError, RuntimeError, subprocess.SubprocessError) as error:
-            print(f"note: robthermal without its compiled kernel ({error}); numpy does the same, slower",
-                  file=sys.stderr)
-            return
-        if editable:
-            for old in source.parent.glob("_moments_*.so"):
+        if version != "editable":
+            self._folder = Path(tempfile.mkdtemp())
+        for kernel, headers in KERNELS.items():
+            try:
+                library = self._built(Path(self.root, kernel), headers)
+            except (OSError, RuntimeError, subprocess.SubprocessError) as error:
+                print(f"note: robthermal without its compiled kernel {kernel.stem} ({error}); numpy does the same, "
+                      "slower", file=sys.stderr)
+                continue
+            if version != "editable":
+                build_data["force_include"][str(library)] = str(kernel.with_name(library.name))
+                build_data["pure_python"] = False
+                build_data["tag"] = f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
+
+    def _built(self, source: Path, headers: tuple[str, ...]) -> Path:
+        """The library of a source: in a folder of its own, or beside the source, where it replaces older ones."""
+        text = b"".join(path.read_bytes() for path in (source, *map(source.with_name, headers)))
+        name = f"{source.stem}_{hashlib.sha256(text).hexdigest()[:16]}.so"  # as the package looks for it
+        library = getattr(self, "_folder", source.parent) / name
+        build(source, library)
+        if library.parent == source.parent:
+            for old in source.parent.glob(f"{source.stem}_*.so"):
                 if old.name != name:
                     old.unlink(missing_ok=True)
-            return
-        build_data["force_include"][str(self._folder / name)] = str(SOURCE.with_name(name))
-        build_data["pure_python"] = False
-        build_data["tag"] = f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
+        return library
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Called when the wheel is written."""
@@ -70,8 +78,10 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def build(source: Path, library: Path) -> None:
-    """Compile `source` to `library`, which appears whole or not at all."""
+    """Compile `source` to `library`, which appears whole or not at all; one without vectors once, for any processor."""
     parts = PARTS.get(platform.machine().lower())
+    if parts and "LANES" not in source.read_text():
+        parts = {1: ()}
     if sys.platform == "win32" or not parts:
         raise RuntimeError(f"it is for x86-64 and ARM64, not Windows; this is {sys.platform} on {platform.machine()}")
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")

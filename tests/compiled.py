@@ -1,4 +1,4 @@
-"""The kernel in C for tests, whether or not it was built when the package was installed."""
+"""The kernels in C for tests, whether or not they were built when the package was installed."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from unittest.mock import patch
 import pytest
 
 from robthermal.identify import _compiled
+from robthermal.thermal import _march
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -40,12 +41,35 @@ def built(lanes: int | None = None) -> _compiled.Solver:
 @cache
 def folder() -> Path:
     """Where the library is."""
-    name = _compiled.library_name(_compiled.source_text())
-    if _compiled.SOURCE.with_name(name).exists():
-        return _compiled.SOURCE.parent
+    return _with_library(_compiled.SOURCE, _compiled.library_name(_compiled.source_text()))
+
+
+@cache
+def steps() -> _march.March:
+    """The compiled steps of a simulation, from beside their source, or compiled now."""
+    found = _march.library(_with_library(_march.SOURCE, _march.library_name(_march.SOURCE.read_bytes())))
+    if found is None:
+        pytest.skip("no library of compiled steps for this compiler and processor")
+    return found
+
+
+def _with_library(source: Path, name: str) -> Path:
+    """The folder of a source where its library is, or a new one."""
+    if source.with_name(name).exists():
+        return source.parent
     if shutil.which("cc") is None:
         pytest.skip("no C compiler, and the package was installed without its compiled kernel")
     made = Path(mkdtemp())
     atexit.register(shutil.rmtree, made)
-    hook()["build"](_compiled.SOURCE, made / name)
+    hook()["build"](source, made / name)
     return made
+
+
+def built_by_hook(root: Path, version: str, target: str = "wheel") -> dict[str, Any]:
+    """What the hook asks hatchling for, in a copy of the source tree."""
+    one = hook()["KernelHook"]()
+    one.root, one.target_name = str(root), target
+    data: dict[str, Any] = {"force_include": {}}
+    one.initialize(version, data)
+    one.finalize(version, data, "")
+    return data

@@ -7,6 +7,7 @@ until the last Chebyshev coefficients of the heats are worth less than the toler
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
 from ._equations import Equations
 from ._fixed_point import HOTTEST, FixedPoint
 from ._layout import Layout
+from ._march import Marching, holds, library
 from ._ports import PortHeat
 from ._schedule import Schedule
 from ._terms import Array
@@ -104,6 +106,15 @@ class Integrator:
             self._fixed[kind, level] = FixedPoint(self.port_heat, np.concatenate([known, nodes]), 1, self.goal)
         return self._fixed[kind, level]
 
+    @cached_property
+    def march(self) -> Marching | None:
+        """Compiled steps of a sample; None where they were not built, or do not know the system."""
+        built = library()
+        if built is None or not self.nq or not holds(self.port_heat, self.nz):
+            return None
+        return Marching(built, self.port_heat, self.step(0, 0), self.gain(0, 0), self.goal, _TAIL * self.tolerance,
+                        HOTTEST)
+
     def window(self) -> tuple[Step, Array, FixedPoint]:
         """Matrices of a window of samples, the gain of a sample, and the fixed point."""
         if self._window is None:
@@ -127,17 +138,24 @@ class Integrator:
         k, level = 0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
             while k < n - 1:
-                if not self.nq and (windows := _whole(plan, k)):
+                if not self.nq and (windows := _whole(plan, k) // WINDOW):
                     self._advance_linear(z, w, k, windows)
                     k += windows * WINDOW
                     continue
-                whole = level == 0 and n - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
-                if whole and self._advance_window(z, w, k):
-                    k += WINDOW
+                if level == 0 and (done := self._advance_samples(z, plan, k)):
+                    k += done
                     continue
                 level = self._advance_segment(z, plan, k, level, refined)
                 k += 1
         return _path(z, refined)
+
+    def _advance_samples(self, z: Array, plan: Schedule, k: int) -> int:
+        """Whole samples from segment k on while that is easy: how many were computed."""
+        if self.march is not None:
+            stop = k + _whole(plan, k)
+            return self.march(z[k:stop + 1], plan.w[k:stop])
+        whole = len(plan.w) - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
+        return WINDOW if whole and self._advance_window(z, plan.w, k) else 0
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:
         matrices, gain, fixed = self.window()
@@ -203,9 +221,9 @@ class Integrator:
 
 
 def _whole(plan: Schedule, k: int) -> int:
-    """Number of windows of whole samples from segment k on."""
+    """Number of whole samples from segment k on."""
     other = np.flatnonzero(plan.kind[k:-1])
-    return int(other[0] if other.size else len(plan.kind) - 1 - k) // WINDOW
+    return int(other[0] if other.size else len(plan.kind) - 1 - k)
 
 
 def _path(z: Array, refined: dict[int, Array]) -> Path:

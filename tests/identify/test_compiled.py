@@ -177,16 +177,6 @@ def test_the_widest_part_that_runs_is_taken(built: _compiled.Solver) -> None:
     assert library(folder, 3) is None and built.__name__.startswith("robthermal_solve_")
 
 
-def built_by_hook(root: Path, version: str, target: str = "wheel") -> dict[str, Any]:
-    """What the hook asks hatchling for, in a copy of the source tree."""
-    one = compiled.hook()["KernelHook"]()
-    one.root, one.target_name = str(root), target
-    data: dict[str, Any] = {"force_include": {}}
-    one.initialize(version, data)
-    one.finalize(version, data, "")
-    return data
-
-
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A source tree with an old library in it."""
@@ -203,7 +193,7 @@ def test_without_a_compiler_the_package_is_pure(tree: Path, version: str, monkey
                                                 capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv("PATH", str(tree))
     monkeypatch.setenv("CC", "no-such-compiler")
-    assert built_by_hook(tree, version) == {"force_include": {}}
+    assert compiled.built_by_hook(tree, version) == {"force_include": {}}
     assert "numpy does the same, slower" in capsys.readouterr().err
 
 
@@ -211,13 +201,13 @@ def test_a_compiler_that_fails_is_a_note(tree: Path, monkeypatch: pytest.MonkeyP
                                          capsys: pytest.CaptureFixture[str]) -> None:
     (tree / "robthermal" / "identify" / "_moments.c").write_text("#error not today\n")
     monkeypatch.delenv("CC", raising=False)
-    assert built_by_hook(tree, "editable") == {"force_include": {}}
+    assert compiled.built_by_hook(tree, "editable") == {"force_include": {}}
     assert "note: robthermal without its compiled kernel" in capsys.readouterr().err
     assert [path.name for path in (tree / "robthermal" / "identify").glob("*.so")] == ["_moments_0123456789abcdef.so"]
 
 
 def test_the_source_distribution_has_no_library(tree: Path) -> None:
-    assert built_by_hook(tree, "standard", "sdist") == {"force_include": {}}
+    assert compiled.built_by_hook(tree, "standard", "sdist") == {"force_include": {}}
 
 
 PARTS = "#define JOINED(lanes) robthermal_runs_here_##lanes\n#define NAMED(lanes) JOINED(lanes)\n"
@@ -229,9 +219,9 @@ def test_an_editable_install_replaces_the_old_library(tree: Path) -> None:
     source = tree / "robthermal" / "identify" / "_moments.c"
     source.write_text(PARTS)
     name = library_name(source.read_bytes() + source.with_name("_vectors.h").read_bytes())
-    assert built_by_hook(tree, "editable") == {"force_include": {}}
+    assert compiled.built_by_hook(tree, "editable") == {"force_include": {}}
     assert [path.name for path in source.parent.glob("*.so")] == [name]
-    wheel = built_by_hook(tree, "standard")
+    wheel = compiled.built_by_hook(tree, "standard")
     (there,) = wheel["force_include"].values()
     assert there == f"robthermal/identify/{name}" and wheel["pure_python"] is False
     assert wheel["tag"].startswith("py3-none-")
@@ -253,7 +243,7 @@ def test_the_parts_are_those_of_the_machine(tree: Path, machine: str, parts: set
         pytest.skip("this compiler knows no AVX")
     (tree / "robthermal" / "identify" / "_moments.c").write_text(PARTS)
     monkeypatch.setattr(platform, "machine", lambda: machine)
-    built_by_hook(tree, "editable")
+    compiled.built_by_hook(tree, "editable")
     (path,) = (tree / "robthermal" / "identify").glob("*.so")
     assert parts_of(path) == parts
 
@@ -264,6 +254,6 @@ def test_the_parts_are_those_of_the_machine(tree: Path, machine: str, parts: set
 def test_a_compiler_without_avx512_builds_the_other_part(tree: Path, missing: int, parts: set[int]) -> None:
     source = tree / "robthermal" / "identify" / "_moments.c"
     source.write_text(f"#if LANES == {missing}\n#error no such instructions\n#endif\n{PARTS}")
-    built_by_hook(tree, "editable")
+    compiled.built_by_hook(tree, "editable")
     (path,) = source.parent.glob("*.so")
     assert parts_of(path) == parts

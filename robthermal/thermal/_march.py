@@ -1,0 +1,150 @@
+"""The compiled steps `_march.c` of small systems where they were built, by ctypes; else None, and numpy does the same.
+
+The library is named by a hash of its source, so that one built from an older source is never loaded. Sizes, types and
+layout of every array are made here, for the other side trusts them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._collocation import TAIL, Step
+from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
+from ._module_term import ModuleTerm
+from ._ports import PortHeat
+from ._terms import Array, NaturalTerm, RadiationTerm
+
+SOURCE = Path(__file__).with_name("_march.c")
+_MOST, _NUMBERS = 64, 8  # as in the source
+_FINEST = 1e-11  # K: below it a change of a temperature is rounding
+_CLOSER = 0.01  # of the change at which numpy stops: one iteration more costs little here
+
+March = Callable[[Any], int]  # of a pointer to a problem: samples that were computed
+
+
+class _Problem(ctypes.Structure):
+    """`problem` of the source."""
+
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("n_z", "n_w", "n_ports", "n_q", "n_pairs", "count")),
+        *((name, ctypes.c_void_p) for name in ("K", "Ku", "M", "ports", "pairs", "numbers", "scatter", "gain", "tail")),
+        *((name, ctypes.c_double) for name in ("goal", "roughest", "hottest")),
+        *((name, ctypes.c_void_p) for name in ("w", "z")),
+    )
+
+
+def library_name(text: bytes) -> str:
+    """Name of the library that belongs to the text of the source."""
+    return f"_march_{hashlib.sha256(text).hexdigest()[:16]}.so"
+
+
+@cache
+def library(folder: Path = SOURCE.parent) -> March | None:
+    """What computes samples by the library in `folder`; None where it was not built, or from another source."""
+    try:
+        found = ctypes.CDLL(os.fspath(folder / library_name(SOURCE.read_bytes())))
+        size, march = found.robthermal_march_size, found.robthermal_march
+    except (OSError, AttributeError):
+        return None
+    size.restype = march.restype = ctypes.c_int64
+    if size() != ctypes.sizeof(_Problem):
+        return None
+    march.argtypes = [ctypes.POINTER(_Problem)]
+    return march
+
+
+class Marching:
+    """Samples of one length, one after the other.
+
+    Parameters
+    ----------
+    built : callable
+        What `library` found.
+    heat : PortHeat
+        Of the system.
+    step : Step
+        Matrices of a sample.
+    gain : ndarray, shape (n_q,)
+        Temperature that one watt of each heat is worth over a sample [K/W].
+    goal, roughest, hottest : float
+        Change of a temperature at which a fixed point is found, accepted truncation of the heats, and what no
+        temperature may reach [K].
+    """
+
+    def __init__(self, built: March, heat: PortHeat, step: Step, gain: Array, goal: float, roughest: float,
+                 hottest: float):
+        pairs, numbers = _described(heat)
+        n_z, n_w = step.K.shape[1], step.Ku.shape[1]
+        self._built, self._size = built, (n_z, n_w, heat.ports.size, heat.scatter.shape[1], len(pairs))
+        self._arrays = [np.ascontiguousarray(a, float) for a in (step.K, step.Ku, step.M)]
+        self._arrays += [np.ascontiguousarray(a, np.int64) for a in (heat.ports, pairs)]
+        self._arrays += [np.ascontiguousarray(a, float) for a in (numbers, _in_pairs(heat), gain, TAIL)]
+        self._limits = max(_CLOSER * goal, _FINEST), roughest, hottest
+
+    def __call__(self, z: Array, w: Array) -> int:
+        """Fill the states z (count + 1, n_z) after the first with the drives w (count, n_w); how many were computed."""
+        n_z, n_w = self._size[:2]
+        if z.shape != (len(w) + 1, n_z) or w.shape[1] != n_w or z.dtype != float or not z.flags.c_contiguous:
+            raise ValueError("states and drives do not fit")
+        held = np.ascontiguousarray(w, float)
+        problem = _Problem(*self._size, len(held), *(one.ctypes.data for one in self._arrays), *self._limits,
+                           held.ctypes.data, z.ctypes.data)
+        return self._built(ctypes.byref(problem))
+
+
+def holds(heat: PortHeat, n_z: int) -> bool:
+    """Whether the compiled steps know every heat of a system, and the system is small enough.
+
+    Parameters
+    ----------
+    heat : PortHeat
+        Of the system.
+    n_z : int
+        Number of its states.
+    """
+    most = max(n_z, heat.ports.size + heat.eq.drives.width, heat.scatter.shape[1])
+    return most <= _MOST and all(type(term) in _KINDS for term in heat.eq.terms)
+
+
+def _described(heat: PortHeat) -> tuple[Array, Array]:
+    """Kind, ends and drive of every pair (n_pairs, 4), and its numbers (n_pairs, 8)."""
+    pairs, numbers = [np.zeros((0, 4))], [np.zeros((0, _NUMBERS))]
+    for term, (a, b, drive) in zip(heat.eq.terms, heat.places, strict=True):
+        kind = list(_KINDS).index(type(term))
+        driven = drive if drive.size else np.full(len(a), -1)
+        pairs.append(np.column_stack([np.full(len(a), kind), a, b, driven]))
+        own = np.zeros((len(a), _NUMBERS))
+        for column, values in enumerate(_KINDS[type(term)](term)):
+            own[:, column] = values
+        numbers.append(own)
+    return np.concatenate(pairs), np.concatenate(numbers)
+
+
+def _in_pairs(heat: PortHeat) -> Array:
+    """Targets of the flows, pair by pair: into end a, then into end b."""
+    order, first = [], 0
+    for term in heat.eq.terms:
+        n = len(term.a)
+        order += [first + side * n + pair for pair in range(n) for side in (0, 1)]
+        first += 2 * n
+    return heat.scatter[order]
+
+
+_KINDS: dict[type, Callable[[Any], tuple[Array | float, ...]]] = {  # in the order of the source
+    ModuleTerm: lambda t: (t.S, t.S_slope, t.R, t.R_slope, t.K_slope, t.T_ref, t.thomson, t.split),
+    NaturalTerm: lambda t: (t.gain, t.exponent, t.warmer_b - t.warmer_a),
+    RadiationTerm: lambda t: (t.coefficient, t.warmer_a, t.warmer_b),
+    StepTerm: lambda t: (t.conductance * t.relative, t.warmer),
+    FollowTerm: lambda t: (t.conductance * t.relative, t.warmer),
+    HeaterTerm: lambda t: (t.gain * t.slope, t.T_ref, t.share),
+    LeadTerm: lambda t: (t.resistance,),
+    CondensationTerm: lambda t: (t.conductance, t.dew_point),
+}

@@ -1,0 +1,137 @@
+"""The compiled steps: no less accurate than numpy's, for every kind of heat; what they cannot do is left to numpy."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import compiled
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.thermal import _exponential, _march
+
+PARTS = [("conductance_step", ["plate-hot"], {"relative": -0.3, "time": 40.5}),
+         ("driven_conductance", ["cold-sample", "tem"], {"relative": 0.2}),
+         ("condensation", ["cold"], {"conductance": 0.01, "dew_point": 330.0}),
+         ("lead_heating", ["hot", "tem"], {"resistance": 0.2}),
+         ("heater_power_slope", ["heater"], {"slope": 0.004}), ("thomson", ["tem"], {"coefficient": 2e-4}),
+         ("joule_split", ["tem"], {"split": 0.1})]
+
+
+@pytest.fixture
+def every(full: rt.System) -> rt.System:
+    """A system with every kind of heat, and no temperature near the dew point: a kink takes many halvings."""
+    for name, where, values in PARTS:
+        full = rt.thermal.add_effect(full, name, where, values).system
+    return full
+
+
+@pytest.fixture
+def lumps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Temperatures of a simulation by the compiled steps, or without them, and how many segments these were asked for.
+    """
+    found = compiled.steps()
+
+    def simulated(system: rt.System, record: rt.Record, tolerance: float, built: bool) -> tuple[np.ndarray, list[int]]:
+        counts: list[int] = []
+
+        def counted(problem: Any) -> int:
+            counts.append(found(problem))
+            return counts[-1]
+
+        monkeypatch.setattr(_exponential, "library", lambda: counted if built else None)
+        return rt.thermal.trajectory(system, record, tolerance=tolerance).lumps, counts
+
+    return simulated
+
+
+def test_every_kind_of_heat_is_tried(every: rt.System) -> None:
+    assert {type(term) for term in rt.thermal.Equations(every).terms} == set(_march._KINDS)
+
+
+@pytest.mark.parametrize("sample_time", [0.25, 0.5])
+def test_no_farther_from_the_limit_than_numpy(every: rt.System, drive: Any, lumps: Any, sample_time: float) -> None:
+    """The limit is numpy's at a tolerance of 1e-9 K, which is tested against an integrator of scipy elsewhere."""
+    record = drive(80, system=every, sample_time=sample_time)
+    exact, _ = lumps(every, record, 1e-9, False)
+    here, counts = lumps(every, record, 1e-4, True)
+    theirs, none = lumps(every, record, 1e-4, False)
+    assert sum(counts) > 60 and not none
+    errors = np.abs(here - exact).max(), np.abs(theirs - exact).max()
+    assert errors[0] < max(errors[1], 1e-7) and errors[1] < 1e-4
+
+
+def test_a_tight_tolerance_is_met(every: rt.System, drive: Any, lumps: Any) -> None:
+    record = drive(40, system=every, sample_time=0.02)
+    (exact, _), (here, counts) = lumps(every, record, 1e-10, False), lumps(every, record, 1e-10, True)
+    assert sum(counts) > 0
+    np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-9)
+
+
+def test_samples_that_are_too_long_are_left_to_numpy(every: rt.System, drive: Any, lumps: Any) -> None:
+    """As that in the middle of which the conductance changes."""
+    record = drive(60, system=every, sample_time=1.0)
+    (exact, _), (here, counts) = lumps(every, record, 1e-8, False), lumps(every, record, 1e-4, True)
+    assert 0 < sum(counts) < 59
+    np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
+
+
+def test_runaway_is_an_error_no_later(lumps: Any) -> None:
+    system = rt.System(
+        ambients={"room": {"temperature": 300.0}}, lumps={"hot": {"capacity": 5.0}, "cold": {"capacity": 5.0}},
+        links=[{"between": ("hot", "room"), "conductance": 0.05}, {"between": ("cold", "hot"), "conductance": 0.1}],
+        modules={"m": {"hot": "hot", "cold": "cold", "seebeck": {"value": 0.05},
+                       "resistance": {"value": 2.0, "slope": 0.02}, "conductance": {"value": 0.5},
+                       "reference_temperature": 300.0, "current_limits": (-9.0, 9.0)}})
+    record = rt.Record(sample_time=1.0, inputs=np.full(2000, 8.0), outputs=np.zeros((2000, 0)), input_names=["m"],
+                       output_names=[])
+    said = []
+    for built in (True, False):
+        with pytest.raises(rt.errors.Diverged, match="runs away") as error:
+            lumps(system, record, 1e-4, built)
+        said.append(error.value.time)
+    assert 0 < said[0] <= said[1] < said[0] + 16  # numpy looks at the temperatures of sixteen samples together
+
+
+def test_sizes_that_do_not_fit_are_refused(full: rt.System) -> None:
+    by = _exponential.Integrator(rt.thermal.Equations(full), (1.0,))
+    march = _march.Marching(compiled.steps(), by.port_heat, by.step(0, 0), by.gain(0, 0), 1e-7, 1e-3, 3000.0)
+    z, w = np.zeros((11, by.nz)), np.zeros((10, by.eq.drives.width))
+    for states, drives in ((z[:-1], w), (z[:, :-1], w), (z, w[:, 1:]), (np.zeros((11, 2 * by.nz))[:, ::2], w),
+                           (z.astype(np.float32), w)):
+        with pytest.raises(ValueError, match="do not fit"):
+            march(states, drives)
+
+
+def test_numpy_takes_what_the_library_does_not_hold(full: rt.System, monkeypatch: pytest.MonkeyPatch) -> None:
+    heat = _exponential.Integrator(rt.thermal.Equations(full), (1.0,)).port_heat
+    assert _march.holds(heat, 64) and not _march.holds(heat, 65)
+    monkeypatch.delitem(_march._KINDS, next(kind for kind in _march._KINDS if kind.__name__ == "RadiationTerm"))
+    assert not _march.holds(heat, 10)
+
+
+def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
+    source = _march.SOURCE.read_bytes()
+    assert _march.library_name(source) != _march.library_name(source + b" ")
+    (tmp_path / _march.library_name(source + b" ")).write_bytes(b"")
+    assert _march.library(tmp_path) is None
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / _march.library_name(source)).write_bytes(b"no library")
+    assert _march.library(tmp_path / "damaged") is None
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_the_hook_builds_it_beside_its_source_or_into_a_wheel(tmp_path: Path) -> None:
+    folder = tmp_path / "robthermal" / "thermal"
+    folder.mkdir(parents=True)
+    shutil.copy(_march.SOURCE, folder)
+    (folder / "_march_0123456789abcdef.so").write_bytes(b"old")
+    name = _march.library_name(_march.SOURCE.read_bytes())
+    assert compiled.built_by_hook(tmp_path, "editable") == {"force_include": {}}
+    assert [path.name for path in folder.glob("*.so")] == [name] and _march.library(folder) is not None
+    wheel = compiled.built_by_hook(tmp_path, "standard")
+    assert list(wheel["force_include"].values()) == [f"robthermal/thermal/{name}"] and wheel["pure_python"] is False
