@@ -81,7 +81,7 @@ def build(source: Path, library: Path) -> None:
     """Compile `source` to `library`, which appears whole or not at all; one without vectors once, for any processor."""
     parts = PARTS.get(platform.machine().lower())
     if parts and "LANES" not in source.read_text():
-        parts = {1: ()}
+        parts = {1: ("-O3",)}
     if sys.platform == "win32" or not parts:
         raise RuntimeError(f"it is for x86-64 and ARM64, not Windows; this is {sys.platform} on {platform.machine()}")
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")

@@ -45,7 +45,7 @@ def folder() -> Path:
 
 
 @cache
-def steps() -> _march.March:
+def steps() -> _march.Steps:
     """The compiled steps of a simulation, from beside their source, or compiled now."""
     found = _march.library(_with_library(_march.SOURCE, _march.library_name(_march.SOURCE.read_bytes())))
     if found is None:

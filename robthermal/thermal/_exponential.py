@@ -7,7 +7,6 @@ until the last Chebyshev coefficients of the heats are worth less than the toler
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +76,7 @@ class Integrator:
         self.nz, self.nq = self.parts.F.shape[0], self.parts.N.shape[1]
         self._gains: dict[tuple[int, int], Array] = {}
         self._fixed: dict[tuple[int, int], FixedPoint] = {}
+        self._compiled: dict[tuple[int, int], Marching | None] = {}
         self._window: tuple[Step, Array, FixedPoint] | None = None
 
     @property
@@ -106,14 +106,14 @@ class Integrator:
             self._fixed[kind, level] = FixedPoint(self.port_heat, np.concatenate([known, nodes]), 1, self.goal)
         return self._fixed[kind, level]
 
-    @cached_property
-    def march(self) -> Marching | None:
-        """Compiled steps of a sample; None where they were not built, or do not know the system."""
-        built = library()
-        if built is None or not self.nq or not holds(self.port_heat, self.nz):
-            return None
-        return Marching(built, self.port_heat, self.step(0, 0), self.gain(0, 0), self.goal, _TAIL * self.tolerance,
-                        HOTTEST)
+    def compiled(self, kind: int, level: int) -> Marching | None:
+        """Compiled steps of lengths[kind] / 2**level; None where they were not built, or do not know the system."""
+        if (kind, level) not in self._compiled:
+            built = library() if self.nq and holds(self.port_heat, self.nz) else None
+            self._compiled[kind, level] = None if built is None else Marching(
+                built, self.port_heat, self.step(kind, level), self.gain(kind, level), self.goal,
+                _TAIL * self.tolerance, HOTTEST)
+        return self._compiled[kind, level]
 
     def window(self) -> tuple[Step, Array, FixedPoint]:
         """Matrices of a window of samples, the gain of a sample, and the fixed point."""
@@ -151,9 +151,10 @@ class Integrator:
 
     def _advance_samples(self, z: Array, plan: Schedule, k: int) -> int:
         """Whole samples from segment k on while that is easy: how many were computed."""
-        if self.march is not None:
+        march = self.compiled(0, 0)
+        if march is not None:
             stop = k + _whole(plan, k)
-            return self.march(z[k:stop + 1], plan.w[k:stop])
+            return march(z[k:stop + 1], plan.w[k:stop])
         whole = len(plan.w) - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
         return WINDOW if whole and self._advance_window(z, plan.w, k) else 0
 

@@ -1,4 +1,5 @@
-/* One sample of exponential collocation after the other, for small systems: what _exponential.py does with numpy.
+/* One sample of exponential collocation after the other, for small systems: what _exponential.py does with numpy; and
+ * the derivatives of many samples, what _sensitivity.py does.
  *
  * Called through _march.py, which checks sizes. The heats of a sample are found by the fixed point T = base + M q(T) at
  * its nodes; a sample whose fixed point does not converge, or whose heats are not smooth, is left to the caller.
@@ -7,7 +8,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64 };
+enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION };
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
@@ -21,7 +22,10 @@ typedef struct {
     const double *gain, *tail;            /* (n_q,) and (2, NODES) */
     double goal, roughest, hottest;       /* all [K]; nothing at the ports is as hot as the last */
     const double *w;                      /* (count, n_w) */
-    double *z;                            /* (count + 1, n_z), the first given */
+    double *z;                            /* (count + 1, n_z), the first given; for derivatives (count, n_z), all */
+    int64_t n_free;                       /* states that are differentiated, the first */
+    double *V, *q;                        /* (count, NODES, n_ports + n_w) and (count, NODES, n_q), of every node */
+    double *F, *through;                  /* (count, n_free, n_free) and (count, n_free, DEGREE n_ports) */
 } problem;
 
 /* Heat into both ends of a pair, as `heat` of the terms in numpy. */
@@ -72,6 +76,61 @@ static void flow(int64_t kind, const double *p, double a, double b, double drive
     into[1] = -q;
 }
 
+/* Derivatives of the heats into both ends by a, b and the drive, as `slopes` of the terms in numpy. */
+static void slopes(int64_t kind, const double *p, double a, double b, double drive, double (*by)[3])
+{
+    const double away = a - b;
+    double g, driven = 0.0;
+    switch (kind) {
+    case MODULE: {
+        const double above = 0.5 * (a + b) - p[5], S = p[0] + p[1] * above, R = p[2] + p[3] * above;
+        const double half = 0.5 * p[1] * drive, joule = 0.25 * p[3] * drive * drive, uneven = 2.0 * p[7];
+        const double hot = (1.0 - uneven) * joule, cold = (1.0 + uneven) * joule, leak = p[4] * above;
+        const double bend = 0.5 * p[4] * away, own = 0.5 * p[6] * drive, along = 0.5 * p[6] * away;
+        by[0][0] = S * drive + half * a + hot - leak - bend - own;
+        by[0][1] = half * a + hot + leak - bend + own;
+        by[0][2] = S * a + (1.0 - uneven) * R * drive - along;
+        by[1][0] = -half * b + cold + leak + bend - own;
+        by[1][1] = -S * drive - half * b + cold - leak + bend + own;
+        by[1][2] = -S * b + (1.0 + uneven) * R * drive - along;
+        return;
+    }
+    case NATURAL:
+        g = p[0] * (1.0 + p[1]) * pow(fabs(p[2] - away), p[1]);
+        by[0][0] = -g;
+        by[0][1] = g;
+        break;
+    case RADIATION: {
+        const double hot = b + p[2], cold = a + p[1];
+        by[0][0] = -4.0 * p[0] * cold * cold * cold;
+        by[0][1] = 4.0 * p[0] * hot * hot * hot;
+        break;
+    }
+    case STEP:
+    case FOLLOW:
+        g = p[0] * (kind == STEP ? drive : fabs(drive));
+        driven = p[0] * (p[1] - away) * (kind == STEP ? 1.0 : (drive > 0.0) - (drive < 0.0));
+        by[0][0] = -g;
+        by[0][1] = g;
+        break;
+    case HEATER:
+        for (int side = 0; side < 2; side++) {
+            const double share = side ? p[2] : 1.0 - p[2];
+            by[side][0] = share * p[0] * drive;
+            by[side][1] = 0.0;
+            by[side][2] = share * p[0] * (a - p[1]);
+        }
+        return;
+    default: /* LEAD, CONDENSATION */
+        memset(by, 0, 2 * sizeof(*by));
+        by[0][kind == LEAD ? 2 : 0] = kind == LEAD ? 2.0 * p[0] * drive : a < p[1] ? -p[0] : 0.0;
+        return;
+    }
+    by[0][2] = driven;
+    for (int k = 0; k < 3; k++)
+        by[1][k] = -by[0][k];
+}
+
 /* Heats by target at one node, V = [ports, w]. */
 static void heats(const problem *at, const double *V, double *q)
 {
@@ -88,10 +147,19 @@ static void heats(const problem *at, const double *V, double *q)
     }
 }
 
-/* y += A x for A (rows, columns). */
+/* y += A x for A (rows, columns); four rows at a time, whose sums do not wait for each other. */
 static void add(const double *A, const double *x, int64_t rows, int64_t columns, double *y)
 {
-    for (int64_t i = 0; i < rows; i++, A += columns) {
+    int64_t i = 0;
+    for (; i + 4 <= rows; i += 4, A += 4 * columns) {
+        double sums[4] = {0.0, 0.0, 0.0, 0.0};
+        for (int64_t j = 0; j < columns; j++)
+            for (int row = 0; row < 4; row++)
+                sums[row] += A[columns * row + j] * x[j];
+        for (int row = 0; row < 4; row++)
+            y[i + row] += sums[row];
+    }
+    for (; i < rows; i++, A += columns) {
         double sum = 0.0;
         for (int64_t j = 0; j < columns; j++)
             sum += A[j] * x[j];
@@ -116,48 +184,153 @@ static int smooth(const problem *at, const double *q)
     return worst <= at->roughest;
 }
 
-/* One sample from z to the n_z numbers after it; 0 where it is left to the caller. */
-static int sample(const problem *at, const double *z, const double *w, double *end)
+/* Heats q at all nodes of a sample from z, where the temperatures there are V; 0 where the fixed point is not found.
+ * base: what rows of K and Ku make of state and drives. */
+static int fixed_point(const problem *at, const double *z, const double *w, double *V, double *q, double *base)
 {
     const int64_t n_ports = at->n_ports, n_q = at->n_q, width = n_ports + at->n_w, nodes = DEGREE * n_ports;
-    double V[NODES][MOST], q[NODES * MOST], base[DEGREE * MOST + MOST], now[DEGREE * MOST], before = HUGE_VAL;
+    double now[DEGREE * MOST], before = HUGE_VAL;
     memset(base, 0, sizeof(double) * (nodes + at->n_z));
     add(at->K, z, nodes + at->n_z, at->n_z, base);
     add(at->Ku, w, nodes + at->n_z, at->n_w, base);
-    for (int node = 0; node < NODES; node++) {
+    for (int64_t node = 0; node < NODES; node++) {
         for (int64_t i = 0; i < n_ports; i++)
-            V[node][i] = z[at->ports[i]];
-        memcpy(V[node] + n_ports, w, sizeof(double) * (width - n_ports));
+            V[width * node + i] = z[at->ports[i]];
+        memcpy(V + width * node + n_ports, w, sizeof(double) * at->n_w);
     }
-    heats(at, V[0], q);
-    for (int node = 1; node < NODES; node++)
+    heats(at, V, q);
+    for (int64_t node = 1; node < NODES; node++)
         memcpy(q + n_q * node, q, sizeof(double) * n_q);
     for (int k = 0; k < ITERATIONS; k++) {
         double change = 0.0;
         memcpy(now, base, sizeof(double) * nodes);
         add(at->M, q, nodes, NODES * n_q, now);
-        for (int node = 1; node < NODES; node++)
+        for (int64_t node = 1; node < NODES; node++)
             for (int64_t i = 0; i < n_ports; i++) {
                 const double T = now[n_ports * (node - 1) + i];
                 if (!(fabs(T) < at->hottest)) /* or not a number */
                     return 0;
-                change = fmax(change, fabs(T - V[node][i]));
-                V[node][i] = T;
+                change = fmax(change, fabs(T - V[width * node + i]));
+                V[width * node + i] = T;
             }
-        if (k > 1 && !(change < before))
+        if (k > 1 && !(change < before) && !(change < at->goal))
             return 0;
-        for (int node = 1; node < NODES; node++)
-            heats(at, V[node], q + n_q * node);
+        for (int64_t node = 1; node < NODES; node++)
+            heats(at, V + width * node, q + n_q * node);
         if (change < at->goal)
-            break;
-        if (k == ITERATIONS - 1)
-            return 0;
+            return 1;
         before = change;
     }
-    if (!smooth(at, q))
+    return 0;
+}
+
+/* One sample from z to the n_z numbers after it; 0 where it is left to the caller. */
+static int sample(const problem *at, const double *z, const double *w, double *end)
+{
+    const int64_t nodes = DEGREE * at->n_ports, columns = NODES * at->n_q;
+    double V[NODES * MOST], q[NODES * MOST], base[DEGREE * MOST + MOST];
+    if (!fixed_point(at, z, w, V, q, base) || !smooth(at, q))
         return 0;
     memcpy(end, base + nodes, sizeof(double) * at->n_z);
-    add(at->M + nodes * NODES * n_q, q, at->n_z, NODES * n_q, end);
+    add(at->M + nodes * columns, q, at->n_z, columns, end);
+    return 1;
+}
+
+/* Rows of M times the derivatives of the heats by the ports, node by node: out (rows, NODES n_ports). */
+static void by_ports(const problem *at, const double *M, int64_t rows, const double *G, double *out)
+{
+    const int64_t n_q = at->n_q, n_ports = at->n_ports;
+    memset(out, 0, sizeof(double) * rows * NODES * n_ports);
+    for (int64_t row = 0; row < rows; row++, M += NODES * n_q, out += NODES * n_ports)
+        for (int64_t node = 0; node < NODES; node++)
+            for (int64_t j = 0; j < n_q; j++)
+                for (int64_t i = 0; i < n_ports; i++)
+                    out[n_ports * node + i] += M[n_q * node + j] * G[n_ports * (n_q * node + j) + i];
+}
+
+/* Derivatives G (n_q, n_ports) of the heats by target at one node. */
+static void heat_slopes(const problem *at, const double *V, double *G)
+{
+    memset(G, 0, sizeof(double) * at->n_q * at->n_ports);
+    for (int64_t pair = 0; pair < at->n_pairs; pair++) {
+        const int64_t *place = at->pairs + 4 * pair;
+        double by[2][3];
+        slopes(place[0], at->numbers + NUMBERS * pair, V[place[1]], V[place[2]], place[3] < 0 ? 0.0 : V[place[3]], by);
+        for (int side = 0; side < 2; side++)
+            for (int64_t j = 0; j < at->n_q; j++) {
+                const double to = at->scatter[at->n_q * (2 * pair + side) + j];
+                for (int k = 0; k < 3; k++)
+                    if (to != 0.0 && place[1 + k] >= 0 && place[1 + k] < at->n_ports)
+                        G[at->n_ports * j + place[1 + k]] += to * by[side][k];
+            }
+    }
+}
+
+/* Solve [A B] of n rows: X with A X = B replaces B. 0 where A is singular. */
+static int solve(double *rows, int64_t n, int64_t width)
+{
+    for (int64_t k = 0; k < n; k++) {
+        int64_t best = k;
+        for (int64_t i = k + 1; i < n; i++)
+            if (fabs(rows[width * i + k]) > fabs(rows[width * best + k]))
+                best = i;
+        if (!(fabs(rows[width * best + k]) > 0.0))
+            return 0;
+        for (int64_t j = k; best != k && j < width; j++) {
+            const double kept = rows[width * k + j];
+            rows[width * k + j] = rows[width * best + j];
+            rows[width * best + j] = kept;
+        }
+        for (int64_t i = k + 1; i < n; i++) {
+            const double factor = rows[width * i + k] / rows[width * k + k];
+            for (int64_t j = k + 1; j < width; j++)
+                rows[width * i + j] -= factor * rows[width * k + j];
+        }
+    }
+    for (int64_t k = n - 1; k >= 0; k--) {
+        for (int64_t i = k + 1; i < n; i++)
+            for (int64_t j = n; j < width; j++)
+                rows[width * k + j] -= rows[width * k + i] * rows[width * i + j];
+        for (int64_t j = n; j < width; j++)
+            rows[width * k + j] /= rows[width * k + k];
+    }
+    return 1;
+}
+
+/* Derivatives of one sample from z: F of its end by its start, `through` of its end by what is added at the nodes. */
+static int derivatives(const problem *at, const double *z, const double *w, double *V, double *q, double *F,
+                       double *through)
+{
+    const int64_t n_ports = at->n_ports, n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;
+    const int64_t columns = NODES * n_ports, width = nodes + n;
+    double base[DEGREE * MOST + MOST], G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
+    double at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
+    if (!fixed_point(at, z, w, V, q, base))
+        return 0;
+    for (int64_t node = 0; node < NODES; node++)
+        heat_slopes(at, V + (n_ports + at->n_w) * node, G + n_q * n_ports * node);
+    by_ports(at, at->M, nodes, G, at_nodes);
+    by_ports(at, at->M + nodes * NODES * n_q, n, G, at_end);
+    for (int64_t i = 0; i < nodes; i++) { /* transposed: as many right sides as states */
+        for (int64_t j = 0; j < nodes; j++)
+            rows[width * i + j] = (i == j) - at_nodes[columns * j + n_ports + i];
+        for (int64_t j = 0; j < n; j++)
+            rows[width * i + nodes + j] = at_end[columns * j + n_ports + i];
+    }
+    if (!solve(rows, nodes, width))
+        return 0;
+    for (int64_t i = 0; i < n; i++) {
+        memcpy(F + n * i, at->K + at->n_z * (nodes + i), sizeof(double) * n);
+        for (int64_t p = 0; p < n_ports; p++)
+            F[n * i + at->ports[p]] += at_end[columns * i + p];
+        for (int64_t k = 0; k < nodes; k++) {
+            const double by = through[nodes * i + k] = rows[width * k + nodes + i];
+            for (int64_t j = 0; j < n; j++)
+                F[n * i + j] += by * at->K[at->n_z * k + j];
+            for (int64_t p = 0; p < n_ports; p++)
+                F[n * i + at->ports[p]] += by * at_nodes[columns * k + p];
+        }
+    }
     return 1;
 }
 
@@ -166,10 +339,28 @@ int64_t robthermal_march_size(void)
     return sizeof(problem);
 }
 
+static int fits(const problem *at)
+{
+    return at->n_ports <= MOST_PORTS && at->n_ports + at->n_w <= MOST && at->n_q <= MOST && at->n_z <= MOST;
+}
+
+/* Samples that were differentiated: `count`, or fewer where a fixed point is not found. */
+int64_t robthermal_derivatives(const problem *at)
+{
+    const int64_t per_V = NODES * (at->n_ports + at->n_w), per_q = NODES * at->n_q, n = at->n_free;
+    if (!fits(at) || n > at->n_z)
+        return 0;
+    for (int64_t k = 0; k < at->count; k++)
+        if (!derivatives(at, at->z + k * at->n_z, at->w + k * at->n_w, at->V + k * per_V, at->q + k * per_q,
+                         at->F + k * n * n, at->through + k * n * DEGREE * at->n_ports))
+            return k;
+    return at->count;
+}
+
 /* Samples that were computed, at most `count`. */
 int64_t robthermal_march(const problem *at)
 {
-    if (at->n_ports + at->n_w > MOST || at->n_q > MOST || at->n_z > MOST)
+    if (!fits(at))
         return 0;
     for (int64_t k = 0; k < at->count; k++)
         if (!sample(at, at->z + k * at->n_z, at->w + k * at->n_w, at->z + (k + 1) * at->n_z))

@@ -10,24 +10,63 @@ import ctypes
 import hashlib
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ._collocation import TAIL, Step
+from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm
 from ._ports import PortHeat
 from ._terms import Array, NaturalTerm, RadiationTerm
 
 SOURCE = Path(__file__).with_name("_march.c")
-_MOST, _NUMBERS = 64, 8  # as in the source
+_MOST, _MOST_PORTS, _NUMBERS = 64, 12, 8  # as in the source
 _FINEST = 1e-11  # K: below it a change of a temperature is rounding
 _CLOSER = 0.01  # of the change at which numpy stops: one iteration more costs little here
 
 March = Callable[[Any], int]  # of a pointer to a problem: samples that were computed
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Functions of the library, each of a pointer to a problem.
+
+    Parameters
+    ----------
+    march : callable
+        Computes samples, and says how many.
+    derivatives : callable
+        Differentiates samples, and says how many.
+    """
+
+    march: March
+    derivatives: March
+
+
+@dataclass(frozen=True)
+class Linearized:
+    """Steps of one length at their nodes, and their derivatives.
+
+    Parameters
+    ----------
+    V : ndarray, shape (S, p + 1, n_ports + n_w)
+        States at the ports, and drives.
+    q : ndarray, shape (S, p + 1, n_q)
+        Heats.
+    F : ndarray, shape (S, n_free, n_free)
+        Derivative of the end by the start.
+    through : ndarray, shape (S, n_free, p n_ports)
+        Derivative of the end by what is added to the ports at nodes 1 to p.
+    """
+
+    V: Array
+    q: Array
+    F: Array
+    through: Array
 
 
 class _Problem(ctypes.Structure):
@@ -38,6 +77,8 @@ class _Problem(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("K", "Ku", "M", "ports", "pairs", "numbers", "scatter", "gain", "tail")),
         *((name, ctypes.c_double) for name in ("goal", "roughest", "hottest")),
         *((name, ctypes.c_void_p) for name in ("w", "z")),
+        ("n_free", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("V", "q", "F", "through")),
     )
 
 
@@ -47,39 +88,40 @@ def library_name(text: bytes) -> str:
 
 
 @cache
-def library(folder: Path = SOURCE.parent) -> March | None:
-    """What computes samples by the library in `folder`; None where it was not built, or from another source."""
+def library(folder: Path = SOURCE.parent) -> Steps | None:
+    """Functions of the library in `folder`; None where it was not built, or from another source."""
     try:
         found = ctypes.CDLL(os.fspath(folder / library_name(SOURCE.read_bytes())))
-        size, march = found.robthermal_march_size, found.robthermal_march
+        size, *both = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
     except (OSError, AttributeError):
         return None
-    size.restype = march.restype = ctypes.c_int64
+    size.restype = ctypes.c_int64
     if size() != ctypes.sizeof(_Problem):
         return None
-    march.argtypes = [ctypes.POINTER(_Problem)]
-    return march
+    for function in both:
+        function.restype, function.argtypes = ctypes.c_int64, [ctypes.POINTER(_Problem)]
+    return Steps(*both)
 
 
 class Marching:
-    """Samples of one length, one after the other.
+    """Steps of one length, one after the other.
 
     Parameters
     ----------
-    built : callable
+    built : Steps
         What `library` found.
     heat : PortHeat
         Of the system.
     step : Step
-        Matrices of a sample.
+        Matrices of a step.
     gain : ndarray, shape (n_q,)
-        Temperature that one watt of each heat is worth over a sample [K/W].
+        Temperature that one watt of each heat is worth over a step [K/W].
     goal, roughest, hottest : float
         Change of a temperature at which a fixed point is found, accepted truncation of the heats, and what no
         temperature may reach [K].
     """
 
-    def __init__(self, built: March, heat: PortHeat, step: Step, gain: Array, goal: float, roughest: float,
+    def __init__(self, built: Steps, heat: PortHeat, step: Step, gain: Array, goal: float, roughest: float,
                  hottest: float):
         pairs, numbers = _described(heat)
         n_z, n_w = step.K.shape[1], step.Ku.shape[1]
@@ -95,9 +137,26 @@ class Marching:
         if z.shape != (len(w) + 1, n_z) or w.shape[1] != n_w or z.dtype != float or not z.flags.c_contiguous:
             raise ValueError("states and drives do not fit")
         held = np.ascontiguousarray(w, float)
-        problem = _Problem(*self._size, len(held), *(one.ctypes.data for one in self._arrays), *self._limits,
-                           held.ctypes.data, z.ctypes.data)
-        return self._built(ctypes.byref(problem))
+        return self._built.march(ctypes.byref(self._problem(held, z)))
+
+    def linearized(self, z: Array, w: Array, n_free: int) -> Linearized | None:
+        """Steps from states z (S, n_z) with drives w (S, n_w) and their derivatives; None where one does not converge.
+
+        Of the first `n_free` states, which the others feed nothing back to.
+        """
+        n_z, n_w, n_ports, n_q, _ = self._size
+        starts, held, S = np.ascontiguousarray(z, float), np.ascontiguousarray(w, float), len(z)
+        if starts.shape != (S, n_z) or held.shape != (S, n_w) or not 0 < n_free <= n_z:
+            raise ValueError("states and drives do not fit")
+        out = Linearized(np.empty((S, DEGREE + 1, n_ports + n_w)), np.empty((S, DEGREE + 1, n_q)),
+                         np.empty((S, n_free, n_free)), np.empty((S, n_free, DEGREE * n_ports)))
+        problem = self._problem(held, starts, n_free,
+                                *(one.ctypes.data for one in (out.V, out.q, out.F, out.through)))
+        return out if self._built.derivatives(ctypes.byref(problem)) == S else None
+
+    def _problem(self, w: Array, z: Array, *rest: int) -> _Problem:
+        return _Problem(*self._size, len(w), *(one.ctypes.data for one in self._arrays), *self._limits, w.ctypes.data,
+                        z.ctypes.data, *rest)
 
 
 def holds(heat: PortHeat, n_z: int) -> bool:
@@ -111,7 +170,7 @@ def holds(heat: PortHeat, n_z: int) -> bool:
         Number of its states.
     """
     most = max(n_z, heat.ports.size + heat.eq.drives.width, heat.scatter.shape[1])
-    return most <= _MOST and all(type(term) in _KINDS for term in heat.eq.terms)
+    return most <= _MOST and heat.ports.size <= _MOST_PORTS and all(type(term) in _KINDS for term in heat.eq.terms)
 
 
 def _described(heat: PortHeat) -> tuple[Array, Array]:

@@ -145,20 +145,27 @@ class Sensitivity:
         return out
 
     def _of_length(self, z: Array, w: Array, held: Mapping[str, Array], kind: int, level: int) -> tuple[Array, Array]:
-        step, ports = self.by.step(kind, level), self.by.ports
-        nodes, n = DEGREE * ports.size, self.n_free
-        V = self._at_ports(step, z, w)
-        q = self.by.port_heat(V)
-        G = self.by.port_heat.slopes(V)  # (S, p+1, nq, np + nw)
+        nodes, n, march = DEGREE * self.by.ports.size, self.n_free, self.by.compiled(kind, level)
+        found = None if march is None else march.linearized(z, w, n)
+        V = self._at_ports(self.by.step(kind, level), z, w) if found is None else found.V
+        q = self.by.port_heat(V) if found is None else found.q
+        G = self.by.port_heat.slopes(V) if found is None or held else np.zeros(0)  # (S, p+1, nq, np + nw)
         direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, parameters that act)
-        S, nodes_by, end_by = len(z), *self._by_ports(step, G)  # derivatives by the port states at start and nodes
+        F, through = self._through(kind, level, G) if found is None else (found.F, found.through)
+        return F, direct[:, nodes:nodes + n] + through @ direct[:, :nodes]
+
+    def _through(self, kind: int, level: int, G: Array) -> tuple[Array, Array]:
+        """Derivatives of the end by the start, and by what is added to the ports at nodes 1 to p."""
+        step, ports = self.by.step(kind, level), self.by.ports
+        S, nodes, n = len(G), DEGREE * ports.size, self.n_free
+        nodes_by, end_by = self._by_ports(step, G)  # derivatives by the port states at start and nodes
         A = np.eye(nodes) - nodes_by[:, :, 1:].reshape(S, nodes, nodes)
         # The transposed system: as many right-hand sides as states, however many parameters there are.
         through = np.linalg.solve(A.transpose(0, 2, 1), end_by[:, :, 1:].reshape(S, n, nodes).transpose(0, 2, 1))
         through = np.ascontiguousarray(through.transpose(0, 2, 1))
         F = step.K[nodes:nodes + n, :n] + through @ step.K[:nodes, :n]
         F[:, :, ports] += end_by[:, :, 0] + through @ nodes_by[:, :, 0]
-        return F, direct[:, nodes:nodes + n] + through @ direct[:, :nodes]
+        return F, through
 
     def _by_ports(self, step: Step, G: Array) -> tuple[Array, Array]:
         """Derivatives of the nodes (S, nodes, p + 1, ports) and of the end, by the port states at start and nodes."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +41,10 @@ def lumps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
         counts: list[int] = []
 
         def counted(problem: Any) -> int:
-            counts.append(found(problem))
+            counts.append(found.march(problem))
             return counts[-1]
 
-        monkeypatch.setattr(_exponential, "library", lambda: counted if built else None)
+        monkeypatch.setattr(_exponential, "library", lambda: replace(found, march=counted) if built else None)
         return rt.thermal.trajectory(system, record, tolerance=tolerance).lumps, counts
 
     return simulated
@@ -80,6 +81,23 @@ def test_samples_that_are_too_long_are_left_to_numpy(every: rt.System, drive: An
     np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
 
 
+def test_derivatives_are_those_of_numpy(every: rt.System, drive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Along one path, by every number of the system; numpy's are tested against differences elsewhere."""
+    found = compiled.steps()
+    every = every.with_parameters({"modules.tem.drive.time_constant": 3.0})  # then a drive is a port, too
+    names = [name for name in every.parameter_names if not name.endswith((".noise", ".disturbance"))]
+    slopes, asked = [], []
+    run = rt.thermal.trajectory(every, drive(60, system=every, sample_time=0.5))
+    for built in (replace(found, derivatives=lambda problem: asked.append(1) or found.derivatives(problem)), None):
+        monkeypatch.setattr(_exponential, "library", lambda built=built: built)
+        run.derivative.by._compiled.clear()
+        slopes.append(run.derivative(names))
+    scale = np.abs(slopes[1]).max(axis=(0, 1))
+    assert asked and np.count_nonzero(scale) > 40
+    np.testing.assert_allclose(slopes[0], slopes[1], rtol=0.0, atol=1e-9 * scale.max())
+    assert (np.abs(slopes[0] - slopes[1]).max(axis=(0, 1)) <= 1e-8 * scale + 1e-12).all()
+
+
 def test_runaway_is_an_error_no_later(lumps: Any) -> None:
     system = rt.System(
         ambients={"room": {"temperature": 300.0}}, lumps={"hot": {"capacity": 5.0}, "cold": {"capacity": 5.0}},
@@ -105,6 +123,9 @@ def test_sizes_that_do_not_fit_are_refused(full: rt.System) -> None:
                            (z.astype(np.float32), w)):
         with pytest.raises(ValueError, match="do not fit"):
             march(states, drives)
+    for states, drives, n_free in ((z[:9], w, 3), (z[:, :-1], w, 3), (z[:10], w[:, 1:], 3), (z[:10], w, by.nz + 1)):
+        with pytest.raises(ValueError, match="do not fit"):
+            march.linearized(states, drives, n_free)
 
 
 def test_numpy_takes_what_the_library_does_not_hold(full: rt.System, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,6 +133,16 @@ def test_numpy_takes_what_the_library_does_not_hold(full: rt.System, monkeypatch
     assert _march.holds(heat, 64) and not _march.holds(heat, 65)
     monkeypatch.delitem(_march._KINDS, next(kind for kind in _march._KINDS if kind.__name__ == "RadiationTerm"))
     assert not _march.holds(heat, 10)
+
+
+def test_a_sample_without_a_fixed_point_is_left_to_numpy(full: rt.System) -> None:
+    """At a current of a megaampere."""
+    by = _exponential.Integrator(rt.thermal.Equations(full), (1.0,))
+    march = _march.Marching(compiled.steps(), by.port_heat, by.step(0, 0), by.gain(0, 0), 1e-7, 1e-3, 3000.0)
+    z, w = np.full((2, by.nz), 300.0), np.tile(by.eq.drives(by.eq.nominal()), (2, 1))
+    assert march.linearized(z, w, 4) is not None
+    w[1, by.eq.drives.column["tem"]] = 1e6
+    assert march.linearized(z, w, 4) is None and march(np.full((3, by.nz), 300.0), w) == 1
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
