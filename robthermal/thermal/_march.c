@@ -9,7 +9,7 @@
 #include <string.h>
 
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
-enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION };
+enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
 typedef struct {

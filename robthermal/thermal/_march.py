@@ -177,11 +177,11 @@ def _described(heat: PortHeat) -> tuple[Array, Array]:
     """Kind, ends and drive of every pair (n_pairs, 4), and its numbers (n_pairs, 8)."""
     pairs, numbers = [np.zeros((0, 4))], [np.zeros((0, _NUMBERS))]
     for term, (a, b, drive) in zip(heat.eq.terms, heat.places, strict=True):
-        kind = list(_KINDS).index(type(term))
+        kind, numbers_of = _KINDS[type(term)]
         driven = drive if drive.size else np.full(len(a), -1)
         pairs.append(np.column_stack([np.full(len(a), kind), a, b, driven]))
         own = np.zeros((len(a), _NUMBERS))
-        for column, values in enumerate(_KINDS[type(term)](term)):
+        for column, values in enumerate(numbers_of(term)):
             own[:, column] = values
         numbers.append(own)
     return np.concatenate(pairs), np.concatenate(numbers)
@@ -197,13 +197,13 @@ def _in_pairs(heat: PortHeat) -> Array:
     return heat.scatter[order]
 
 
-_KINDS: dict[type, Callable[[Any], tuple[Array | float, ...]]] = {  # in the order of the source
-    ModuleTerm: lambda t: (t.S, t.S_slope, t.R, t.R_slope, t.K_slope, t.T_ref, t.thomson, t.split),
-    NaturalTerm: lambda t: (t.gain, t.exponent, t.warmer_b - t.warmer_a),
-    RadiationTerm: lambda t: (t.coefficient, t.warmer_a, t.warmer_b),
-    StepTerm: lambda t: (t.conductance * t.relative, t.warmer),
-    FollowTerm: lambda t: (t.conductance * t.relative, t.warmer),
-    HeaterTerm: lambda t: (t.gain * t.slope, t.T_ref, t.share),
-    LeadTerm: lambda t: (t.resistance,),
-    CondensationTerm: lambda t: (t.conductance, t.dew_point),
+_KINDS: dict[type, tuple[int, Callable[[Any], tuple[Array | float, ...]]]] = {  # numbered as in the source
+    ModuleTerm: (0, lambda t: (t.S, t.S_slope, t.R, t.R_slope, t.K_slope, t.T_ref, t.thomson, t.split)),
+    NaturalTerm: (1, lambda t: (t.gain, t.exponent, t.warmer_b - t.warmer_a)),
+    RadiationTerm: (2, lambda t: (t.coefficient, t.warmer_a, t.warmer_b)),
+    StepTerm: (3, lambda t: (t.conductance * t.relative, t.warmer)),
+    FollowTerm: (4, lambda t: (t.conductance * t.relative, t.warmer)),
+    HeaterTerm: (5, lambda t: (t.gain * t.slope, t.T_ref, t.share)),
+    LeadTerm: (6, lambda t: (t.resistance,)),
+    CondensationTerm: (7, lambda t: (t.conductance, t.dew_point)),
 }
