@@ -56,7 +56,7 @@ class Linearized:
     V : ndarray, shape (S, p + 1, n_ports + n_w)
         States at the ports, and drives.
     q : ndarray, shape (S, p + 1, n_q)
-        Heats.
+        Heats at the nodes by target [W].
     F : ndarray, shape (S, n_free, n_free)
         Derivative of the end by the start.
     through : ndarray, shape (S, n_free, p n_ports)
