@@ -22,6 +22,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 KERNELS = {  # sources, each with the headers that belong to it
     Path("robthermal", "identify", "_moments.c"): ("_vectors.h",),
+    Path("robthermal", "_recursion.c"): (),
     Path("robthermal", "thermal", "_march.c"): (),
 }
 # Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor

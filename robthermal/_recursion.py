@@ -1,17 +1,35 @@
-"""x(k+1) = A(k) x(k) + b(k) for many columns at once, without a loop over the samples.
+"""x(k+1) = A(k) x(k) + b(k) for many columns at once: in C where that was built, else without a loop over the samples.
 
-The samples are cut into blocks. All blocks go through their samples together, from 0; then the states at their ends
-are passed on from block to block, and what they add within each is one product.
+Without C the samples are cut into blocks. All blocks go through their samples together, from 0; then the states at
+their ends are passed on from block to block, and what they add within each is one product.
 """
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._library import library
+
 Array = NDArray[np.floating[Any]]
+SOURCE = Path(__file__).with_suffix(".c")
+
+
+@cache
+def compiled(folder: Path = SOURCE.parent) -> Callable[..., None] | None:
+    """The compiled recursion by the library in `folder`; None where it was not built, or from another source."""
+    found = library(SOURCE, folder)
+    if found is None:
+        return None
+    run: Any = found.robthermal_recursion
+    run.restype, run.argtypes = None, [ctypes.c_int64] * 4 + [ctypes.c_void_p] * 3
+    return run  # type: ignore[no-any-return]
 
 
 def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
@@ -38,11 +56,23 @@ def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
     [0.0, 1.0, 1.5, 1.75]
     """
     n, n_z, m = b.shape
-    x = np.zeros((n + 1, n_z, m))
-    if start is not None:
-        x[0] = start
-    if n == 0:
-        return x
+    if A.shape != (n, n_z, n_z):
+        raise ValueError(f"transitions {A.shape} for {b.shape}")
+    x = np.empty((n + 1, n_z, m))
+    x[0] = 0.0 if start is None else start
+    run = compiled()
+    if run is not None and A.dtype == b.dtype == float:
+        side_by_side = A.strides[1:] == (8 * n_z, 8) and A.strides[0] in (0, 8 * n_z * n_z)  # or one for all
+        held, pushed = A if side_by_side else np.ascontiguousarray(A), np.ascontiguousarray(b)
+        run(n, n_z, m, held.strides[0] // 8, held.ctypes.data, pushed.ctypes.data, x.ctypes.data)
+    elif n:
+        _in_blocks(A, b, x)
+    return x
+
+
+def _in_blocks(A: Array, b: Array, x: Array) -> None:
+    """Fill x (n + 1, n_z, m) after its first."""
+    n, n_z, m = b.shape
     length = max(1, int(np.sqrt(n / 2)))
     blocks = n // length
     whole = blocks * length
@@ -61,4 +91,3 @@ def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
     within += (passed.reshape(blocks, length * n_z, n_z) @ before).reshape(within.shape)
     for k in range(whole, n):
         x[k + 1] = A[k] @ x[k] + b[k]
-    return x

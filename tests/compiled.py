@@ -6,6 +6,7 @@ import atexit
 import runpy
 import shutil
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -15,6 +16,8 @@ from unittest.mock import patch
 
 import pytest
 
+from robthermal import _recursion
+from robthermal._library import library_name
 from robthermal.identify import _compiled
 from robthermal.thermal import _march
 
@@ -47,10 +50,24 @@ def folder() -> Path:
 @cache
 def steps() -> _march.Steps:
     """The compiled steps of a simulation, from beside their source, or compiled now."""
-    found = _march.library(_with_library(_march.SOURCE, _march.library_name(_march.SOURCE.read_bytes())))
+    found = _march.library(_with_library(_march.SOURCE, name_of(_march.SOURCE)))
     if found is None:
         pytest.skip("no library of compiled steps for this compiler and processor")
     return found
+
+
+@cache
+def recursion() -> Callable[..., None]:
+    """The compiled recursion, in the same way."""
+    found = _recursion.compiled(_with_library(_recursion.SOURCE, name_of(_recursion.SOURCE)))
+    if found is None:
+        pytest.skip("no library of the recursion for this compiler and processor")
+    return found
+
+
+def name_of(source: Path) -> str:
+    """Name of the library of a source without headers."""
+    return library_name(source.stem, source.read_bytes())
 
 
 def _with_library(source: Path, name: str) -> Path:

@@ -1,12 +1,21 @@
-"""Linear recursions in blocks and filters 1/a, against a loop over the steps."""
+"""Linear recursions, in C and in blocks, and filters 1/a, against a loop over the steps."""
 
 from __future__ import annotations
 
+import compiled
 import numpy as np
 import pytest
 
+from robthermal import _recursion
 from robthermal._all_pole import all_pole
 from robthermal._recursion import recursion
+
+
+@pytest.fixture(autouse=True, params=["numpy", "C"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both ways of a recursion."""
+    run = compiled.recursion() if request.param == "C" else None
+    monkeypatch.setattr(_recursion, "compiled", lambda: run)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 7, 50, 1025])
@@ -22,6 +31,23 @@ def test_is_what_a_loop_gives(n: int, columns: int) -> None:
     found = recursion(A, b, start)
     assert found.shape == (n + 1, 3, columns)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("laid", ["one", "transposed", "every other"])
+def test_arrays_may_lie_in_any_way(laid: str) -> None:
+    rng = np.random.default_rng(0)
+    A, b = 0.4 * rng.standard_normal((40, 3, 3)), rng.standard_normal((40, 3, 2))
+    given = {"one": (np.broadcast_to(A[0], A.shape), b), "transposed": (A.transpose(0, 2, 1), np.asfortranarray(b)),
+             "every other": (A[::2], b[::2])}[laid]
+    expected = [np.zeros((3, 2))]
+    for transition, pushed in zip(*given, strict=True):
+        expected.append(transition @ expected[-1] + pushed)
+    np.testing.assert_allclose(recursion(*given), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_sizes_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(ValueError, match="transitions"):
+        recursion(np.zeros((4, 3, 3)), np.zeros((5, 3, 1)))
 
 
 def test_starts_from_nothing_by_default_and_leaves_its_arguments_alone() -> None:

@@ -1,14 +1,11 @@
 """The compiled steps `_march.c` of small systems where they were built, by ctypes; else None, and numpy does the same.
 
-The library is named by a hash of its source, so that one built from an older source is never loaded. Sizes, types and
-layout of every array are made here, for the other side trusts them.
+Sizes, types and layout of every array are made here, for the other side trusts them.
 """
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -17,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .._library import library as compiled_from
 from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm
@@ -82,19 +80,13 @@ class _Problem(ctypes.Structure):
     )
 
 
-def library_name(text: bytes) -> str:
-    """Name of the library that belongs to the text of the source."""
-    return f"_march_{hashlib.sha256(text).hexdigest()[:16]}.so"
-
-
 @cache
 def library(folder: Path = SOURCE.parent) -> Steps | None:
     """Functions of the library in `folder`; None where it was not built, or from another source."""
-    try:
-        found = ctypes.CDLL(os.fspath(folder / library_name(SOURCE.read_bytes())))
-        size, *both = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
-    except (OSError, AttributeError):
+    found = compiled_from(SOURCE, folder)
+    if found is None:
         return None
+    size, *both = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
     size.restype = ctypes.c_int64
     if size() != ctypes.sizeof(_Problem):
         return None

@@ -104,7 +104,10 @@ class Sensitivity:
                 moved = jump[segment[begins], :, None]
                 maps.P[begins, :, self.names.index(name)] += (maps.F[begins] @ moved)[..., 0]
             states = recursion(maps.F, maps.P, now)
-            out[segment[ends[chunk]] + 1] = states[1:][ends[chunk]]
+            if len(begins) == len(segment):  # one step each: a view is several times as fast
+                out[segment[0] + 1:segment[-1] + 2] = states[1:]
+            else:
+                out[segment[ends[chunk]] + 1] = states[1:][ends[chunk]]
             now = states[-1]
         return out
 
@@ -112,17 +115,29 @@ class Sensitivity:
         """Linear maps of a chunk of steps."""
         n, segment, level = self.n_free, path.segment[chunk], path.level[chunk]
         kind = plan.kind[segment]
+        if np.all((kind == kind[0]) & (level == level[0])):
+            held = {name: slopes[segment] for name, slopes in self.held.items()}
+            F, by_acting = self._of_length(path.starts[chunk], plan.w[segment], held, int(kind[0]), int(level[0]))
+            return Transitions(F, self._of_all(by_acting))
         F, P = np.empty((len(segment), n, n)), np.zeros((len(segment), n, len(self.names)))
         acting = np.array([self.names.index(name) for name in self._acting], np.intp)
         for which, depth in set(zip(kind.tolist(), level.tolist(), strict=True)):
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
             F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
-            if own.all() and self._acting == self.names[:acting.size]:  # views are several times as fast
-                P[..., :acting.size] = by_acting
-            else:
-                P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
+            P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
         return Transitions(F, P)
+
+    def _of_all(self, by_acting: Array) -> Array:
+        """Derivatives by all parameters of those by the ones that act on a step."""
+        if len(self._acting) == len(self.names):
+            return by_acting
+        out = np.zeros((*by_acting.shape[:2], len(self.names)))
+        if self._acting == self.names[:len(self._acting)]:
+            out[..., :len(self._acting)] = by_acting
+        else:
+            out[..., [self.names.index(name) for name in self._acting]] = by_acting
+        return out
 
     def rate_slopes(self, states: Array, w: Array, slopes: Array, held: Mapping[str, Array]) -> Array:
         """Derivative (n, n_free, n_parameters) of ż at states (n, n_free) that move by slopes, and drives by held."""
@@ -146,6 +161,9 @@ class Sensitivity:
 
     def _of_length(self, z: Array, w: Array, held: Mapping[str, Array], kind: int, level: int) -> tuple[Array, Array]:
         nodes, n, march = DEGREE * self.by.ports.size, self.n_free, self.by.compiled(kind, level)
+        if not nodes:  # nothing but the linear network
+            F, none = np.broadcast_to(self.by.step(kind, level).K[:n, :n], (len(z), n, n)), np.zeros((len(z), 1, 0))
+            return F, self._direct(kind, level, z, w, held, none, none, np.zeros((len(z), 1, 0, w.shape[1])))
         found = None if march is None else march.linearized(z, w, n)
         V = self._at_ports(self.by.step(kind, level), z, w) if found is None else found.V
         q = self.by.port_heat(V) if found is None else found.q

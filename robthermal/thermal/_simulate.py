@@ -267,7 +267,9 @@ class _Derivative:
         by_rate = self.delayed or any(name.endswith((".delay", ".time_constant")) for name in names)
         held = held_slopes(eq, self.record, names, plan)
         along = Sensitivity(by, names, held, jump_slopes(by, names, self.path.z, plan))
-        slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))[at]
+        slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))
+        if len(at) < len(slopes):  # else every segment is a sample
+            slopes = slopes[at]
         return reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
                               _rate_slopes(along, states, plan, slopes) if self.delayed else None,
                               {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
+from robthermal._library import library_name
 from robthermal.thermal import _exponential, _march
 
 PARTS = [("conductance_step", ["plate-hot"], {"relative": -0.3, "time": 40.5}),
@@ -147,12 +148,12 @@ def test_a_sample_without_a_fixed_point_is_left_to_numpy(full: rt.System) -> Non
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
-    source = _march.SOURCE.read_bytes()
-    assert _march.library_name(source) != _march.library_name(source + b" ")
-    (tmp_path / _march.library_name(source + b" ")).write_bytes(b"")
+    source, name = _march.SOURCE.read_bytes(), compiled.name_of(_march.SOURCE)
+    assert name == library_name("_march", source) != library_name("_march", source + b" ")
+    (tmp_path / library_name("_march", source + b" ")).write_bytes(b"")
     assert _march.library(tmp_path) is None
     (tmp_path / "damaged").mkdir()
-    (tmp_path / "damaged" / _march.library_name(source)).write_bytes(b"no library")
+    (tmp_path / "damaged" / name).write_bytes(b"no library")
     assert _march.library(tmp_path / "damaged") is None
 
 
@@ -162,7 +163,7 @@ def test_the_hook_builds_it_beside_its_source_or_into_a_wheel(tmp_path: Path) ->
     folder.mkdir(parents=True)
     shutil.copy(_march.SOURCE, folder)
     (folder / "_march_0123456789abcdef.so").write_bytes(b"old")
-    name = _march.library_name(_march.SOURCE.read_bytes())
+    name = compiled.name_of(_march.SOURCE)
     assert compiled.built_by_hook(tmp_path, "editable") == {"force_include": {}}
     assert [path.name for path in folder.glob("*.so")] == [name] and _march.library(folder) is not None
     wheel = compiled.built_by_hook(tmp_path, "standard")
