@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import robthermal as rt
 
 MACHINE = Path(rt.__file__).parent / "systems" / "two_module.toml"
@@ -84,9 +86,31 @@ def test_a_file_that_cannot_be_read_is_answered_with_its_reader_alone(tmp_path: 
 
 def test_a_missing_certificate_is_answered_with_the_checker_alone(tmp_path: Path) -> None:
     unwanted = ("scipy", "pandas", "matplotlib", "jinja2", "robthermal.thermal", "robthermal.signals",
-                "robthermal.identify", "robthermal.certify")
+                "robthermal.identify", "robthermal.certify", "robthermal.report")
     (_, status, said, loaded), = after([["verify", "lost.json"]], unwanted, tmp_path)
     assert (status, loaded) == (2, []) and "lost.json" in said
+
+
+def test_a_missing_calibration_is_answered_before_anything_is_loaded(tmp_path: Path) -> None:
+    lines = [["certify", str(MACHINE), "--parameters", "lost.json"],
+             ["design", str(MACHINE), "--parameters", "lumps.x1.capacity=38:42", "--parameters", "lost.json"]]
+    found = after(lines, NOTHING, tmp_path)
+    assert [(words, status, loaded) for words, status, _, loaded in found] == [(words, 2, []) for words in lines]
+    assert all("lost.json: there is no such file" in said for *_, said, _ in found)
+
+
+@pytest.mark.exhaustive  # beside it `test_no_command_waits_for_scipy_stats` asks the files themselves
+def test_records_are_diagnosed_without_what_certifies_and_designs(tmp_path: Path) -> None:
+    """The whole command: read, fitted, drawn, written."""
+    assert after([["new", "bench"]], (), tmp_path)[0][1] == 0
+    unwanted = ("scipy.stats", "scipy.signal", "scipy.interpolate", "control", "cvxpy", "flint", "joblib",
+                "robthermal.verification", "robthermal.certify", "robthermal.calibration", "robthermal.synthesis",
+                "robthermal.design")
+    record = tmp_path / "bench" / "train.csv"
+    record.write_text("".join(record.read_text(encoding="utf-8").splitlines(keepends=True)[:120]), encoding="utf-8")
+    (_, status, said, loaded), = after([["diagnose", "bench/setup.toml", "bench/train.csv"]],
+                                       ("scipy.linalg", "matplotlib", *unwanted), tmp_path)
+    assert (status, loaded) == (0, ["scipy.linalg", "matplotlib"]), said  # fits and figures: what is loaded is seen
 
 
 def test_a_sound_system_is_checked_without_what_designs_and_draws(tmp_path: Path) -> None:

@@ -71,6 +71,11 @@ class LocalEstimate:
         return self.basis.size * self.n_u + self.basis.transient_size * len(self.spectra)
 
     @property
+    def rounding(self) -> Array:
+        """Size of a line of each output that may be nothing but rounding, (n_y,)."""
+        return np.asarray(np.max([spectrum.rounding for spectrum in self.spectra], axis=0))
+
+    @property
     def nominal_degrees_of_freedom(self) -> int:
         """q of a window with full rank."""
         return sum(points_per_record(self.spectra, self.basis)) - self.unknowns
@@ -141,7 +146,7 @@ class LocalEstimate:
             noise=np.empty((self.n_y, self.n_y, count), dtype=complex) if full_noise else None,
             degrees_of_freedom=np.full(count, self.nominal_degrees_of_freedom, dtype=np.int32),
         )
-        exact = np.ones(count, dtype=bool)
+        exact = np.ones(count, dtype=bool)  # bins that are left to the exact solver
         if self._kernel is not None:
             self._solve_interior(self._kernel, found, exact, start)
         for part in self._parts(start + np.flatnonzero(exact)):
@@ -172,9 +177,17 @@ class LocalEstimate:
                 _store_noise(found, part, fit.noise[..., mine])
                 exact[part] = fit.doubtful[mine]
 
+        stop = start + exact.size
+        edges = np.concatenate([np.arange(start, min(first, stop)), np.arange(max(last, start), stop)])
+
+        def solve_edges() -> None:  # beside the interior: they take as long as a block
+            for part in self._parts(edges):
+                self._solve_exactly(found, part, part - start)
+            exact[edges - start] = False
+
         before = max(0, start - first) // block * block
-        starts = range(first + before, min(last, start + exact.size), block)
-        run_all(solve, starts, worth=len(starts) >= 4)
+        starts = range(first + before, min(last, stop), block)
+        run_all(lambda a: solve(a) if a else solve_edges(), [0, *starts], worth=len(starts) >= 4)
 
     def _solve_exactly(self, found: LocalArrays, bins: Array, place: Array) -> None:
         fit = solve_windows(regression(self.spectra, self.basis, bins))

@@ -13,7 +13,7 @@ from robthermal.signals import Record
 from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalArrays, LocalEstimate
-from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 
@@ -71,7 +71,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
     """The estimate of checked records with a given local basis, polynomial or with prescribed poles."""
     estimate = LocalEstimate([spectrum_of(r.inputs, r.outputs) for r in records], basis)
     found = estimate.run()
-    first, rounding = records[0], rounding_of([r.outputs for r in records])
+    first = records[0]
     frequencies = np.arange(1, estimate.n_bins + 1) / (basis.n_samples * first.sample_time)
     notes = undetermined_inputs(found.response, frequencies, first.input_names)
     return FrequencyResponse(
@@ -83,7 +83,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
         degrees_of_freedom=found.degrees_of_freedom,
         transient=estimate.transient,
         coherence=lambda bins: _coherence(estimate, found, bins),
-        suspect=suspect_bins(found.variance, found.degrees_of_freedom, basis.half_width, rounding),
+        suspect=suspect_bins(found.variance, found.degrees_of_freedom, basis.half_width, estimate.rounding),
         input_names=first.input_names,
         output_names=first.output_names,
         operating_point=mean_inputs(records),
@@ -104,7 +104,10 @@ def _coherence(estimate: LocalEstimate, found: LocalArrays, bins: slice) -> Arra
 
 def undetermined_inputs(response: Array, frequencies: Array, names: Sequence[str]) -> list[str]:
     """What to say about inputs without power (or not distinguishable) in some bins; refuses those without any."""
-    notes, lost = [], []
+    notes: list[str] = []
+    lost: list[str] = []
+    if not np.isnan(np.vdot(response, response)):
+        return notes  # the sum is a number, so all are: half the passes
     for i, name in enumerate(names):
         missing = np.isnan(response[:, i]).any(axis=0)
         if missing.all():

@@ -15,7 +15,7 @@ from .._checks import whole_number
 from ._basis import LocalBasis
 from ._local import LocalEstimate
 from ._lpm import undetermined_inputs
-from ._records import as_records, check_excitation, mean_inputs, rounding_of, spectrum_of
+from ._records import as_records, check_excitation, mean_inputs, spectrum_of
 from ._response import FrequencyResponse
 from ._suspect import suspect_bins
 from ._threads import run_all
@@ -110,7 +110,7 @@ def lrm(
         noise_covariance=found.noise,
         degrees_of_freedom=found.degrees_of_freedom,
         transient=found.transient,
-        suspect=suspect_bins(variance, found.degrees_of_freedom, half_width, rounding_of([r.outputs for r in records])),
+        suspect=suspect_bins(variance, found.degrees_of_freedom, half_width, estimate.rounding),
         input_names=records[0].input_names,
         output_names=records[0].output_names,
         operating_point=mean_inputs(records),

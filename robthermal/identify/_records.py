@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from robthermal.signals import Record
 from ._threads import run_all
 
 _SILENT = 1e-12  # standard deviation relative to the largest value, below which a signal is constant to rounding
-_LINE_SILENT = 1e3  # a bin is excited when it exceeds this many times the rounding error of its signal
+_LEVEL = 1e3 * np.finfo(float).eps  # of the largest value: a line below it may be nothing but rounding
 _SIDE_BY_SIDE = (50_000, 2_000_000)  # samples between which channels are transformed together: time against memory
 _COPIES = 1e-12  # squared relative distance below which inputs are linear combinations of each other
 
@@ -98,9 +98,9 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
     """Refuse signals (each (n, n_u), one per experiment) that are constant, or combinations of each other."""
     gram, varies = np.zeros((len(names), len(names))), np.zeros(len(names), dtype=bool)
     for signal in signals:
-        own = _gram(signal)
+        own, largest = _gram(signal)
         gram += own
-        varies |= np.sqrt(np.diag(own) / len(signal)) > _SILENT * _largest(signal)
+        varies |= np.sqrt(np.diag(own) / len(signal)) > _SILENT * largest
     for i, name in enumerate(names):
         if not varies[i]:
             raise InputError(
@@ -122,16 +122,18 @@ def check_excitation(signals: Sequence[Array], names: Sequence[str], *, where: s
         )
 
 
-def _gram(signal: Array) -> Array:
-    """Products of the deviations from the mean (n_u, n_u), of a signal (n, n_u)."""
+def _gram(signal: Array) -> tuple[Array, Array]:
+    """Products of the deviations from the mean (n_u, n_u), and largest absolute values (n_u,), of a signal (n, n_u)."""
     n, channels = signal.shape
-    centered = np.empty((channels, n))  # neighboring numbers of a channel lie side by side
+    centered, largest = np.empty((channels, n)), np.empty(channels)  # numbers of a channel lie side by side
 
     def center(c: int) -> None:
-        np.subtract(signal[:, c], signal[:, c].mean(), out=centered[c])
+        centered[c] = signal[:, c]
+        largest[c] = _most(centered[c])
+        centered[c] -= centered[c].mean()
 
     run_all(center, range(channels), worth=channels > 1 and n > _SIDE_BY_SIDE[0])
-    return np.asarray(centered @ centered.T)
+    return np.asarray(centered @ centered.T), largest
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,7 @@ class Spectrum:
     U: Array  # (n_u, F)
     Y: Array  # (n_y, F)
     n_samples: int
+    rounding: Array = field(default_factory=lambda: np.empty(0))  # (n_y,): lines of Y below may be nothing but that
 
     @property
     def n_bins(self) -> int:
@@ -151,27 +154,29 @@ def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
     """Spectra of the deviations from the mean; input bins that hold rounding errors only are set to exactly zero."""
     n, n_u, n_y = len(inputs), inputs.shape[1], outputs.shape[1]
     whole = np.empty((n_u + n_y, n // 2 + 1), dtype=complex)
-    spectra = whole[:, 1 : (n - 1) // 2 + 1]
+    spectra, level = whole[:, 1 : (n - 1) // 2 + 1], np.empty(n_u + n_y)
 
     def transform(c: int) -> None:  # channel by channel: a record of ten million samples must not be copied whole
-        column = inputs[:, c] if c < n_u else outputs[:, c - n_u]
-        np.fft.rfft(column - column.mean(), norm="ortho", out=whole[c])
+        column = np.array(inputs[:, c] if c < n_u else outputs[:, c - n_u])
+        level[c] = _LEVEL * _most(column)
+        column -= column.mean()
+        np.fft.rfft(column, norm="ortho", out=whole[c])
         if c < n_u:
             row = spectra[c]
-            row[np.abs(row) <= rounding_level(inputs[:, c : c + 1])] = 0.0
+            row[np.abs(row) <= level[c]] = 0.0
 
     run_all(transform, range(n_u + n_y), worth=_SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
-    return Spectrum(U=spectra[:n_u], Y=spectra[n_u:], n_samples=n)
+    return Spectrum(U=spectra[:n_u], Y=spectra[n_u:], n_samples=n, rounding=level[n_u:])
 
 
 def rounding_level(signals: Array) -> Array:
     """Size of a spectral line, per channel of `signals` (n, channels), that may be nothing but rounding."""
-    return np.asarray(_LINE_SILENT * np.finfo(float).eps * _largest(signals))
+    return np.array([_LEVEL * _most(column) for column in signals.T])  # by column: many times faster than axis=0
 
 
-def _largest(signals: Array) -> Array:
-    """Largest absolute value per channel of `signals` (n, channels); by column: many times faster than axis=0."""
-    return np.array([max(column.max(), -column.min()) for column in signals.T])
+def _most(column: Array) -> float:
+    """Largest absolute value."""
+    return float(max(column.max(), -column.min()))
 
 
 def rounding_of(signals: Sequence[Array]) -> Array:

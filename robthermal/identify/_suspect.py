@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
@@ -10,7 +12,8 @@ from .._arrays import Array
 from ._threads import run_all
 
 _LEVEL = 2e-3  # chance of a false alarm in one output of one bin, before the estimation error of the reference
-_SIDE_BY_SIDE = (25_000, 1_000_000)  # bins between which outputs are compared together: time against memory
+_PIECE = 2**14  # bins compared at a time: what is computed of them stays in the cache
+_SIDE_BY_SIDE = 50_000  # bins of all outputs from which other threads help
 _REACH = 6  # width of the reference on either side, in half widths
 
 
@@ -33,15 +36,17 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
     place: Array | int = np.maximum(degrees_of_freedom, 1) - 1
     if degrees_of_freedom.min() == degrees_of_freedom.max():
         place = int(q.size) - 1  # one number for all bins, as without weak ones: nothing to look up
-    limit = scipy.special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place]
-    ratio = _median_ratio(q)[place]
+    limit = np.broadcast_to(scipy.special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place], n_f)
+    ratio = np.broadcast_to(_median_ratio(q)[place], n_f)
     by_output = np.zeros((n_y, n_f), dtype=bool)
+    pieces = range(0, n_f, _PIECE)
 
-    def compare(o: int) -> None:
-        reference = _reference(variance[o] / ratio, gap, reach)
-        by_output[o] = variance[o] > limit * np.maximum(reference, rounding[o] ** 2)
+    def compare(item: int) -> None:
+        o, part = item % n_y, slice(pieces[item // n_y], pieces[item // n_y] + _PIECE)
+        reference = _reference(lambda few: variance[o, few] / ratio[few], n_f, part, gap, reach)
+        by_output[o, part] = variance[o, part] > limit[part] * np.maximum(reference, rounding[o] ** 2)
 
-    run_all(compare, range(n_y), worth=n_y > 1 and _SIDE_BY_SIDE[0] < n_f < _SIDE_BY_SIDE[1])
+    run_all(compare, range(n_y * len(pieces)), worth=n_y * n_f > _SIDE_BY_SIDE)
     return np.asarray(by_output.any(axis=0))
 
 
@@ -58,19 +63,26 @@ def _medians(rows: Array) -> Array:
     return np.where(np.isnan(increasing[:, -1]), np.nan, medians)
 
 
-def _reference(row: Array, gap: int, reach: int) -> Array:
-    """Lower of the medians of the `reach` bins beyond `gap`, left and right; infinite sides do not count."""
+def _reference(row: Callable[[slice], Array], n: int, part: slice, gap: int, reach: int) -> Array:
+    """Lower of the medians of the `reach` bins beyond `gap`, left and right, of some of the n bins of a row.
+
+    Infinite sides do not count. `row` gives the values of a slice.
+    """
     # Medians at half-overlapping windows only: the reference then moves by less than half its own width.
-    n, stride = row.size, max(1, reach // 2)
-    view = sliding_window_view(row, reach)[::stride]
-    medians = np.concatenate([_medians(view[first : first + 2**13]) for first in range(0, len(view), 2**13)])
+    a, b, stride = part.start, min(part.stop, n), max(1, reach // 2)
     # Window i begins at bin i stride: on the right of bin k the first with i stride >= k + gap, on the left the last
     # that ends at k - gap or before.
-    on_right, on_left, start = np.full(n, np.inf), np.full(n, np.inf), gap + reach - 1
+    start = gap + reach - 1
+    low = max(0, (a - start) // stride)
+    high = min((n - reach) // stride, (b - 1 + gap + stride - 1) // stride) + 1
+    medians = np.empty(0)
+    if high > low:
+        medians = _medians(sliding_window_view(row(slice(low * stride, (high - 1) * stride + reach)), reach)[::stride])
     each = np.broadcast_to(medians[:, None], (medians.size, stride)).ravel()  # several times faster than np.repeat
-    following = each[stride + gap - 1 :][:n]
-    preceding = each[: max(0, n - start)]
-    on_right[: following.size], on_left[start : start + preceding.size] = following, preceding
+    on_right, on_left, first = np.full(b - a, np.inf), np.full(b - a, np.inf), max(a, start)
+    following = each[a + stride + gap - 1 - low * stride :][: b - a]
+    preceding = each[first - start - low * stride :][: max(0, b - first)]
+    on_right[: following.size], on_left[first - a : first - a + preceding.size] = following, preceding
     lower = np.minimum(on_right, on_left)
     known = np.isfinite(lower)
-    return lower if known.all() else np.where(known, lower, np.median(row))
+    return lower if known.all() else np.where(known, lower, np.median(row(slice(0, n))))

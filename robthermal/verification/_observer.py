@@ -8,15 +8,18 @@ e+ = M e with M = A_d - L C + Γ F, F a mean of ∂f/∂x over the box (proof no
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
+import numpy as np
 from flint import arb, arb_mat, fmpq
 
 from robthermal.errors import InputError
 
 from ._corners import Part, first_failure, is_positive
+from ._definite import approximate
 from ._fields import get, mapping, margin_of, no_other, numbers, positive, sequence, text
 from ._kind import Kind, Proof, working_precision
 from ._lyapunov import (
@@ -115,49 +118,117 @@ def find_margin(problem: Observer) -> dict[str, float]:
     Looked for with the refinement that proves the claim itself: a probe that fails would try all finer ones.
     """
     with working_precision():
-        pieces = next((k for k in PIECES if _prove(problem, problem.contraction, (k,)).valid), 0)
-        low, high = 0.0, round_down(problem.contraction)
-        while pieces and high - low > max(0.01 * low, 1e-5):
-            middle = (low + high) / 2 if low > 0 else high / 4
-            proven = _prove(problem, problem.contraction - fmpq(*middle.as_integer_ratio()), (pieces,)).valid
-            low, high = (middle, high) if proven else (low, middle)
+        inequality = _inequality(problem)
+        if isinstance(inequality, str):
+            return {"contraction": 0.0}
+        each = (_margin(inequality, problem.contraction, pieces) for pieces in PIECES)
+        low = next((margin for margin in each if margin is not None), 0.0)
     return {"contraction": float(f"{low * 0.999:.4g}") if low > 0 else 0.0}
 
 
-def _prove(problem: Observer, contraction: fmpq, refinements: Sequence[int] = PIECES) -> Proof:
+def _margin(inequality: _Inequality, contraction: fmpq, pieces: int) -> float | None:
+    """Return the margin with one refinement, none where it does not prove the claim itself.
+
+    By bisection. Floats take its steps, and the one they end with is proven; where it is not, every step is.
+    """
+    def proven(margin: float) -> bool:
+        return inequality.prove(contraction - fmpq(*margin.as_integer_ratio()), (pieces,)).valid
+
+    high, hint = round_down(contraction), inequality.hint(contraction, pieces)
+    low = _bisected(lambda margin: margin < hint, high)
+    if low > 0 and proven(low):
+        return low
+    if low == 0 and hint > 0:
+        return 0.0  # less than is looked for; no margin claims nothing
+    return _bisected(proven, high) if proven(0.0) else None
+
+
+def _bisected(holds: Callable[[float], bool], high: float) -> float:
+    """Return a margin that holds, to one per cent of the largest; 0 where none is found."""
+    low = 0.0
+    while high - low > max(0.01 * low, 1e-5):
+        middle = (low + high) / 2 if low > 0 else high / 4
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _prove(problem: Observer, contraction: fmpq) -> Proof:
     """[c P, M'P; P M, c P] > 0 for all M of the box: affine in M, so that vertices suffice."""
-    n = len(problem.matrix)
     if contraction <= 0:
         return Proof(False, f"contraction {show(contraction)} is not positive")
+    inequality = _inequality(problem)
+    return Proof(False, inequality) if isinstance(inequality, str) else inequality.prove(contraction)
+
+
+@dataclass(frozen=True)
+class _Inequality:
+    """What the inequality is made of, whatever the contraction."""
+
+    problem: Observer
+    P: arb_mat
+    passive: arb_mat  # P M without what varies
+    left: arb_mat  # P Γ
+    nonlinear: Sequence[Collection[Described]]
+
+    def prove(self, contraction: fmpq, refinements: Sequence[int] = PIECES) -> Proof:
+        """Prove it at every vertex of the relaxed box, refining the relaxation where it fails."""
+        n = self.P.nrows()
+        start = _schur(self.passive, self.P * arb(contraction))
+        words = f"M'PM < {decimal(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
+        proof = Proof(False, "too many vertices to check any")
+        for pieces in refinements:
+            more = self.too_much(pieces)
+            if more:
+                return Proof(False, f"{proof.reason} ({more})")
+            groups = self.groups(pieces)
+            failed = first_failure(start, groups, lambda item: _part(self.left, item, n))
+            if failed is None:
+                return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")
+            proof = Proof(False, f"{words} fails or cannot be proven at {failed.where or 'the links'}")
+            if failed.real:
+                break  # a point of the box: no refinement helps
+        return proof
+
+    def hint(self, contraction: fmpq, pieces: int) -> float:
+        """Return the margin that floats see: M'PM <= c² P is |L^-1 P M L^-T| <= c with P = L L'. It proves nothing."""
+        if self.too_much(pieces):
+            return 0.0
+        try:
+            half = np.linalg.inv(np.linalg.cholesky(approximate(self.P)))
+        except np.linalg.LinAlgError:
+            return 0.0
+        base = half @ approximate(self.passive) @ half.T
+        shares = [[half @ approximate(self.left * dense(entries, len(base))) @ half.T for entries, *_ in group]
+                  for group in self.groups(pieces)]
+        return round_down(contraction) - max(float(np.linalg.norm(sum(some, base), 2)) for some in product(*shares))
+
+    def groups(self, pieces: int) -> list[Collection[Described]]:
+        """Return the shares of ∂f/∂x of which every vertex takes one of each group."""
+        return [*self.nonlinear, *module_slopes(self.problem.system, self.problem.region, pieces)]
+
+    def too_much(self, pieces: int) -> str:
+        """Return why the vertices are too many; else empty."""
+        return too_much(self.problem.system, self.problem.region, self.nonlinear, pieces, 2 * self.P.nrows())
+
+
+def _inequality(problem: Observer) -> _Inequality | str:
+    """Return the parts of the inequality, P > 0 proven, or why there is none."""
+    n = len(problem.matrix)
     base, nonlinear, missing = link_slopes(problem.system, problem.region)
     broken = (asymmetry(problem.matrix) or missing
-              or too_much(problem.system, problem.region, nonlinear, refinements[0], 2 * n))
+              or too_much(problem.system, problem.region, nonlinear, PIECES[0], 2 * n))
     if broken:
-        return Proof(False, broken)
+        return broken
     P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])
     if not is_positive(P):
-        return Proof(False, "P > 0 fails or cannot be proven")
+        return "P > 0 fails or cannot be proven"
     sampled = _sampled(problem)
     if isinstance(sampled, str):
-        return Proof(False, sampled)
+        return sampled
     A_d, hold = sampled
     left = P * hold
     passive = P * (A_d - _injection(problem)) + left * dense(_beyond_passive(problem, base), n)
-    start = _schur(passive, P * arb(contraction))
-    words = f"M'PM < {decimal(contraction)}² P, M = A_d - LC + Γ ∂f/∂x,"
-    proof = Proof(False, "too many vertices to check any")
-    for pieces in refinements:
-        more = too_much(problem.system, problem.region, nonlinear, pieces, 2 * n)
-        if more:
-            return Proof(False, f"{proof.reason} ({more})")
-        groups: list[Collection[Described]] = [*nonlinear, *module_slopes(problem.system, problem.region, pieces)]
-        failed = first_failure(start, groups, lambda item: _part(left, item, n))
-        if failed is None:
-            return Proof(True, f"{words} at all {math.prod(map(len, groups))} vertices of the relaxed box")
-        proof = Proof(False, f"{words} fails or cannot be proven at {failed.where or 'the links'}")
-        if failed.real:
-            break  # a point of the box: no refinement helps
-    return proof
+    return _Inequality(problem, P, passive, left, nonlinear)
 
 
 def _sampled(problem: Observer) -> tuple[arb_mat, arb_mat] | str:

@@ -37,6 +37,34 @@ def test_margin_is_proven_and_close():
     assert not verify(larger).valid and "stored margin" in verify(larger).reason
 
 
+@pytest.mark.parametrize("hint", [math.nan, math.inf, -math.inf, 0.5])
+def test_a_wrong_hint_costs_time_and_no_margin(hint, monkeypatch):
+    """Floats say where to look for the margin; what they say wrongly is found out by the proof."""
+    rng = np.random.default_rng(8)
+    found = [each for each in (made(with_energy(machine(rng), 1.0)) for _ in range(6)) if each.holds]
+    assert len(found) >= 3 and all(verify(each).valid and each.margin["contraction"] > 0 for each in found)
+    monkeypatch.setattr("robthermal.verification._observer._Inequality.hint", lambda *some: hint)
+    for each in found:
+        again = establish("observer", system=each.system, region=each.region, evidence=each.evidence, made_by={})
+        assert again.margin == each.margin
+
+
+def test_the_margin_is_that_of_the_worst_operating_point():
+    """Sampled: the inequality holds with the margin taken off; 5 % more is not proven."""
+    rng = np.random.default_rng(8)
+    held = [(each, margin) for each, margin in ((each, made(with_energy(each, 1.0)).margin) for each in
+                                                (machine(rng) for _ in range(8))) if margin]
+    assert len(held) >= 4
+    for document, margin in held:
+        assert violation(with_energy(document, 1.0 - margin["contraction"]), rng) < 0
+        assert not made(with_energy(document, 1.0 - 1.05 * margin["contraction"]), margin={}).holds
+
+
+def with_energy(document, contraction):
+    E = [lump["capacity"] for lump in document["system"]["lumps"].values()]
+    return {**document, "evidence": {"matrix": np.diag(E).tolist(), "contraction": contraction}}
+
+
 def violation(document, rng, count=40, nominal=None):
     P = np.array([[truth.number(value) for value in row] for row in document["evidence"]["matrix"]])
     c = truth.number(document["evidence"]["contraction"])

@@ -11,13 +11,14 @@ from ._files import certificate_files as certificate_files
 if TYPE_CHECKING:  # what type checkers and editors see of the table below
     from ._check_files import FileCheck as FileCheck
     from ._check_files import verify_files as verify_files
-    from ._check_files import write_checks as write_checks
+    from ._junit import write_checks as write_checks
     from ._second import SecondVerdict as SecondVerdict
     from ._second import second_verdicts as second_verdicts
 
 _HOME = {  # name: the module it lives in
-    **dict.fromkeys(("FileCheck", "verify_files", "write_checks"), "_check_files"),
+    **dict.fromkeys(("FileCheck", "verify_files"), "_check_files"),
     **dict.fromkeys(("SecondVerdict", "second_verdicts"), "_second"),
+    "write_checks": "_junit",
 }
 
 __all__ = ["FileCheck", "SecondVerdict", "certificate_files", "second_verdicts", "verify_files", "write_checks"]

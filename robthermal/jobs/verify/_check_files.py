@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...errors import InputError
-from ...report import Claim, Report, versions, write_junit
 from ...verification import Certificate, verify
-from ..now import now
 from ._second import INSTALL, SecondVerdict, second_verdicts
 
 
@@ -107,40 +105,3 @@ def _checked(file: Path) -> FileCheck:
         return FileCheck(file, None, str(error), "", "", {}, 0.0)
     return FileCheck(file, verdict.valid, verdict.reason, certificate.claim, certificate.kind, verdict.margins,
                      verdict.seconds)
-
-
-def write_checks(checks: Sequence[FileCheck], path: str | Path) -> Path:
-    """Write the checks as JUnit XML, one test case per file.
-
-    Parameters
-    ----------
-    checks : sequence of FileCheck
-        From `verify_files`. What is not valid, or cannot be read, is a failure.
-    path : str or Path
-        File to write.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import robthermal as rt
-    >>> file = rt.jobs.verify.write_checks(rt.jobs.verify_files([Path("none.json")]), "junit.xml")
-    >>> 'failures="1"' in file.read_text()
-    True
-    """
-    claims = [Claim(str(one.file), one.claim, one.valid is not None, one.valid, "as in the file", _margin(one),
-                    "re-derived in ball arithmetic", "" if one.valid else one.reason, str(one.file), one.kind,
-                    one.seconds) for one in checks]
-    return write_junit(Report("robthermal verify", "", "", claims, (), versions(), (), now()), path)
-
-
-def _margin(one: FileCheck) -> str:
-    return ", ".join(f"{name} {value:.3g}" for name, value in one.margins.items()) or "none"
