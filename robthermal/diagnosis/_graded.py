@@ -115,6 +115,7 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
     state = judged.state
     if judged.verdict != "unexplained" or not state.nominal.records:
         return judged
+    judged = replace(judged, why="more than noise is left beside it")
     try:
         finer = coarsened(state.nominal)
         if finer.structure.n_coarse:
@@ -154,11 +155,19 @@ def chosen_again(state: SearchState, nominal: Refit) -> SearchState:
 
 
 def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evidence, ...]]:
-    """The effects that hold over blocks and segments and are needed, the least needed one dropped first."""
+    """The effects that hold over blocks and segments and are needed, the least needed one dropped first.
+
+    What the records cannot tell from it is asked first: a rival that holds and is needed takes its place.
+    """
     rounds, fit = state.rounds, state.fit
     found = evidence_of(rounds, fit, finer)
     while not all(one.lasting for one in found):
         worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
+        instead = in_its_place(rounds, worst, fit, finer)
+        if instead is not None:
+            rounds, fit = instead
+            found = evidence_of(rounds, fit, finer)
+            continue
         less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
         if less is None:
             return replace(state, rounds=(), fit=finer), ()
@@ -169,6 +178,43 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
             rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
         found = evidence_of(rounds, fit, finer)
     return replace(state, nominal=finer, rounds=rounds, fit=fit), found
+
+
+def in_its_place(rounds: tuple[Accepted, ...], place: int, fit: Refit, finer: Refit
+                 ) -> tuple[tuple[Accepted, ...], Refit] | None:
+    """The effects with a rival in the place of one that does not last; None if none of its rivals lasts.
+
+    Beside unknowns of a finer network an effect may have the smallest sum of squares and remove nothing where the
+    network is as it is: it could not be named itself, and so it is no rival of one that could.
+
+    Parameters
+    ----------
+    rounds : tuple of Accepted
+        In the order of the effects of the fit.
+    place : int
+        Of the effect that does not last.
+    fit, finer : Refit
+        With all of them; without any.
+    """
+    old, others = rounds[place], [one.key for i, one in enumerate(fit.structure.effects) if i != place]
+    lasting = []
+    for entry in old.contenders:
+        keys = [one.key for one in entry.fit.structure.effects]
+        if [key for key in keys if key != entry.candidate.key] != others:
+            continue
+        new = coarsened(entry.fit) if entry.fit.structure.coarse else entry.fit
+        at = keys.index(entry.candidate.key)
+        swapped = [one for i, one in enumerate(rounds) if i != place]
+        swapped.insert(at, replace(old, best=replace(entry, fit=new), contenders=()))
+        if evidence_of(swapped, new, finer)[at].lasting:
+            lasting.append((at, replace(entry, fit=new)))
+    if not lasting:
+        return None
+    (at, best), *rivals = lasting
+    kept = [one for i, one in enumerate(rounds) if i != place]
+    kept.insert(at, replace(old, best=best, contenders=tuple(entry for _, entry in rivals)))
+    kept[-1] = replace(kept[-1], best=replace(kept[-1].best, fit=best.fit))
+    return tuple(kept), best.fit
 
 
 def _with_rivals(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
@@ -208,8 +254,10 @@ def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
 
 def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:
     """The verdict on what lasts."""
-    if not state.rounds or no_names(state):
-        return judged
+    if not state.rounds:
+        return replace(judged, why="the validation records contradict what holds over parts of the training records")
+    if faults := no_names(state):
+        return replace(judged, why=_beside(state, f"are no names: {' '.join(faults)}"))
     fit, nominal = state.fit, judged.state.nominal
     plain, bare = exact(fit), exact(nominal)
     kept = replace(state, nominal=nominal, scores=judged.state.scores, short=ShortList(fit, (), {}), complete=True,
@@ -219,13 +267,28 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
         return down
     held = validation.predicted(bare, plain)
     gaps = [Gap(nominal.rms, plain.rms, expected_rms(plain))] + ([] if held is None else [held.gap])
-    if not _closes(gaps) or not independent_of_step(fit):
-        return judged
+    if not _closes(gaps):
+        return replace(judged, why=_beside(state, f"take {_shares(gaps)} off the excess mean square, less than the "
+                                           f"{100.0 * _SHARE:.0f} % asked for on training records or the "
+                                           f"{100.0 * _CLOSED_SQUARE:.0f} % on validation records"))
+    if not independent_of_step(fit):
+        return replace(judged, why=_beside(state, "move when the integration is refined"))
     ambiguous = not all(one_place(round_, nominal.structure.base) for round_ in state.rounds)
     verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
     code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
     return Judged(state=kept, adequacy=down.adequacy, hold_out=held, verdict=verdict, outcome=code.outcome(),
                   plain=plain, evidence=evidence_of(state.rounds, fit, finer))
+
+
+def _beside(state: SearchState, what: str) -> str:
+    """Why the effects that last are no names, with their labels."""
+    labels = " and ".join(round_.best.candidate.label for round_ in state.rounds)
+    where = ", which last beside a network with its lumps split," if state.fit.structure.n_coarse else ""
+    return f"{labels}{where} {what.rstrip('.')}"
+
+
+def _shares(gaps: Sequence[Gap]) -> str:
+    return " and ".join(f"{100.0 * max(left(gap).share_explained, 0.0):.0f} %" for gap in gaps)
 
 
 def _closes(gaps: Sequence[Gap]) -> bool:
@@ -237,12 +300,15 @@ def _closes(gaps: Sequence[Gap]) -> bool:
 
 def _nothing_lasts(judged: Judged, finer: Refit) -> Judged:
     """The answer as it was; it says so if a finer network alone explains most of what is left."""
-    nominal = exact(judged.state.nominal)
-    if not finer.structure.n_coarse or nominal.variance < 1.0 or finer.variance > _NOISE:
+    if not finer.structure.n_coarse:
+        return judged
+    judged = replace(judged, why="beside a network with its lumps split nothing holds over the records and is needed")
+    if exact(judged.state.nominal).variance < 1.0 or finer.variance > _NOISE:
         return judged
     share = 1.0 - max(finer.variance - 1.0, 0.0) / max(judged.state.nominal.variance - 1.0, 1e-9)
     if share < 1.0 - NEEDED:
         return judged
     text = ("No effect of the catalog is reproducibly better than none. What is left is what a finer network would "
             "change: split the lumps where heat flows.")
-    return replace(judged, outcome=DiagnosisCode.UNEXPLAINED.outcome(text, remedy="Refine the network."))
+    return replace(judged, why="a network with its lumps split explains the training records without any effect",
+                   outcome=DiagnosisCode.UNEXPLAINED.outcome(text, remedy="Refine the network."))

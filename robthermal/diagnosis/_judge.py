@@ -68,6 +68,8 @@ class Judged:
         Where the fit of the state allows for a network that is too coarse: the same effects with the network as it is.
     evidence : tuple of Evidence
         For every effect, where the model is not exact.
+    why : str
+        Of an answer "unexplained" that was graded: what kept effects from being named, in words that follow "because".
     """
 
     state: SearchState
@@ -77,6 +79,7 @@ class Judged:
     outcome: Outcome
     plain: Refit | None = None
     evidence: tuple[Evidence, ...] = ()
+    why: str = ""
 
     def __str__(self) -> str:
         return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else
@@ -149,8 +152,9 @@ def without_names_of_noise(judged: Judged) -> Judged:
         return judged
     text = ("The model moves and the readings do not. Which effect holds them where they are cannot be told from such "
             "records: a heater that is off, a sensor that is not attached, a wrong column.")
-    return replace(judged, verdict="unexplained", evidence=(), plain=None, outcome=DiagnosisCode.UNEXPLAINED.outcome(
-        text, remedy="See that heaters and sensors are connected."))
+    return replace(judged, verdict="unexplained", evidence=(), plain=None, why="",
+                   outcome=DiagnosisCode.UNEXPLAINED.outcome(
+                       text, remedy="See that heaters and sensors are connected."))
 
 
 def no_names(state: SearchState) -> list[str]:

@@ -22,6 +22,7 @@ from ._doubts import (
 )
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
+from ._nearest import nearest
 from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative
@@ -185,6 +186,7 @@ def concluded(judged: Judged) -> Diagnosis:
         next_experiment=_plan(state.rounds) if named else None, outcome=judged.outcome,
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
+        nearest=nearest(judged, gap),
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves,
         ambients=found_ambients(fit))
     caveats = _caveats(judged, diagnosis)
@@ -195,8 +197,8 @@ def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
     """All that is to be said of an answer."""
     rooms = [] if found.verdict == "unexplained" else ambients_in_words(found.ambients, found.nominal.system)
     left_over = map(str, filter(None, (found.remainder, found.resolving)))
-    return " ".join([found.outcome.text, *found.nominal.floor.remarks, *rooms, *left_over, *found.fit.contradictions,
-                     *caveats])
+    return " ".join(filter(None, [found.outcome.text, found.nearest, *found.nominal.floor.remarks, *rooms, *left_over,
+                                  *found.fit.contradictions, *caveats]))
 
 
 def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:

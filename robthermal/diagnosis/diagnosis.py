@@ -108,6 +108,9 @@ class Diagnosis:
         the network as it is.
     caveats : tuple of str
         What to hold against a name, a sentence each; the outcome's text has them too.
+    nearest : str
+        Where nothing is named: what came nearest, what it takes off the error, and why it is no name; empty if nothing
+        did. The outcome's text has it, too.
     ambients : tuple of FoundAmbient
         Ambients that a training record does not hold, as its readings say them; `system` keeps its own.
     """
@@ -136,6 +139,7 @@ class Diagnosis:
     reference: Compared | None = None
     refinement: Refinement | None = None
     caveats: tuple[str, ...] = ()
+    nearest: str = ""
     ambients: tuple[FoundAmbient, ...] = ()
 
     @property

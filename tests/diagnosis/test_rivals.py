@@ -14,10 +14,12 @@ from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.diagnosis import Entry
-from robthermal.diagnosis._graded import _predicts, chosen_again
+from robthermal.diagnosis._graded import _predicts, chosen_again, in_its_place
 from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis.diagnose import doubts, place_undecided
-from robthermal.diagnosis.evidence import Twin
+from robthermal.diagnosis.effects import Candidate
+from robthermal.diagnosis.effects._ambient_drift import ambient_drift
+from robthermal.diagnosis.evidence import Evidence, Stability, Twin
 from robthermal.diagnosis.fit import Refit, coarsened
 from robthermal.diagnosis.search import Accepted, begin, decide, one_place, refit_short_list, with_neighbors
 from robthermal.diagnosis.search._neighbors import neighboring
@@ -60,12 +62,13 @@ def measured(cell: int, seed: int = 1, path: float = 0.2) -> rt.Record:
 
 
 @cache
-def finer(cell: int) -> Refit:
-    return coarsened(rt.diagnosis.refit(bar(), measured(cell)))
+def finer(cell: int, path: float = 0.2) -> Refit:
+    return coarsened(rt.diagnosis.refit(bar(), measured(cell, path=path)))
 
 
-def found(cell: int) -> Accepted:
-    before = finer(cell)
+@cache
+def found(cell: int, path: float = 0.2) -> Accepted:
+    before = finer(cell, path)
     decision = decide(refit_short_list(before, rt.diagnosis.score(before, ["missing_link"])))
     assert isinstance(decision, Accepted)
     return decision
@@ -142,6 +145,54 @@ def test_what_is_left_after_a_drop_is_chosen_again():
     assert set(again.rounds[0].best.candidate.where) in ({"x1", "x5"}, {"x2", "x5"})
     assert again.fit is again.rounds[0].best.fit
     assert before.rss - again.fit.rss > 3.0 * (before.rss - wrong.fit.rss) > 0.0
+
+
+@pytest.mark.parametrize(("lasting", "best", "rivals"), [
+    ("x1", "x1", []), ("x2", "x2", []), ("x1 x2", "x1", ["x2"]), ("", None, [])])
+def test_of_an_effect_that_does_not_last_only_rivals_that_do_take_the_place(monkeypatch, lasting, best, rivals):
+    """The path has two names, from x1 and from x2; which of them lasts is told here, that of the lag does not."""
+    good, bad = Evidence(0.9, 1.0, Stability(6, 0.1), 0.9), Evidence(0.0, 1.0, Stability(6, 0.1), 0.0)
+
+    def told(rounds, fit, nominal):
+        return tuple(good if set(lasting.split()) & set(one.best.candidate.where) else bad for one in rounds)
+
+    one = found(16)
+    entries = tuple(sorted((one.best, *one.contenders), key=lambda entry: sorted(entry.candidate.where)))
+    wrong = replace(one, best=replace(one.best, candidate=other_effect(one).candidate), contenders=entries)
+    monkeypatch.setattr("robthermal.diagnosis._graded.evidence_of", told)
+    monkeypatch.setattr("robthermal.diagnosis._graded.coarsened", lambda fit: fit)
+    answer = in_its_place((wrong,), 0, one.best.fit, one.before)
+    if best is None:
+        assert answer is None
+    else:
+        (chosen,), fit = answer
+        assert best in chosen.best.candidate.where and fit is chosen.best.fit
+        assert len(chosen.contenders) == len(rivals) and all(rival in entry.candidate.where for rival, entry
+                                                             in zip(rivals, chosen.contenders, strict=True))
+
+
+@pytest.mark.exhaustive
+def test_a_rival_that_is_needed_takes_the_place_of_a_better_fit_that_is_not():
+    """An offset that the records do not need stands first, the path behind it.
+
+    On a stack a mass was best beside a finer network and removed nothing without; the path was dropped with it.
+    """
+    one = found(16, path=0.8)
+    nothing = rt.diagnosis.refit_short_list(one.before, rt.diagnosis.score(one.before, ["sensor_offset"])).entries[0]
+    wrong = replace(one, best=nothing, contenders=(one.best, *one.contenders))
+    (chosen,), fit = in_its_place((wrong,), 0, nothing.fit, one.before)
+    assert frozenset(chosen.best.candidate.where) in ({"x1", "x5"}, {"x2", "x5"}) and chosen.best.fit is fit
+    assert nothing.candidate.key not in {entry.candidate.key for entry in chosen.contenders}
+    assert in_its_place((replace(wrong, contenders=()),), 0, nothing.fit, one.before) is None
+    same = replace(one, contenders=(nothing,))  # a rival that is not needed takes no place
+    assert in_its_place((same,), 0, one.best.fit, one.before) is None
+
+
+def test_what_is_no_path_between_two_parts_has_no_neighbors():
+    """A drift of the room is not in the catalog: asking for its neighbors there ended every answer that held one."""
+    one = found(16)
+    drifting = replace(one, best=replace(one.best, candidate=Candidate(ambient_drift(), ("room",))))
+    assert with_neighbors(drifting) is drifting
 
 
 @pytest.mark.parametrize(("one", "other", "answer"), [

@@ -64,8 +64,23 @@ class Evidence:
     @property
     def lasting(self) -> bool:
         """Whether it holds over blocks and segments and is needed."""
-        return (self.reproducible >= SURE and self.stability.spread <= WIDEST and self.stability.segments > 1
-                and self.needed >= NEEDED)
+        return not self.short_of
+
+    @property
+    def short_of(self) -> str:
+        """The first of these tests that fails, with the number and the limit; empty if none does."""
+        if not self.needed >= NEEDED:
+            return (f"takes {100.0 * max(self.needed, 0.0):.0f} % off what is left without it, less than the "
+                    f"{100.0 * NEEDED:.0f} % of an effect that is needed")
+        if not self.reproducible >= SURE:
+            return (f"lessens the error in {100.0 * self.reproducible:.0f} % of draws of parts of the records, less "
+                    f"than {100.0 * SURE:.0f} %")
+        if self.stability.segments < 2:
+            return "shows its size in a single part of the records"
+        if not self.stability.spread <= WIDEST:
+            return (f"has a size that differs by {100.0 * self.stability.spread:.0f} % between parts of the records, "
+                    f"more than {100.0 * WIDEST:.0f} %")
+        return ""
 
 
 def reproducible(with_it: Refit, without: Refit) -> float:

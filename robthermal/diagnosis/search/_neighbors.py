@@ -28,6 +28,8 @@ def with_neighbors(round_: Accepted) -> Accepted:
         Effect accepted beside a network that may be too coarse.
     """
     best, before = round_.best, round_.before
+    if len(best.candidate.where) != 2:  # no path: a drift of an ambient is not in the catalog, either
+        return round_
     known = {entry.candidate.key for entry in round_.contenders}
     near = [one for one in before.testable(candidates(before.structure.base, [best.candidate.effect.name]))
             if one.key not in known and neighboring(before.structure.base, one, best.candidate)]

@@ -184,7 +184,7 @@ def _effect_section(found: Diagnosis) -> Section:
 
 def _own_words(found: Diagnosis) -> str:
     """Why the verdict is as it is, without what the claims and the first screen say already."""
-    said = [found.adequacy.outcome.text, str(found.remainder or "")]
+    said = [found.adequacy.outcome.text, str(found.remainder or ""), found.nearest]
     said += [] if found.hold_out is None else [found.hold_out.outcome.text]
     text = found.outcome.text
     for sentence in said:

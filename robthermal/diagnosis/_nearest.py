@@ -1,0 +1,42 @@
+"""Where nothing is named: what came nearest, what it takes off the error, and why it is no name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ._graded import evidence_of
+from ._judge import Judged
+from .evidence import Gap, left
+
+
+def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
+    """What came nearest to an answer, in two sentences; empty where the search accepted nothing, or was not graded.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer with the effects that the search accepted.
+    gap : mapping
+        `Gap` of "train" and, if given, "validation", after being with these effects.
+    """
+    labels = [round_.best.candidate.label for round_ in judged.state.rounds]
+    if not labels or not judged.why:
+        return ""
+    seen = "validation" if "validation" in gap else "train"
+    records, one = "the validation records" if seen == "validation" else "the training records", gap[seen]
+    what, them, comes = " and ".join(labels), "it" if len(labels) == 1 else "them", "s" if len(labels) == 1 else ""
+    if left(one).share_explained <= 0.0:
+        return (f"Nearest come{comes} {what}, with which the error on {records} does not fall ({one.before:.2g} to "
+                f"{one.after:.2g} {one.unit}): no name.")
+    return (f"Nearest come{comes} {what}: with {them} the error on {records} falls from {one.before:.2g} to "
+            f"{one.after:.2g} {one.unit}, noise alone would give {one.noise:.2g}. No name, because "
+            f"{_why(judged)}.")
+
+
+def _why(judged: Judged) -> str:
+    """The first test that fails: of the effects themselves, or beside a finer network."""
+    state = judged.state
+    found = evidence_of(state.rounds, state.fit, state.nominal)
+    short = [f"{round_.best.candidate.label} {one.short_of}" for round_, one in zip(state.rounds, found, strict=True)
+             if not one.lasting]
+    return next(iter(short), judged.why)

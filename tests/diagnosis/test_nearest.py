@@ -1,0 +1,99 @@
+"""What an answer "unexplained" says: what came nearest, what it takes off the error, and why it is no name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis import Diagnosis
+from robthermal.diagnosis._judge import Judged
+from robthermal.diagnosis._nearest import nearest
+from robthermal.diagnosis.evidence import Evidence, Stability
+from robthermal.diagnosis.search import SearchState, ShortList
+from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
+
+Hide = Callable[..., tuple[rt.Record, rt.Record]]
+
+
+@pytest.fixture(scope="module")
+def records(hide: Hide, rate: Callable) -> tuple[rt.Record, rt.Record]:
+    """Natural convection is hidden, and the catalog is cut so that it has no name for it."""
+    def convected(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return rate(T, u, np.array([0.3 * abs(u[1] - T[0]) ** 0.25 * (u[1] - T[0]), 0.0]))
+
+    return hide(convected)
+
+
+@pytest.fixture(scope="module")
+def unexplained(plant: rt.System, records: tuple[rt.Record, rt.Record]) -> Diagnosis:
+    return rt.diagnose(plant, records[0], validation=records[1], effects=["sensor_gain", "sensor_lag"])
+
+
+def test_it_names_the_effect_and_both_errors_on_unseen_data(unexplained: Diagnosis) -> None:
+    (tried,), gap = unexplained.provisional, unexplained.gap["validation"]
+    assert unexplained.verdict == "unexplained" and not unexplained.effects
+    said = unexplained.nearest
+    assert said.startswith(f"Nearest comes {tried.label}: with it the error on the validation records falls from ")
+    assert f"from {gap.before:.2g} to {gap.after:.2g} K, noise alone would give {gap.noise:.2g}. No name, " in said
+    assert gap.after < gap.before and said in unexplained.outcome.text
+
+
+def test_the_reason_is_a_test_that_fails_with_its_number(unexplained: Diagnosis) -> None:
+    """Most of the gap is left with it, as the residuals say without any evidence."""
+    gap = unexplained.gap["train"]
+    taken = (gap.before**2 - gap.after**2) / (gap.before**2 - gap.noise**2)
+    assert taken < 0.3
+    assert f"takes {100 * taken:.0f} % off what is left without it, less than the 30 %" in unexplained.nearest
+
+
+def test_without_validation_it_speaks_of_the_training_records(
+        plant: rt.System, records: tuple[rt.Record, rt.Record]) -> None:
+    found = rt.diagnose(plant, records[0], effects=["sensor_gain"])
+    assert "the error on the training records falls" in found.nearest and "validation" not in found.nearest
+
+
+def test_where_it_does_not_help_on_unseen_data_it_says_so(plant: rt.System, unexplained: Diagnosis) -> None:
+    nominal, scores = unexplained.nominal, unexplained.scores
+    state = SearchState(nominal=nominal, names=None, scores=scores, fit=unexplained.fit, current=scores,
+                        short=ShortList(nominal, (), {}), rounds=unexplained.rounds)
+    judged = Judged(state=state, adequacy=unexplained.adequacy, hold_out=None, verdict="unexplained",
+                    outcome=unexplained.outcome, why="of something")
+    worse = replace(unexplained.gap["validation"], before=0.1, after=0.2)
+    said = nearest(judged, {**unexplained.gap, "validation": worse})
+    assert said.endswith("with which the error on the validation records does not fall (0.1 to 0.2 K): no name.")
+    assert nearest(replace(judged, why=""), unexplained.gap) == ""  # not graded
+    assert nearest(replace(judged, state=replace(state, rounds=())), unexplained.gap) == ""
+
+
+def test_named_consistent_and_empty_answers_have_none(plant: rt.System, records: tuple[rt.Record, rt.Record],
+                                                      hide: Hide) -> None:
+    named = rt.diagnose(plant, records[0], effects=["natural_convection"])
+    assert named.verdict == "named" and named.nearest == ""
+    fine = rt.diagnose(plant, hide()[0], effects=["sensor_lag"])
+    assert fine.verdict == "consistent" and fine.nearest == ""
+    empty = rt.diagnose(plant, records[0], effects=["input_gain_slope"])
+    assert empty.verdict == "unexplained" and not empty.provisional and empty.nearest == ""
+
+
+def test_the_first_sentence_of_the_report_says_it_in_words(unexplained: Diagnosis) -> None:
+    report = diagnosis_report(Diagnosed(unexplained, (), (), ()))
+    assert "Nearest comes a gain error of sensor T" in report.headline
+    assert "No name, because a gain error of sensor T" in report.headline
+    section, = (one for one in report.sections if one.anchor == "effects")
+    assert unexplained.nearest not in section.text  # said once
+
+
+@pytest.mark.parametrize(("found", "words"), [
+    (Evidence(0.9, 1.0, Stability(6, 0.1), 0.9), ""),
+    (Evidence(0.9, 1.0, Stability(6, 0.1), 0.12), "takes 12 % off"),
+    (Evidence(-0.1, 1.0, Stability(6, 0.1), -0.1), "takes 0 % off"),
+    (Evidence(0.9, 0.62, Stability(6, 0.1), 0.9), "in 62 % of draws of parts of the records, less than 95 %"),
+    (Evidence(0.9, 1.0, Stability(1, 0.0), 0.9), "in a single part of the records"),
+    (Evidence(0.9, 1.0, Stability(6, 0.8), 0.9), "differs by 80 % between parts of the records, more than 50 %"),
+    (Evidence(0.9, 1.0, Stability(6, float("nan")), 0.9), "differs by nan %")])
+def test_every_test_of_an_effect_has_its_words(found: Evidence, words: str) -> None:
+    assert (words in found.short_of) and found.lasting is (found.short_of == "") and found.lasting is (words == "")
