@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .._celsius import ZERO_CELSIUS
 from ..thermal import System
 from ._judge import Name
 from .effects import AMBIENT_DRIFT, Candidate
 from .fit import FoundAmbient, Refit, found_ambients
+from .search import Accepted, other_periods
 
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
@@ -47,6 +49,30 @@ def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Nam
             places = " or between ".join(" and ".join(at) for at in (where, *(at for _, at in others)))
             said.append(f"The records do not tell whether this path goes between {places}: neighboring lumps are one "
                         "answer, because where a lump ends is the model's choice. The augmented model has the first.")
+    return said
+
+
+def periods_undecided(rounds: Sequence[Accepted], remainder: bool) -> list[str]:
+    """Where records of different times leave several periods possible, a sentence each.
+
+    Parameters
+    ----------
+    rounds : sequence of Accepted
+        Accepted effects.
+    remainder : bool
+        Whether something is left beyond the noise.
+    """
+    said = []
+    for round_ in rounds:
+        candidate, found = round_.best.candidate, round_.best.found
+        if not candidate.effect.paired:
+            continue
+        shape = {name: value for name, value in found.items() if name != candidate.effect.size.name}
+        others = other_periods(round_.before, replace(candidate, shape=shape), remainder)
+        if others:
+            listed = " or ".join(f"{period:.4g} s" for period in others[:_LISTED])
+            said.append(f"The period of {candidate.label} is {shape['period']:.4g} s, or as well {listed}: the records "
+                        "do not tell how many periods went by between them. A longer record does.")
     return said
 
 

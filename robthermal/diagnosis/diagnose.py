@@ -18,6 +18,7 @@ from ._doubts import (
     held_ambients,
     may_be_the_room,
     may_drift,
+    periods_undecided,
     place_undecided,
 )
 from ._graded import evidence_of, graded, lasting_beyond_steps
@@ -207,6 +208,8 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said = []
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
+    if verdict in ("named", "named_with_remainder", "ambiguous"):
+        said += periods_undecided(state.rounds, verdict != "named")
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     return (*said, *may_be_the_room(nominal, state.fit.structure.effects),

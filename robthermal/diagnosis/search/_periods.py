@@ -1,0 +1,96 @@
+"""Periods that records of different times cannot tell apart, and the one that all of them support.
+
+A record of length T tells a frequency to 1/T. Two records whose middles are D apart tell it to a fraction of 1/D, but
+for how many periods went by in between: every 1/D there is another minimum of the sum of squares, and a refit ends in
+the one it began at. So all of them within 1/T are compared before a refit begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects import Candidate
+from ..evidence import BIC_GAP, promised, score_candidates
+from ..fit import Refit
+from ..path import LinearizedRecord
+
+Array = NDArray[np.float64]
+_PERIOD = "period"
+_PER_MINIMUM = 2  # frequencies tried per 1/D
+_MOST = 200  # frequencies tried
+_ALIKE = 0.9  # of what the best explains: beside a remainder another period that reaches it may be the right one
+
+
+def supported(fit: Refit, candidate: Candidate, size: float) -> tuple[Candidate, float]:
+    """A periodic effect at the period near its own that explains most of all records, and its size there.
+
+    Parameters
+    ----------
+    fit : Refit
+        Without the effect.
+    candidate : Candidate
+        With trial values; returned as it is unless it has a period and there are several records.
+    size : float
+        Its size at these values.
+    """
+    periods = _near(fit.records, candidate)
+    if not periods.size:
+        return candidate, size
+    scores = score_candidates(fit, [_with_periods(candidate, periods)])
+    return replace(candidate, shape=scores.candidates[0].shape), float(scores.size[0])
+
+
+def other_periods(before: Refit, candidate: Candidate, remainder: bool) -> list[float]:
+    """Other periods of an accepted effect that the records do not exclude, the likeliest first [s].
+
+    Parameters
+    ----------
+    before : Refit
+        Fit without the effect.
+    candidate : Candidate
+        With the period and phase found as trial values.
+    remainder : bool
+        Whether something is left beyond the noise: then what explains nearly as much is not excluded, either.
+    """
+    periods = _near(before.records, candidate)
+    if not periods.size:
+        return []
+    left = np.array([_left(before, candidate, period) for period in periods])
+    explained = before.rss - left
+    own = int(np.argmin(np.abs(periods - candidate.shape[_PERIOD])))
+    behind = before.n_readings * np.log(left / left[own])
+    close = (behind < BIC_GAP) | (remainder & (explained > _ALIKE * explained[own]))
+    ends = np.concatenate([[np.inf], left, [np.inf]])
+    minimum = (left <= ends[:-2]) & (left <= ends[2:])
+    apart = np.abs(np.arange(periods.size) - own) >= _PER_MINIMUM
+    order = [int(i) for i in np.argsort(left) if close[i] and minimum[i] and apart[i]]
+    return [float(periods[i]) for i in order]
+
+
+def _near(records: Sequence[LinearizedRecord], candidate: Candidate) -> Array:
+    """Periods within the resolution of the longest record, its own in the middle; none for fewer than two records."""
+    if not candidate.effect.paired or len(records) < 2:
+        return np.zeros(0)
+    middles = [0.5 * (one.time[0] + one.time[-1]) for one in records]
+    apart, longest = max(middles) - min(middles), max(one.span for one in records)
+    if apart <= 0.0 or candidate.shape[_PERIOD] > longest:  # a drift is no matter of whole periods
+        return np.zeros(0)
+    count = min(int(_PER_MINIMUM * apart / longest), _MOST // 2)
+    frequencies = 1.0 / candidate.shape[_PERIOD] + np.arange(-count, count + 1) / (_PER_MINIMUM * apart)
+    return np.asarray(1.0 / frequencies[frequencies * longest > 0.5], np.float64)
+
+
+def _with_periods(candidate: Candidate, periods: Array) -> Candidate:
+    """The candidate with these trial periods alone."""
+    quantities = tuple(replace(one, grid=lambda context, where: list(periods)) if one.name == _PERIOD else one
+                       for one in candidate.effect.quantities)
+    return replace(candidate, effect=replace(candidate.effect, quantities=quantities))
+
+
+def _left(before: Refit, candidate: Candidate, period: float) -> float:
+    """Sum of squares that the effect leaves at one period, its phase the best."""
+    return promised(before, score_candidates(before, [_with_periods(candidate, np.array([period]))]), 0)
