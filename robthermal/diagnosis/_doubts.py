@@ -58,7 +58,7 @@ def periods_undecided(rounds: Sequence[Accepted], remainder: bool) -> list[str]:
     Parameters
     ----------
     rounds : sequence of Accepted
-        Accepted effects.
+        Accepted effects, each with the fit before it.
     remainder : bool
         Whether something is left beyond the noise.
     """

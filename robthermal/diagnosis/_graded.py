@@ -18,6 +18,7 @@ from .fit import Refit, coarsened, exact
 from .search import (
     ALIKE,
     Accepted,
+    Entry,
     SearchState,
     ShortList,
     one_place,
@@ -163,7 +164,7 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
     found = evidence_of(rounds, fit, finer)
     while not all(one.lasting for one in found):
         worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
-        instead = in_its_place(rounds, worst, fit, finer)
+        instead = in_its_place(rounds, worst, finer)
         if instead is not None:
             rounds, fit = instead
             found = evidence_of(rounds, fit, finer)
@@ -180,8 +181,7 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
     return replace(state, nominal=finer, rounds=rounds, fit=fit), found
 
 
-def in_its_place(rounds: tuple[Accepted, ...], place: int, fit: Refit, finer: Refit
-                 ) -> tuple[tuple[Accepted, ...], Refit] | None:
+def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit) -> tuple[tuple[Accepted, ...], Refit] | None:
     """The effects with a rival in the place of one that does not last; None if none of its rivals lasts.
 
     Beside unknowns of a finer network an effect may have the smallest sum of squares and remove nothing where the
@@ -193,28 +193,29 @@ def in_its_place(rounds: tuple[Accepted, ...], place: int, fit: Refit, finer: Re
         In the order of the effects of the fit.
     place : int
         Of the effect that does not last.
-    fit, finer : Refit
-        With all of them; without any.
+    finer : Refit
+        Without any effect.
     """
-    old, others = rounds[place], [one.key for i, one in enumerate(fit.structure.effects) if i != place]
-    lasting = []
-    for entry in old.contenders:
-        keys = [one.key for one in entry.fit.structure.effects]
-        if [key for key in keys if key != entry.candidate.key] != others:
-            continue
-        new = coarsened(entry.fit) if entry.fit.structure.coarse else entry.fit
-        at = keys.index(entry.candidate.key)
-        swapped = [one for i, one in enumerate(rounds) if i != place]
-        swapped.insert(at, replace(old, best=replace(entry, fit=new), contenders=()))
-        if evidence_of(swapped, new, finer)[at].lasting:
-            lasting.append((at, replace(entry, fit=new)))
+    tried = filter(None, (_instead(rounds, place, entry) for entry in rounds[place].contenders))
+    lasting = [(new, at) for new, at in tried if evidence_of(new, new[at].best.fit, finer)[at].lasting]
     if not lasting:
         return None
-    (at, best), *rivals = lasting
-    kept = [one for i, one in enumerate(rounds) if i != place]
-    kept.insert(at, replace(old, best=best, contenders=tuple(entry for _, entry in rivals)))
-    kept[-1] = replace(kept[-1], best=replace(kept[-1].best, fit=best.fit))
-    return tuple(kept), best.fit
+    (chosen, at), *others = lasting
+    own = replace(chosen[at], contenders=tuple(new[i].best for new, i in others))
+    return (*chosen[:at], own, *chosen[at + 1:]), own.best.fit
+
+
+def _instead(rounds: tuple[Accepted, ...], place: int, rival: Entry) -> tuple[tuple[Accepted, ...], int] | None:
+    """The effects with a rival in one place, and where it stands; None if it was not fitted beside the others."""
+    others = [round_.best.candidate.key for i, round_ in enumerate(rounds) if i != place]
+    keys = [candidate.key for candidate in rival.fit.structure.effects]
+    if [key for key in keys if key != rival.candidate.key] != others:
+        return None
+    fit = coarsened(rival.fit) if rival.fit.structure.coarse else rival.fit
+    at, out = keys.index(rival.candidate.key), [*rounds[:place], *rounds[place + 1:]]
+    out.insert(at, replace(rounds[place], best=replace(rival, fit=fit), contenders=()))
+    out[-1] = replace(out[-1], best=replace(out[-1].best, fit=fit))
+    return tuple(out), at
 
 
 def _with_rivals(state: SearchState, finer: Refit, validation: Validation) -> SearchState:

@@ -161,7 +161,7 @@ def test_of_an_effect_that_does_not_last_only_rivals_that_do_take_the_place(monk
     wrong = replace(one, best=replace(one.best, candidate=other_effect(one).candidate), contenders=entries)
     monkeypatch.setattr("robthermal.diagnosis._graded.evidence_of", told)
     monkeypatch.setattr("robthermal.diagnosis._graded.coarsened", lambda fit: fit)
-    answer = in_its_place((wrong,), 0, one.best.fit, one.before)
+    answer = in_its_place((wrong,), 0, one.before)
     if best is None:
         assert answer is None
     else:
@@ -180,12 +180,12 @@ def test_a_rival_that_is_needed_takes_the_place_of_a_better_fit_that_is_not():
     one = found(16, path=0.8)
     nothing = rt.diagnosis.refit_short_list(one.before, rt.diagnosis.score(one.before, ["sensor_offset"])).entries[0]
     wrong = replace(one, best=nothing, contenders=(one.best, *one.contenders))
-    (chosen,), fit = in_its_place((wrong,), 0, nothing.fit, one.before)
+    (chosen,), fit = in_its_place((wrong,), 0, one.before)
     assert frozenset(chosen.best.candidate.where) in ({"x1", "x5"}, {"x2", "x5"}) and chosen.best.fit is fit
     assert nothing.candidate.key not in {entry.candidate.key for entry in chosen.contenders}
-    assert in_its_place((replace(wrong, contenders=()),), 0, nothing.fit, one.before) is None
+    assert in_its_place((replace(wrong, contenders=()),), 0, one.before) is None
     same = replace(one, contenders=(nothing,))  # a rival that is not needed takes no place
-    assert in_its_place((same,), 0, one.best.fit, one.before) is None
+    assert in_its_place((same,), 0, one.before) is None
 
 
 def test_what_is_no_path_between_two_parts_has_no_neighbors():
