@@ -1,4 +1,4 @@
-"""Periods that records of different times cannot tell apart, and the one that all of them support.
+"""Periods that records of different times cannot distinguish, and the one that all of them support.
 
 A record of length T tells a frequency to 1/T. Two records whose middles are D apart tell it to a fraction of 1/D, but
 for how many periods went by in between: every 1/D there is another minimum of the sum of squares, and a refit ends in
