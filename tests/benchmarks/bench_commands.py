@@ -1,9 +1,9 @@
 """Processor time of the commands: start, whole, and its shares of imports, of figures and files, and of mathematics.
 
-Run as a script; `--all` adds `map` with 90 conditions. The folder of compiled modules is its own, filled first, as
-an installation fills it. A start is the answer to `--help`, to an input that is missing, and to one that is damaged:
-then the reader is loaded, and the command's own work would begin. Shares are those of `_shares.py`, in a run of its
-own beside the timed one.
+Run as a script; `--all` adds `map` with 90 conditions. The package is copied first, for a merge into its tree would
+break a command halfway. The folder of compiled modules is its own, filled first, as an installation fills it. A start
+is the answer to `--help`, to an input that is missing, and to one that is damaged: then the reader is loaded, and the
+command's own work would begin. Shares are those of `_shares.py`, in a run of its own beside the timed one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -58,7 +59,7 @@ WARM = ("import robthermal.jobs.chain, robthermal.jobs.explanations, robthermal.
 def environment(folder: Path) -> dict[str, str]:
     """Of the commands: one thread, and compiled modules kept in the folder."""
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    kept["PYTHONPATH"] = os.pathsep.join([str(Path(rt.__file__).parents[1]), *filter(None, sys.path)])
+    kept["PYTHONPATH"] = os.pathsep.join([str(folder / "copy"), *filter(None, sys.path)])
     return {**kept, "PYTHONPYCACHEPREFIX": str(folder / "compiled"), "OMP_NUM_THREADS": "1"}
 
 
@@ -108,6 +109,8 @@ if __name__ == "__main__":
     header(f"Commands, one process; load of the machine {os.getloadavg()[0]:.1f}")
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
+        shutil.copytree(Path(rt.__file__).parent, place / "copy" / "robthermal",
+                        ignore=shutil.ignore_patterns("__pycache__"))
         subprocess.run([sys.executable, "-c", WARM], cwd=place, env=environment(place), check=True)
         spent(["new", "bench"], place, (0,))
         (place / "damaged").mkdir()
