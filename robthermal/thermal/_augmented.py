@@ -42,8 +42,7 @@ def augment(eq: Equations) -> Augmented:
     layout, n = Layout(eq), len(eq.system.lumps)
     heat, nz = PortHeat.of(eq, layout), layout.size
     F, D = np.zeros((nz, nz)), np.zeros((nz, eq.drives.width))
-    F[:n, :n] = eq.A.toarray() / eq.capacity[:, None]
-    D[:n] = eq.D.toarray() / eq.capacity[:, None]
+    F[:n, :n], D[:n] = (dense / eq.capacity[:, None] for dense in eq.dense)
     _sensors(eq, layout, F)
     _meters(eq, layout, F, D)
     _memories(eq, layout, F, D)
@@ -65,7 +64,7 @@ def _sensors(eq: Equations, layout: Layout, F: Array) -> None:
 
 def _meters(eq: Equations, layout: Layout, F: Array, D: Array) -> None:
     n, ambients = len(eq.capacity), eq.drives.ambients
-    conductance = eq.D[:, ambients].toarray()
+    conductance = eq.dense[1][:, ambients]
     F[layout.ambient_meters, :n] = -conductance.T
     D[layout.ambient_meters, ambients] = np.diag(conductance.sum(axis=0))
     D[layout.ambient_meters, eq.drives.one] = conductance.T @ eq.gradient

@@ -10,7 +10,8 @@ which is linear in z(0), u and q: only the small fixed-point problem q = heat(T)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from math import factorial
 
 import numpy as np
@@ -27,6 +28,7 @@ _MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))  # nodal values ->
 TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]
 _TERMS = 18  # of the series of a matrix of norm 1: 1/18! is below a rounding
 _FUNCTIONS = DEGREE + 2
+_SMALL = 20000  # entries of F, of all derivatives together: larger ones are not kept
 _FACTORIALS = np.array([factorial(k) for k in range(_TERMS + _FUNCTIONS)], float)
 
 
@@ -53,8 +55,35 @@ def step_matrices(parts: Augmented, h: float) -> Step:
     """Matrices of a step of length h [s].
 
     Complex `parts` (complex-step derivatives) and leading axes of F, B and N (many derivatives at once) are allowed;
-    the matrices then have the same leading axes.
+    the matrices then have the same leading axes. The last few are kept, for several records of one system; they
+    cannot be written to.
     """
+    if parts.F.size > _SMALL:
+        return _made(parts, h)
+    arrays = (parts.F, parts.B, parts.N, parts.ports)
+    return _kept(_Asked(b"".join(one.tobytes() for one in arrays), tuple((one.shape, one.dtype.str) for one in arrays),
+                        h, parts))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What the matrices of a step depend on."""
+
+    numbers: bytes
+    kinds: tuple[tuple[tuple[int, ...], str], ...]
+    h: float
+    parts: Augmented = field(compare=False)
+
+
+@lru_cache(maxsize=16)
+def _kept(asked: _Asked) -> Step:
+    made = _made(asked.parts, asked.h)
+    for one in (made.K, made.Ku, made.M):
+        one.flags.writeable = False
+    return made
+
+
+def _made(parts: Augmented, h: float) -> Step:
     theta = node_integrals(parts.F * h)
     many, nz, nq = parts.F.shape[:-2], parts.F.shape[-1], parts.N.shape[-1]
     n_rows = DEGREE * parts.ports.size

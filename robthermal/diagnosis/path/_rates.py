@@ -19,7 +19,7 @@ def each(kinds: Array, kind: Places) -> Array:
 def heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
     """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
     nl = x.shape[1]
-    out = np.broadcast_to(equations.A.toarray(), (len(x), nl, nl)).copy()
+    out = np.broadcast_to(equations.dense[0], (len(x), nl, nl)).copy()
     for term in equations.terms:
         s = term.slopes(*equations.ends(term, x, u))
         for pair, (a, b) in enumerate(zip(term.a, term.b, strict=True)):
