@@ -19,17 +19,17 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 7, 50, 1025])
-@pytest.mark.parametrize("columns", [1, 5])
-def test_is_what_a_loop_gives(n: int, columns: int) -> None:
+@pytest.mark.parametrize(("columns", "states"), [(1, 3), (5, 3), (1, 6)])
+def test_is_what_a_loop_gives(n: int, columns: int, states: int) -> None:
     rng = np.random.default_rng(n)
-    A = 0.5 * np.eye(3) + 0.2 * rng.standard_normal((n, 3, 3))
-    b = rng.standard_normal((n, 3, columns))
-    start = rng.standard_normal((3, columns))
+    A = 0.5 * np.eye(states) + 0.1 * rng.standard_normal((n, states, states))
+    b = rng.standard_normal((n, states, columns))
+    start = rng.standard_normal((states, columns))
     expected = [start]
     for k in range(n):
         expected.append(A[k] @ expected[-1] + b[k])
     found = recursion(A, b, start)
-    assert found.shape == (n + 1, 3, columns)
+    assert found.shape == (n + 1, states, columns)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 

@@ -153,6 +153,9 @@ def _measured(eq: Equations, record: Record) -> dict[str, float]:
 
 
 def _default(eq: Equations, record: Record) -> NDArray[np.float64]:
+    own = [lump.initial for lump in eq.system.lumps.values() if lump.initial is not None]
+    if len(own) == len(eq.capacity):
+        return np.array(own)
     first = eq.system.ambient_names[0]
     ambient = record[first][0] if first in record.input_names else eq.system.ambients[first].temperature
     readings = _measured(eq, record)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from .._recursion import recursion
 from ..errors import Diverged
 from ._augmented import augment
 from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
@@ -131,16 +132,16 @@ class Integrator:
         Diverged
             When temperatures leave every sensible range.
         """
-        n, w = len(plan.w), plan.w
+        n = len(plan.w)
         z = np.empty((n, self.nz))
         z[0] = z0
         refined: dict[int, Array] = {}
         k, level = 0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
             while k < n - 1:
-                if not self.nq and (windows := _whole(plan, k) // WINDOW):
-                    self._advance_linear(z, w, k, windows)
-                    k += windows * WINDOW
+                if not self.nq and (whole := _whole(plan, k)):
+                    self._advance_linear(z, plan, k, whole)
+                    k += whole
                     continue
                 if level == 0 and (done := self._advance_samples(z, plan, k)):
                     k += done
@@ -169,15 +170,15 @@ class Integrator:
         z[k + 1:k + 1 + WINDOW] = (base[rows:] + matrices.M[rows:] @ q.ravel()).reshape(WINDOW, self.nz)
         return True
 
-    def _advance_linear(self, z: Array, w: Array, k: int, windows: int) -> None:
-        """Several windows without nonlinear heats: only their last samples follow each other, the rest is a product."""
-        matrices, many = self.window()[0], windows * WINDOW
-        driven = w[k:k + many].reshape(windows, -1) @ matrices.Ku.T
-        starts = np.empty((windows, self.nz))
-        starts[0], last = z[k], matrices.K[-self.nz:]
-        for j in range(windows - 1):
-            starts[j + 1] = last @ starts[j] + driven[j, -self.nz:]
-        z[k + 1:k + 1 + many] = (starts @ matrices.K.T + driven).reshape(many, self.nz)
+    def _advance_linear(self, z: Array, plan: Schedule, k: int, whole: int) -> None:
+        """Whole samples without nonlinear heats: one recursion."""
+        step, stop = self.step(0, 0), k + whole
+        driven = plan.w[k:stop] @ step.Ku.T
+        steady = np.broadcast_to(step.K, (whole, *step.K.shape))
+        z[k:stop + 1] = recursion(steady, driven[..., None], z[k][:, None])[..., 0]
+        hot = np.flatnonzero(~(np.abs(z[k:stop + 1, :len(self.eq.capacity)]).max(axis=1) < HOTTEST))
+        if hot.size:
+            self._give_up(z[k + hot[0]], plan.at[k + hot[0]] * self.lengths[0])
 
     def _advance_segment(self, z: Array, plan: Schedule, k: int, level: int, refined: dict[int, Array]) -> int:
         """One segment in 2**level steps, refined as needed; return the level to start the next one with."""

@@ -55,8 +55,9 @@ class Sensitivity:
         self._linear = {name: part for name in self.names
                         if (part := slope(integrator.eq, integrator.parts, name)) is not None}
         eq = integrator.eq
+        self._heating = {name for name in self.names if any(True for _ in touched(eq, name))}
         self._acting = [name for name in self.names  # the others move no more than the start
-                        if name in self._linear or name in held or any(True for _ in touched(eq, name))]
+                        if name in self._linear or name in held or name in self._heating]
         self._columns = [self._acting.index(name) for name in self._linear]
         self._steps: dict[tuple[int, int], Array] = {}
 
@@ -224,7 +225,7 @@ class Sensitivity:
             else:
                 out[..., self._columns] = linear
         for column, name in enumerate(self._acting):
-            heat = self.by.port_heat.parameter(name, V)
+            heat = self.by.port_heat.parameter(name, V) if name in self._heating else None
             if name in held:
                 out[..., column] += held[name] @ step.Ku[:rows].T
                 through_drive = np.einsum("sjqw,sw->sjq", G[..., self.by.ports.size:], held[name])

@@ -174,10 +174,15 @@ class LinearizedRecord:
         own = [number for number in unknowns.gain_names if number not in names]
         initial = ([f"lumps.{lump}.initial" for lump in self.run.system.lumps]
                    if unknowns.start.stop > unknowns.start.start else [])
-        J = self.run.derivative([*names, *own, *initial])[:, self.one.columns]
+        J = self.run.derivative([*names, *own, *initial])
+        if not np.array_equal(self.one.columns, np.arange(J.shape[1])):
+            J = J[:, self.one.columns]
         out = np.zeros((*J.shape[:2], unknowns.v.size))
-        common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
-        out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
+        if chain.shape == (len(names),) * 2 and not np.any(chain - np.diag(np.diag(chain))):  # one number each
+            np.multiply(J[..., :len(names)], np.diag(chain), out=out[..., :len(names)])
+        else:
+            common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
+            out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
         out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
