@@ -7,6 +7,26 @@ import numpy as np
 from robthermal._arrays import Array
 from robthermal.errors import InputError
 
+from ._threads import run_all
+
+_PIECE = 2**13  # bins that one thread multiplies at a time
+
+
+def kronecker(gram: Array, noise: Array) -> Array:
+    """Covariances (n_u n_y, n_u n_y, F) of a gram block (n_u, n_u, F) and noise covariances (n_y, n_y, F).
+
+    Evers (4.16): the Kronecker product puts the input index outside, the output index inside.
+    """
+    n_u, n_y, n_f = len(gram), len(noise), gram.shape[-1]
+    product = np.empty((n_u, n_y, n_u, n_y, n_f), dtype=complex)
+
+    def multiply(start: int) -> None:
+        part = slice(start, start + _PIECE)
+        np.einsum("ijf,opf->iojpf", gram[..., part], noise[..., part], out=product[..., part])
+
+    run_all(multiply, range(0, n_f, _PIECE), worth=n_f > 4 * _PIECE)
+    return product.reshape(n_u * n_y, n_u * n_y, n_f)
+
 
 def quantile(p: float, q: Array) -> Array:
     """F_p(2, 2q), from P(F > x) = (1 + x/q)^(-q); infinite where no degrees of freedom are left."""

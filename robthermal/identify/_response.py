@@ -17,7 +17,7 @@ from robthermal.errors import InputError, Outcome
 from .._control import control
 from . import _response_files, _response_plots, _response_text
 from ._deferred import Deferred, fixed, narrow, part_of, shifted
-from ._regions import correlated_blocks, independent_blocks, radius_of
+from ._regions import correlated_blocks, independent_blocks, kronecker, radius_of
 from ._response_shapes import PER_BIN, check_shapes
 
 
@@ -193,10 +193,7 @@ class FrequencyResponse:
         """E[(vec G^ - vec G)(.)^H], columns of G stacked, shape (n_y n_u, n_y n_u, n_f)."""
         if self._covariance is not None:
             return fixed(part_of(self._covariance, slice(None)), complex)
-        n = len(self.input_names) * len(self.output_names)
-        # Evers (4.16): the Kronecker product puts the input index outside, the output index inside.
-        product = np.einsum("ijf,opf->iojpf", np.asarray(self.gram), self.noise_covariance)
-        return fixed(product.reshape(n, n, -1), complex)
+        return fixed(kronecker(np.asarray(self.gram), self.noise_covariance), complex)
 
     @cached_property
     def transient(self) -> Array:

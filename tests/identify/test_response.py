@@ -203,3 +203,16 @@ def test_radius_of_the_circle_is_the_quantile_of_f(p):
                                           input_names=["u"], output_names=["y"], sample_time=1.0, n_samples=10,
                                           method="given")
         assert G.confidence_radius(p)[0, 0, 0] ** 2 == pytest.approx(stats.f.ppf(p, 2, 2 * q), rel=1e-12)
+
+
+@pytest.mark.parametrize(("n_u", "n_y", "n_f"), [(1, 1, 3), (2, 3, 40_000), (3, 1, 9_000)])
+def test_the_covariance_is_the_kronecker_product_at_every_bin(n_u: int, n_y: int, n_f: int) -> None:
+    rng = np.random.default_rng(n_f)
+    gram, noise = (rng.normal(size=(n, n, n_f)) + 1j * rng.normal(size=(n, n, n_f)) for n in (n_u, n_y))
+    names = [f"q{i}" for i in range(n_u)], [f"T{o}" for o in range(n_y)]
+    estimate = FrequencyResponse(
+        frequencies=np.arange(1.0, n_f + 1), response=np.ones((n_y, n_u, n_f)), gram=gram, noise_covariance=noise,
+        degrees_of_freedom=np.full(n_f, 9), input_names=names[0], output_names=names[1], sample_time=0.1,
+        n_samples=2 * n_f + 2, method="by hand")
+    for k in {0, n_f // 2, n_f - 1, *rng.integers(0, n_f, 30).tolist()}:
+        np.testing.assert_allclose(estimate.covariance[..., k], np.kron(gram[..., k], noise[..., k]), rtol=1e-14)
