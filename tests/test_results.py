@@ -23,7 +23,7 @@ pytestmark = pytest.mark.exhaustive  # what is made here is made by the tests of
 # Made by no short example; each of the same kind as others that are here, or made of nothing but what is.
 ELSEWHERE = {"calibration.Estimates", "diagnosis.Measurement", "diagnosis.Response", "diagnosis.Decision",
              "diagnosis.JointCheck", "design.CertifiedLoop", "design.Polarity", "coupling.Joint", "coupling.Norm",
-             "diagnosis.Left", "diagnosis.Remainder", "report.Printed"}
+             "diagnosis.Left", "diagnosis.Remainder"}
 CLASSES = public_classes()
 DRAWN = [(one, name) for one in CLASSES for name in dir(one) if name == "plot" or name.startswith("plot_")]
 
