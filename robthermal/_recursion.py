@@ -29,7 +29,7 @@ def compiled(folder: Path = SOURCE.parent) -> Callable[..., None] | None:
         return None
     run: Any = found.robthermal_recursion
     run.restype, run.argtypes = None, [ctypes.c_int64] * 4 + [ctypes.c_void_p] * 3
-    return run  # type: ignore[no-any-return]
+    return run
 
 
 def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
