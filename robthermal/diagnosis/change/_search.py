@@ -13,7 +13,7 @@ from ...fitting import Ranges
 from ..effects import Candidate, candidates
 from ..evidence import ALIAS, Scores, score_candidates
 from ..fit import Refit, relinearized
-from ..search import Accepted, Entry, refit_short_list
+from ..search import Accepted, Entry, between_trials, refit_short_list
 from ._excess import excess_of
 from ._parameter_change import NAME, parameter_changes, relative, says_again
 from ._reference import Reference
@@ -149,9 +149,10 @@ def _refitted(fit: Refit, scores: Scores, reference: Reference, alpha: float) ->
         yield _Tried(replace(entry, p_value=p, delta_bic=bic), kappa, p < alpha)
 
 
-def _trials(candidate: Candidate, fit: Refit) -> int:
-    """Trial values of a candidate; of a pair the phase is none, it is a second quantity."""
-    return max(len(list(candidate.trials(fit.paths[0]))) // (2 if candidate.effect.paired else 1), 1)
+def _trials(candidate: Candidate, fit: Refit) -> float:
+    """Trial values of a candidate, periods in all records; of a pair the phase is none, it is a second quantity."""
+    count = max(len(candidate.trials(fit.paths[0])), 1)
+    return max(0.5 * count, 1.0) * between_trials(fit.records) if candidate.effect.paired else float(count)
 
 
 def _part(scores: Scores, some: NDArray[np.bool_]) -> Scores:

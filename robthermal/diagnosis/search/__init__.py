@@ -14,6 +14,7 @@ from ._joint_sets import refit_set as refit_set
 from ._neighbors import ALIKE as ALIKE
 from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
+from ._periods import between_trials as between_trials
 from ._periods import other_periods as other_periods
 from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
 from ._resolve_alternatives import ruled_out as ruled_out
@@ -37,7 +38,8 @@ from ._state import SearchState as SearchState
 from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
-           "ShortList", "accept", "begin", "beside", "checked_jointly", "compare", "decide", "implausible_names",
-           "leaves_large_misfit", "needed", "one_place", "other_periods", "quantities_of", "refit_candidates",
-           "refit_set", "refit_short_list", "resolve_alternatives", "revise", "revised", "ruled_out", "select_jointly",
-           "shortlist", "validate", "with_neighbors", "with_wider_noise", "without", "without_contradicted"]
+           "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
+           "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods", "quantities_of",
+           "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise", "revised",
+           "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_wider_noise", "without",
+           "without_contradicted"]

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..effects import Candidate
-from ..evidence import BIC_GAP, promised, score_candidates
+from ..evidence import BIC_GAP, Scores, promised, score_candidates
 from ..fit import Refit
 from ..path import LinearizedRecord
 
@@ -25,23 +26,48 @@ _MOST = 200  # frequencies tried
 _ALIKE = 0.9  # of what the best explains: beside a remainder another period that reaches it may be the right one
 
 
-def supported(fit: Refit, candidate: Candidate, size: float) -> tuple[Candidate, float]:
-    """A periodic effect at the period near its own that explains most of all records, and its size there.
+def on_all_records(fit: Refit, scores: Scores) -> Scores:
+    """Scores with every periodic effect at the period near its own trial value that explains most of all records.
+
+    At trial values of one record two places of the same heat would be compared at two different minima.
 
     Parameters
     ----------
     fit : Refit
-        Without the effect.
-    candidate : Candidate
-        With trial values; returned as it is unless it has a period and there are several records.
-    size : float
-        Its size at these values.
+        That was scored.
+    scores : Scores
+        Scores on that fit; returned as they are unless there are several records.
     """
-    periods = _near(fit.records, candidate)
-    if not periods.size:
-        return candidate, size
-    scores = score_candidates(fit, [_with_periods(candidate, periods)])
-    return replace(candidate, shape=scores.candidates[0].shape), float(scores.size[0])
+    places = [i for i, candidate in enumerate(scores.candidates) if _near(fit.records, candidate).size]
+    if not places:
+        return scores
+    tried = [scores.candidates[i] for i in places]
+    new = score_candidates(fit, [_with_periods(one, _near(fit.records, one)) for one in tried])
+    found = dict(zip(places, new.candidates, strict=True))
+
+    def merged(name: str) -> Any:
+        out = getattr(scores, name).copy()
+        out[..., places] = getattr(new, name)
+        return out
+
+    p, n_trials = merged("p_value"), scores.n_trials + new.n_trials
+    p[places] = np.minimum(new.p_value * n_trials / new.n_trials, 1.0)
+    candidates = tuple(replace(one, shape=found[i].shape) if i in found else one
+                       for i, one in enumerate(scores.candidates))
+    names = ("size", "std", "statistic", "possible", "identifiability", "limit", "signatures")
+    rest = {name: merged(name) for name in names}
+    return replace(scores, candidates=candidates, p_value=p, n_trials=n_trials, **rest)
+
+
+def between_trials(records: Sequence[LinearizedRecord]) -> float:
+    """Minima of all records together per trial period of one record: by so much more is tried; 1 of one record.
+
+    Parameters
+    ----------
+    records : sequence of LinearizedRecord
+        Records with the times at which they were taken.
+    """
+    return max(_apart(records) / max(one.span for one in records), 1.0) if records else 1.0
 
 
 def other_periods(before: Refit, candidate: Candidate, remainder: bool) -> list[float]:
@@ -75,13 +101,18 @@ def _near(records: Sequence[LinearizedRecord], candidate: Candidate) -> Array:
     """Periods within the resolution of the longest record, its own in the middle; none for fewer than two records."""
     if not candidate.effect.paired or len(records) < 2:
         return np.zeros(0)
-    middles = [0.5 * (one.time[0] + one.time[-1]) for one in records]
-    apart, longest = max(middles) - min(middles), max(one.span for one in records)
+    apart, longest = _apart(records), max(one.span for one in records)
     if apart <= 0.0 or candidate.shape[_PERIOD] > longest:  # a drift is no matter of whole periods
         return np.zeros(0)
     count = min(int(_PER_MINIMUM * apart / longest), _MOST // 2)
     frequencies = 1.0 / candidate.shape[_PERIOD] + np.arange(-count, count + 1) / (_PER_MINIMUM * apart)
     return np.asarray(1.0 / frequencies[frequencies * longest > 0.5], np.float64)
+
+
+def _apart(records: Sequence[LinearizedRecord]) -> float:
+    """Time between the middles of the first and the last record [s]."""
+    middles = [0.5 * float(one.time[0] + one.time[-1]) for one in records]
+    return max(middles) - min(middles)
 
 
 def _with_periods(candidate: Candidate, periods: Array) -> Candidate:

@@ -16,7 +16,7 @@ from ..effects import Candidate
 from ..evidence import BIC_GAP, Scores, Twin, promised
 from ..fit import Refit, extended
 from ._implausible import implausible
-from ._periods import supported
+from ._periods import on_all_records
 from ._ramp import as_ramp
 from ._scan import retried, scanned
 from ._starts import BEHIND, Origin, in_reach, started
@@ -160,6 +160,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
     >>> best.candidate.label, round(best.values["time_constant"][0])
     ('sensor_lag(T)', 30)
     """
+    scores = on_all_records(fit, scores)
     picked: list[int] = []
     for i in scores.order:
         if len(picked) < length and not set(scores.aliases(i)) & set(picked):
@@ -171,8 +172,8 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
         if fit.n_readings * math.log(fit.rss / promised(fit, scores, i)) < _PROMISED * best - BEHIND:
             continue
         try:
-            entries.append(entry_of(origin, *supported(fit, scores.candidates[i], float(scores.size[i])),
-                                    float(scores.p_value[i]), scores.twins(i), best))
+            entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
+                                    scores.twins(i), best))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
     likely = []
