@@ -14,7 +14,17 @@ import pandas as pd
 import pytest
 
 from robthermal.errors import InputError
-from robthermal.report import Claim, Figure, Report, Section, Table, measured_against_model, write_html
+from robthermal.report import (
+    Claim,
+    Figure,
+    Report,
+    Section,
+    Table,
+    _table,
+    measured_against_model,
+    write_content,
+    write_html,
+)
 
 VOID = {"meta", "link", "br"}
 LOADING = {"src", "srcset", "action", "data", "poster", "background"}
@@ -204,6 +214,19 @@ def test_long_records_and_tables_stay_under_three_megabytes(report: Report, tmp_
     path = write_html(big, tmp_path / "r.html")
     assert path.stat().st_size < 3e6
     assert "99800 more are not shown" in Page(path).text
+
+
+def test_a_cell_is_written_once(report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """For page and file together, however often the page asks whether a column holds numbers."""
+    written: list[object] = []
+    cell = _table._cell
+    monkeypatch.setattr(_table, "_cell", lambda value, digits: written.append(value) or cell(value, digits))
+    table = Table(pd.DataFrame({"lump": ["sink", "stage", "cold"], "C [J/K]": [120.0, 35.0, 8.0]}), "Lumps.")
+    section = Section("Lumps", "Three of them.", tables=(table,))
+    page = write_html(replace(report, sections=(section,)), tmp_path / "report.html").read_text(encoding="utf-8")
+    write_content(replace(report, sections=(section,)), tmp_path / "report.json")
+    assert written == ["sink", "stage", "cold", 120.0, 35.0, 8.0]
+    assert '<th scope="row">stage</th><td class="number">35</td>' in page
 
 
 def test_of_many_claims_the_first_and_the_failing_have_cards(tmp_path: Path) -> None:
