@@ -65,8 +65,8 @@ def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes:
         if name in volts:
             out[:, i] = _voltage_slopes(eq, name, states, w, slopes, held, names)
         else:
-            out[:, i] = sensor.gain * _delayed(slopes[:, sources[name]], _of(rate_slopes, sources[name]),
-                                               sensor.delay, h)
+            moved = _delayed(slopes[:, sources[name]], _of(rate_slopes, sources[name]), sensor.delay, h)
+            np.multiply(sensor.gain, moved, out=out[:, i])
             _add_own_slopes(out[:, i], eq, name, sensor, states[:, sources[name]], _of(rates, sources[name]), names, h)
     return out
 
