@@ -123,7 +123,7 @@ def _judge(best: tuple[str, ...], misfit: dict[tuple[str, ...], float]) -> tuple
 def _misfit(system: System, record: Record, flipped: tuple[str, ...], sensors: list[str]) -> float:
     signs = np.array([-1.0 if name in flipped else 1.0 for name in record.input_names])
     turned = Record(sample_time=record.sample_time, inputs=record.inputs * signs, outputs=record.outputs,
-                    input_names=record.input_names, output_names=record.output_names)
+                    input_names=record.input_names, output_names=record.output_names, averaged=record.averaged)
     try:
         run = simulate(system, turned)
     except Diverged:

@@ -33,7 +33,8 @@ def frame(record: Record) -> pd.DataFrame:
 def summary(record: Record) -> str:
     """Name, length, and the range of every channel."""
     title = f"Record {record.name!r}" if record.name else "Record"
-    lines = [f"{title}: {record.n_samples} samples of {record.sample_time:.10g} s, from {record.start_time:.10g} s"]
+    lines = [f"{title}: {record.n_samples} samples of {record.sample_time:.10g} s, from {record.start_time:.10g} s"
+             + (", readings are means over the sample before" if record.averaged else "")]
     rows = [("", "channel", "min", "max", "unit")]
     for kind, names in (("input", record.input_names), ("output", record.output_names)):
         for name in names:

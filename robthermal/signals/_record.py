@@ -29,7 +29,8 @@ class Record:
     """Measured or simulated signals, sampled uniformly; temperatures in kelvin.
 
     Inputs (heaters, currents, ambient temperatures) are held: row k acts over [t_k, t_k + sample_time).
-    Outputs are read at t_k, before row k of the inputs has had any effect.
+    Outputs are read at t_k, before row k of the inputs has had any effect; or, where they are `averaged`, they are means
+    over the sample that ends at t_k.
 
     Parameters
     ----------
@@ -45,6 +46,9 @@ class Record:
         Time of the first row [s].
     units : mapping of str to str, optional
         Channel name to unit. Temperatures are in kelvin: ``"K"``.
+    averaged : bool, optional
+        Whether outputs are means over the sample before t_k, as loggers that average record them; default: read at t_k.
+        A file that is saved does not say it.
     name : str, optional
         Name of the record, as reports show it.
     notes : sequence of str, optional
@@ -82,6 +86,7 @@ class Record:
     output_names: tuple[str, ...]
     start_time: float
     units: Mapping[str, str]
+    averaged: bool
     name: str
     notes: tuple[str, ...]
     imported: Import | None
@@ -96,6 +101,7 @@ class Record:
         output_names: Sequence[str],
         start_time: float = 0.0,
         units: Mapping[str, str] | None = None,
+        averaged: bool = False,
         name: str = "",
         notes: Sequence[str] = (),
         imported: Import | None = None,
@@ -115,6 +121,7 @@ class Record:
             "output_names": output_list,
             "start_time": t0,
             "units": channel_units(units, input_list + output_list),
+            "averaged": _truth(averaged),
             "name": _text(name, "name"),
             "notes": _texts(notes),
             "imported": imported,
@@ -364,6 +371,12 @@ def _check_shapes(U: Array, Y: Array) -> None:
             where="arguments inputs and outputs",
             expected="at least two samples",
         )
+
+
+def _truth(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(f"averaged is {value!r}", where="argument averaged", expected="True or False")
+    return value
 
 
 def _text(value: object, where: str) -> str:

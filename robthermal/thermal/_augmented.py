@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ def augment(eq: Equations) -> Augmented:
     F, D = np.zeros((nz, nz)), np.zeros((nz, eq.drives.width))
     F[:n, :n], D[:n] = (dense / eq.capacity[:, None] for dense in eq.dense)
     _sensors(eq, layout, F)
+    for source, integral in layout.integrals.items():
+        F[integral, source] = 1.0
     _meters(eq, layout, F, D)
     _memories(eq, layout, F, D)
     _periodic(eq, layout, F)
@@ -108,7 +110,7 @@ def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
         return _slope_by_conductance(eq, own, (eq.system.modules[part].hot, eq.system.modules[part].cold))
     if (table, field) in AFFINE:  # a difference is exact
         changed, step = unit_change(eq.system, name)
-        other = without_meters(augment(Equations(changed)), len(own.F))
+        other = without_meters(augment(replace(eq, system=changed)), len(own.F))
         differences = ((other.F - own.F) / step, (other.B - own.B) / step, (other.N - own.N) / step)
         return Augmented(*differences, parts.ports)
     rows = _rows_of_scale(eq, table, part, field)

@@ -19,11 +19,17 @@ from ._terms import Array
 Initial = ArrayLike | Mapping[str, float] | None
 
 
-def held_inputs(eq: Equations, record: Record) -> Array:
-    """Matrix u (n_samples, n_u) of a record, in the order of `System.exogenous_names`."""
+def record_of(record: Record) -> Record:
+    """A record, refusing what is not one."""
     if not isinstance(record, Record):
         raise InputError(f"record is a {type(record).__name__}", where="argument record",
                          expected="a robthermal.Record", remedy="Read one with rt.read_record(path, system).")
+    return record
+
+
+def held_inputs(eq: Equations, record: Record) -> Array:
+    """Matrix u (n_samples, n_u) of a record, in the order of `System.exogenous_names`."""
+    record_of(record)
     columns, missing = [], []
     for name, nominal in zip(eq.system.exogenous_names, eq.nominal(), strict=True):
         if name in record.input_names:

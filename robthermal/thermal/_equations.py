@@ -31,6 +31,8 @@ class Equations:
     ----------
     system : System
         What to write down.
+    averaged : bool, optional
+        Whether readings are means over the sample before them, as in a record of that kind.
 
     Attributes
     ----------
@@ -53,6 +55,7 @@ class Equations:
     """
 
     system: System
+    averaged: bool = False
 
     @cached_property
     def index(self) -> dict[str, int]:

@@ -10,9 +10,9 @@ from ._equations import Equations
 
 @dataclass(frozen=True)
 class Layout:
-    """State z = [lumps, lagged sensors, lagged drives, memories, periodic loads (sine, cosine), meters].
+    """State z = [lumps, lagged sensors, lagged drives, memories, periodic loads (sine, cosine), integrals, meters].
 
-    The meters feed nothing back. They integrate the heat received from every ambient, the electrical energy of every
+    The integrals are those of what thermometers read, where readings are means over a sample. The meters feed nothing back. They integrate the heat received from every ambient, the electrical energy of every
     module, the heat of every heater, and that of all other sources, so that the balance of a simulation can be checked.
 
     Parameters
@@ -49,11 +49,28 @@ class Layout:
         loaded = [name for name, lump in self.eq.system.lumps.items() if lump.periodic is not None]
         return {name: first + 2 * i for i, name in enumerate(loaded)}
 
+    @cached_property
+    def sources(self) -> dict[str, int]:
+        """State that every thermometer reads: its lag if it has one, else its lump."""
+        return {name: self.sensors.get(name, self.eq.index[sensor.lump])
+                for name, sensor in self.eq.system.thermometers.items()}
+
+    @cached_property
+    def integrals(self) -> dict[int, int]:
+        """Of the states that thermometers read to their integrals over time; none where readings are at once."""
+        first = self._n_without_integrals
+        read = sorted(set(self.sources.values())) if self.eq.averaged else []
+        return {source: first + i for i, source in enumerate(read)}
+
+    @property
+    def _n_without_integrals(self) -> int:
+        return (len(self.eq.system.lumps) + len(self.sensors) + len(self.drives) + len(self.memories)
+                + 2 * len(self.periodic))
+
     @property
     def n_free(self) -> int:
         """Number of states before the meters."""
-        return (len(self.eq.system.lumps) + len(self.sensors) + len(self.drives) + len(self.memories)
-                + 2 * len(self.periodic))
+        return self._n_without_integrals + len(self.integrals)
 
     @property
     def ambient_meters(self) -> slice:

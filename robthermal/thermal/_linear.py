@@ -15,7 +15,6 @@ from ..errors import InputError
 from ._checks import by_lump
 from ._equations import Equations
 from ._layout import Layout
-from ._sensors import source_states
 from ._steady import exogenous_point
 from ._system import System, equations
 from ._terms import Array
@@ -173,7 +172,7 @@ def _matrices(eq: Equations, x: Array, u: Array) -> tuple[Array, Array]:
 
 def _outputs(eq: Equations, n_states: int, x: Array, u: Array) -> tuple[Array, Array, list[str]]:
     """C and D: a thermometer reads a state, a voltage the faces of its module and the current."""
-    sensors, layout, volts, sources = eq.system.sensors, Layout(eq), voltages(eq), source_states(eq)
+    sensors, layout, volts, sources = eq.system.sensors, Layout(eq), voltages(eq), Layout(eq).sources
     if not sensors:
         return np.eye(len(eq.capacity), n_states), np.zeros((len(eq.capacity), u.size)), list(eq.system.lump_names)
     C, D = np.zeros((len(sensors), n_states)), np.zeros((len(sensors), u.size))

@@ -1,6 +1,7 @@
 """Sensor readings from states and drives, and their derivatives.
 
-A thermometer reads its lump: lag (a state), delay, gain about the reference, offset. The voltage of a module follows
+A thermometer reads its lump: lag (a state), delay, gain about the reference, offset; in a record of means the mean of
+that over the sample before. The voltage of a module follows
 from the temperatures of its faces and from the current of the same row of the record, at once.
 """
 
@@ -14,17 +15,10 @@ import numpy as np
 from .._all_pole import all_pole
 from ._equations import Equations
 from ._layout import Layout
-from ._parts import Sensor
 from ._terms import Array
 from ._voltage import voltages
 
 Rates = tuple[Array, Array] | None
-
-
-def source_states(eq: Equations) -> dict[str, int]:
-    """State that every thermometer reads: its lag state if it has one, else its lump."""
-    lags = Layout(eq).sensors
-    return {name: lags.get(name, eq.index[sensor.lump]) for name, sensor in eq.system.thermometers.items()}
 
 
 def reference(eq: Equations) -> float:
@@ -41,14 +35,13 @@ def currents(eq: Equations, states: Array, w: Array, column: int) -> Array:
 def read_sensors(eq: Equations, states: Array, rates: Rates, w: Array, h: float) -> Array:
     """Noise-free readings (n, n_sensors) [K or V] from states (n, n_states) and drives w (n, n_w) of every sample."""
     T_ref, columns = reference(eq), []
-    sources, volts = source_states(eq), voltages(eq)
+    layout, volts = Layout(eq), voltages(eq)
     for name, sensor in eq.system.sensors.items():
         if name in volts:
             current = currents(eq, states, w, volts[name].column)
             columns.append(sensor.gain * volts[name].value(states, current) + sensor.offset)
             continue
-        state = sources[name]
-        source = _delayed(states[:, state], _of(rates, state), sensor.delay, h)
+        source = seen(layout, name, states, rates, sensor.delay, h)
         columns.append(T_ref + sensor.gain * (source - T_ref) + sensor.offset)
     return np.column_stack(columns) if columns else np.zeros((len(states), 0))
 
@@ -60,14 +53,13 @@ def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes:
     Given are that of the states (n, n_states, n_parameters), and by name that of the drives (n, n_w) of every sample.
     """
     out = np.empty((len(states), len(eq.system.sensors), len(names)))
-    sources, volts = source_states(eq), voltages(eq)
+    layout, volts = Layout(eq), voltages(eq)
     for i, (name, sensor) in enumerate(eq.system.sensors.items()):
         if name in volts:
             out[:, i] = _voltage_slopes(eq, name, states, w, slopes, held, names)
         else:
-            moved = _delayed(slopes[:, sources[name]], _of(rate_slopes, sources[name]), sensor.delay, h)
-            np.multiply(sensor.gain, moved, out=out[:, i])
-            _add_own_slopes(out[:, i], eq, name, sensor, states[:, sources[name]], _of(rates, sources[name]), names, h)
+            np.multiply(sensor.gain, seen(layout, name, slopes, rate_slopes, sensor.delay, h), out=out[:, i])
+            _add_own_slopes(out[:, i], layout, name, states, rates, names, h)
     return out
 
 
@@ -92,24 +84,47 @@ def _voltage_slopes(eq: Equations, name: str, states: Array, w: Array, slopes: A
     return out
 
 
-def _add_own_slopes(out: Array, eq: Equations, name: str, sensor: Sensor, x: Array, rate: Rates, names: Sequence[str],
+def _add_own_slopes(out: Array, layout: Layout, name: str, states: Array, rates: Rates, names: Sequence[str],
                     h: float) -> None:
-    """Add what the parameters of a thermometer, and the reference, change at fixed temperatures x (n,)."""
+    """Add what the parameters of a thermometer, and the reference, change at fixed states (n, n_states)."""
+    eq, sensor = layout.eq, layout.eq.system.sensors[name]
     T_ref, first = reference(eq), eq.system.ambient_names[0]
     for column, parameter in enumerate(names):
         if parameter == f"sensors.{name}.offset":
             out[:, column] += 1.0
         elif parameter == f"sensors.{name}.gain":
-            out[:, column] += _delayed(x, rate, sensor.delay, h) - T_ref
-        elif parameter == f"sensors.{name}.delay" and rate is not None:
+            out[:, column] += seen(layout, name, states, rates, sensor.delay, h) - T_ref
+        elif parameter == f"sensors.{name}.delay" and rates is not None:
             step = 1e-4 * h
-            later = _delayed(x, rate, sensor.delay + step, h)
-            sooner = _delayed(x, rate, max(sensor.delay - step, 0.0), h)
+            later = seen(layout, name, states, rates, sensor.delay + step, h)
+            sooner = seen(layout, name, states, rates, max(sensor.delay - step, 0.0), h)
             out[:, column] += sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
-        elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rate is not None:
-            out[1:, column] -= sensor.gain * rate[1][1:]  # a short lag τ reads x - τ ẋ
+        elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rates is not None:
+            out[1:, column] -= sensor.gain * _rate_seen(layout, name, states, rates, h)  # a short lag τ reads x - τ ẋ
         elif parameter == f"ambients.{first}.temperature":
             out[:, column] += 1.0 - sensor.gain
+
+
+def seen(layout: Layout, name: str, states: Array, rates: Rates, delay: float, h: float) -> Array:
+    """What a thermometer without gain and offset reads, (n, ...), of states (n, n_states, ...) or of their slopes.
+
+    At every sample the state it reads, `delay` seconds earlier; or the mean of it over the sample before, from the
+    integral. Before the start it was as at the start.
+    """
+    source = layout.sources[name]
+    integral = layout.integrals.get(source)
+    if integral is None:
+        return _delayed(states[:, source], _of(rates, source), delay, h)
+    start = states[:1, source]
+    until = _delayed(states[:, integral], _of(rates, integral), delay, h)
+    before = np.minimum(h * np.arange(len(states)) - delay, 0.0).reshape(-1, *[1] * (until.ndim - 1))
+    return np.concatenate([start, np.diff(until + before * start, axis=0) / h])
+
+
+def _rate_seen(layout: Layout, name: str, states: Array, rates: tuple[Array, Array], h: float) -> Array:
+    """Rate of what a thermometer reads at every sample but the first: just before it, or the mean since the last."""
+    source = layout.sources[name]
+    return np.diff(states[:, source], axis=0) / h if layout.integrals else rates[1][1:, source]
 
 
 def lumps_read(eq: Equations) -> list[int]:
@@ -121,7 +136,7 @@ def lumps_read(eq: Equations) -> list[int]:
 def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h: float) -> Array:
     """Readings from the sampled temperatures (n, n_kept) of some lumps and the inputs u, for large networks.
 
-    Lumps are taken as linear between samples, for which the lag is exact.
+    Lumps are taken as linear between samples, for which the lag is exact, and the mean that of both ends.
     """
     T_ref, columns, at = reference(eq), [], {lump: place for place, lump in enumerate(kept)}
     volts = {name: replace(volt, hot=at[volt.hot], cold=at[volt.cold]) for name, volt in voltages(eq).items()}
@@ -131,9 +146,11 @@ def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h
             columns.append(sensor.gain * volts[name].value(sampled, current) + sensor.offset)
             continue
         source = sampled[:, at[eq.index[sensor.lump]]]
-        seen = _lag(source, sensor.time_constant, h) if sensor.time_constant else source
-        seen = _delayed_linear(seen[:, None], sensor.delay, h)[:, 0]
-        columns.append(T_ref + sensor.gain * (seen - T_ref) + sensor.offset)
+        read = _lag(source, sensor.time_constant, h) if sensor.time_constant else source
+        read = _delayed_linear(read[:, None], sensor.delay, h)[:, 0]
+        if eq.averaged:
+            read = np.concatenate([read[:1], 0.5 * (read[1:] + read[:-1])])
+        columns.append(T_ref + sensor.gain * (read - T_ref) + sensor.offset)
     return np.column_stack(columns) if columns else np.zeros((len(sampled), 0))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NoReturn
 
@@ -13,7 +13,7 @@ from .._celsius import ZERO_CELSIUS
 from .._drawing import axes_for
 from ..errors import InputError
 from ..signals import Record
-from ._drive import Initial, held_inputs, held_slopes, start_lumps, start_slope, start_state
+from ._drive import Initial, held_inputs, record_of, held_slopes, start_lumps, start_slope, start_state
 from ._equations import Equations
 from ._exponential import Integrator, Path
 from ._implicit import refuse_memory, run_implicit
@@ -124,7 +124,7 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     -------
     Record
         Same inputs; outputs are the noise-free readings of all sensors [K, or V] (of all lumps if the system has no
-        sensor). The voltage of a row is that at the current of the same row.
+        sensor), means over the sample before where those of `record` are. The voltage of a row is that at the current of the same row.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     >>> bool(np.allclose(run["bar"], 300 + 2 * (1 - np.exp(-run.time * 0.5 / 100))))
     True
     """
-    eq = equations(system)
+    eq = _equations(system, record)
     if is_small(eq):
         run = trajectory(system, record, initial=initial, tolerance=tolerance)
         readings = run.readings if system.sensors else run.lumps
@@ -158,7 +158,7 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     volts = {name: unit for name, unit in system.sensor_units.items() if unit == "V"}
     return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
                   input_names=record.input_names, output_names=system.sensor_names or system.lump_names, units=volts,
-                  start_time=record.start_time, name=f"simulation of {system.name}")
+                  start_time=record.start_time, averaged=record.averaged, name=f"simulation of {system.name}")
 
 
 def trajectory(system: System, record: Record, *, initial: Initial = None, tolerance: float = 1e-4,
@@ -199,7 +199,7 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     >>> bool(np.allclose(run.sensitivity[:, 0, 0], slope))
     True
     """
-    eq = equations(system)
+    eq = _equations(system, record)
     u = held_inputs(eq, record)
     for name in sensitivities:
         system.parameter(name)  # a misspelt name is refused at once
@@ -215,6 +215,18 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
                       run.heater_heat, run.electrical_energy, run.source_heat, (),
                       partial(_refuse_large, system), "implicit")
+
+
+def _equations(system: System, record: Record) -> Equations:
+    """Equations of a system for the readings of a record."""
+    eq = equations(system)
+    if not record_of(record).averaged:
+        return eq
+    if volts := [name for name, unit in system.sensor_units.items() if unit == "V"]:
+        raise InputError(f"the record holds means, and {', '.join(map(repr, volts))} is a voltage",
+                         where="argument record", expected="thermometers alone where readings are means over a sample",
+                         remedy="Log samples, or leave the voltage out of the system.")
+    return replace(eq, averaged=True)
 
 
 def _refuse_large(system: System, names: Sequence[str]) -> NoReturn:

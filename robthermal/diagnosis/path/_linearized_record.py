@@ -247,12 +247,27 @@ class LinearizedRecord:
         """Sensors with a state of their own."""
         return [name for name, sensor in self.system.sensors.items() if sensor.time_constant > 0]
 
+    @cached_property
+    def sources(self) -> list[int]:
+        """State that every sensor in the record reads, its lag or its lump; -1 for voltages."""
+        nl, lumps = self.x.shape[1], self.system.lump_names
+        return [-1 if self.system.sensors[name].module else nl + self.lags.index(name) if name in self.lags
+                else lumps.index(self.system.sensors[name].lump) for name in self.one.sensors]
+
+    @cached_property
+    def means(self) -> list[int]:
+        """Of which states a mean over the sample before is a state too: what sensors read, in a record of means."""
+        return sorted(set(self.sources)) if self.one.record.averaged else []
+
     @property
     def M(self) -> Array:
-        """Rate of the deviations of lumps and lagged sensors, (n, n_z, n_z) [1/s]."""
+        """Rate of the deviations of lumps and lagged sensors, and of means from 0, (n, n_z, n_z) [1/s]."""
         n, nl = self.x.shape
-        nz = nl + len(self.lags)
+        core = nl + len(self.lags)
+        nz = core + len(self.means)
         M = np.zeros((n, nz, nz))
+        for row, source in enumerate(self.means, start=core):
+            M[:, row, source] = 1.0 / self.h
         slopes = heat_slopes(self.equations, 0.5 * (self.x + self.end), self.u)
         M[:, :nl, :nl] = slopes / self.equations.capacity[:, None]
         for row, name in enumerate(self.lags, start=nl):
@@ -274,13 +289,19 @@ class LinearizedRecord:
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array]:
-        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end."""
+        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end.
+
+        The mean of a state over a sample has the next φ: that of e^{Mt} is φ₁, of t φ₁(Mt) is φ₂, of t² φ₂(Mt) is φ₃.
+        """
         M, kind = self.kinds
-        Mh = M * self.h
-        A = expm(Mh)
-        one = np.eye(A.shape[1])
-        phi1 = np.linalg.solve(Mh, A - one)
-        phi2 = np.linalg.solve(Mh, phi1 - one)
+        core = M.shape[1] - len(self.means)
+        Mh = M[:, :core, :core] * self.h
+        phi = [expm(Mh)]
+        for factor in (1.0, 1.0, 2.0)[:3 if self.means else 2]:
+            phi.append(np.linalg.solve(Mh, phi[-1] - np.eye(core) / factor))
+        A, phi1, phi2 = (np.concatenate([now, of_mean[:, self.means]], axis=1)
+                         for now, of_mean in zip(phi[:3], phi[1:] if self.means else phi[:3], strict=True))
+        A = np.concatenate([A, np.zeros((*A.shape[:2], len(self.means)))], axis=2)  # every sample from 0
         nl = self.x.shape[1]
         per_watt = self.h / self.equations.capacity
         by_end = phi2[..., :nl] * per_watt
@@ -290,15 +311,14 @@ class LinearizedRecord:
     def C(self) -> Array:
         """What the sensors in the record read of the states, (n, n_sensors, n_z); that of voltages varies."""
         varies = any(self.system.sensors[name].module for name in self.one.sensors)
-        C = np.zeros((len(self.x) if varies else 1, len(self.one.sensors), self.x.shape[1] + len(self.lags)))
-        for i, name in enumerate(self.one.sensors):
-            sensor = self.system.sensors[name]
-            if sensor.module:
+        core = self.x.shape[1] + len(self.lags)
+        C = np.zeros((len(self.x) if varies else 1, len(self.one.sensors), core + len(self.means)))
+        for i, (name, source) in enumerate(zip(self.one.sensors, self.sources, strict=True)):
+            if source < 0:
                 C[:, i, :self.x.shape[1]] = voltage_slopes(self.equations, name, self.x, self.u)
-                continue
-            state = (self.x.shape[1] + self.lags.index(name) if name in self.lags
-                     else self.system.lump_names.index(sensor.lump))
-            C[:, i, state] = sensor.gain
+            else:
+                read = core + self.means.index(source) if self.means else source
+                C[:, i, read] = self.system.sensors[name].gain
         return C if varies else np.broadcast_to(C[0], (len(self.x), *C.shape[1:]))
 
     @cached_property
@@ -352,7 +372,10 @@ class LinearizedRecord:
         out = self._answered(heat, len(responses))
         for j, response in enumerate(responses):
             if response.reading is not None:
-                out[..., j] += response.reading[:, self.one.columns]
+                read = response.reading[:, self.one.columns]
+                if self.means:  # linear between samples
+                    read = np.concatenate([read[:1], 0.5 * (read[1:] + read[:-1])])
+                out[..., j] += read
         return out
 
     def answer(self, start: Array, end: Array) -> Array:

@@ -106,7 +106,7 @@ def repeated(record: Record, times: int) -> Record:
     """The same record several times, one after the other."""
     return Record(sample_time=record.sample_time, inputs=np.tile(record.inputs, (times, 1)),
                   outputs=np.tile(record.outputs, (times, 1)), input_names=record.input_names,
-                  output_names=record.output_names, name=record.name)
+                  output_names=record.output_names, averaged=record.averaged, name=record.name)
 
 
 def with_inputs(record: Record, values: Mapping[str, Array], sample_time: float | None = None) -> Record:
@@ -115,4 +115,5 @@ def with_inputs(record: Record, values: Mapping[str, Array], sample_time: float 
     for name, column in values.items():
         inputs[:, record.input_names.index(name)] = column
     return Record(sample_time=sample_time or record.sample_time, inputs=inputs, outputs=record.outputs,
-                  input_names=record.input_names, output_names=record.output_names, name="next experiment")
+                  input_names=record.input_names, output_names=record.output_names, averaged=record.averaged,
+                  name="next experiment")

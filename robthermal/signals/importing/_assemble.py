@@ -62,6 +62,13 @@ def make_records(
     made = [(_sampled(part, values.inputs, driven), _sampled(part, values.outputs, read)) for part in parts]
     for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
         _freeze(matrix)
+    starts = [part.start for part in parts]
+    if choice.record.averaged:
+        made = [(U[1:], Y[:-1]) for U, Y in made]
+        starts = [part.start + part.sample_time * (choice.record.averaged == "after") for part in parts]
+        text = (f"every value is the mean over the step {choice.record.averaged} its stamp, as declared: readings stand "
+                "where their step ends, inputs where theirs begins")
+        table.actions.append(Action("averaged", len(parts), text))
     say_dropped(table, values, time)
     report = make_report(source, table, clock, time, values, parts, glitches, choice, system)
     said = [action.text for action in table.actions if action.what in _LOUD]
@@ -80,13 +87,14 @@ def make_records(
             outputs=Y,
             input_names=[c.name for c in driven],
             output_names=[c.name for c in read],
-            start_time=part.start,
+            start_time=start,
             units=units,
+            averaged=choice.record.averaged is not None,
             name=report.file if len(parts) == 1 else f"{report.file} part {k + 1}",
             notes=said + notes,
             imported=report,
         )
-        for k, (part, (U, Y)) in enumerate(zip(parts, made, strict=True))
+        for k, (part, start, (U, Y)) in enumerate(zip(parts, starts, made, strict=True))
     )
 
 

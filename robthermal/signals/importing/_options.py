@@ -83,6 +83,8 @@ class ImportOptions(_Table):
         Rows with one time stamp and different values.
     restarts : {"refuse", "split"}
         Time that jumps back.
+    averaged : {"before", "after"}, optional
+        Every value is the mean over the step before its stamp, or after it; default: read at the stamp.
     """
 
     time: str | tuple[str, ...] | None = None
@@ -106,6 +108,12 @@ class ImportOptions(_Table):
     jitter: Fraction = 0.25
     duplicates: Literal["refuse", "first", "last", "mean"] = "refuse"
     restarts: Literal["refuse", "split"] = "refuse"
+    averaged: Literal["before", "after"] | None = None
+
+    @property
+    def least(self) -> int:
+        """Samples that a part needs: of means the first input and the last reading go."""
+        return max(self.shortest, 3) if self.averaged else self.shortest
 
     @field_validator("delimiter")
     @classmethod

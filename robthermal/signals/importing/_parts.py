@@ -87,7 +87,7 @@ def parts_of(
     driven, read : sequence of (header, column)
         Inputs and currents; sensors and ambients; nan where missing.
     options : ImportOptions
-        gaps, fill_up_to, shortest, jitter.
+        gaps, fill_up_to, shortest, jitter, averaged.
 
     Raises
     ------
@@ -226,14 +226,14 @@ def _long_enough(
     short: list[slice] = []
     for rows in segments:
         samples = round(float(stamps[rows.stop - 1] - stamps[rows.start]) / median) + 1
-        (long if rows.stop - rows.start >= 2 and samples >= options.shortest else short).append(rows)
+        (long if rows.stop - rows.start >= 2 and samples >= options.least else short).append(rows)
     if short:
         gone = sum(rows.stop - rows.start for rows in short)
         table.actions.append(
             Action(
                 "left_out",
                 len(short),
-                f"{len(short)} parts shorter than {options.shortest} samples left out ({gone} rows)",
+                f"{len(short)} parts shorter than {options.least} samples left out ({gone} rows)",
                 lines=[table.lines[rows.start] for rows in short[:50]],
                 times=[float(stamps[rows.start]) for rows in short[:50]],
                 rows=gone,
@@ -242,7 +242,7 @@ def _long_enough(
     used = sum(rows.stop - rows.start for rows in long)
     if not long or 2 * used < len(table.lines):
         raise InputError(
-            f"{used} of {len(table.lines)} rows are left in {len(long)} parts of at least {options.shortest} samples",
+            f"{used} of {len(table.lines)} rows are left in {len(long)} parts of at least {options.least} samples",
             where=table.where,
             expected="at least half of the rows",
             remedy='Repair the file, lower shortest, or write gaps = "fill".',
