@@ -70,6 +70,8 @@ class Judged:
         For every effect, where the model is not exact.
     why : str
         Of an answer "unexplained" that was graded: what kept effects from being named, in words that follow "because".
+    means : str
+        What the records would be if their values were means over a step; empty where that explains nothing.
     """
 
     state: SearchState
@@ -80,6 +82,7 @@ class Judged:
     plain: Refit | None = None
     evidence: tuple[Evidence, ...] = ()
     why: str = ""
+    means: str = ""
 
     def __str__(self) -> str:
         return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else

@@ -24,6 +24,7 @@ from ._doubts import (
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._nearest import nearest
+from ._means import asked_of_means
 from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative
@@ -138,6 +139,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if too_warm(nominal) and (judged.plain is not None or judged.verdict == "unexplained"):
         progress("once more, with a room no warmer than beside a machine that is only heated")
         judged = _judged(only_heated(nominal), names, checked, progress)
+    judged = asked_of_means(judged, lambda others: refit(system, others, floor, parameters=parameters,
+                                                         session_gain=session_gain))
     progress("locating the misfit and planning the next experiment")
     found = concluded(judged)
     if not refine:
@@ -205,7 +208,7 @@ def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
 def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     """What to hold against the answer."""
     state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
-    said = []
+    said = [judged.means] if judged.means else []
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
     if verdict in ("named", "named_with_remainder", "ambiguous"):

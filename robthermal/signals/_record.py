@@ -219,7 +219,7 @@ class Record:
         """
         ins = self.input_names if inputs is None else channel_names(inputs, "inputs")
         outs = self.output_names if outputs is None else channel_names(outputs, "outputs")
-        return self._changed(
+        return self.changed(
             inputs=self._columns(ins),
             outputs=self._columns(outs),
             input_names=ins,
@@ -243,7 +243,7 @@ class Record:
         """
         names = self.output_names if output_names is None else channel_names(output_names, "output_names")
         units = {name: unit for name, unit in self.units.items() if name in self.input_names + names}
-        return self._changed(outputs=outputs, output_names=names, units=units)
+        return self.changed(outputs=outputs, output_names=names, units=units)
 
     def to_frame(self) -> pd.DataFrame:
         """Copy as a table.
@@ -331,7 +331,7 @@ class Record:
                 where="part of a record",
                 expected=f"at least two of the {self.n_samples} rows",
             )
-        return self._changed(
+        return self.changed(
             inputs=self.inputs[start:stop],
             outputs=self.outputs[start:stop],
             start_time=self.start_time + start * self.sample_time,
@@ -345,7 +345,14 @@ class Record:
         # 1e-9 of a sample: 0.1 * 3 is not 0.3, but the user means that row.
         return int(min(max(math.ceil(offset - 1e-9 * max(1.0, abs(offset))), 0), self.n_samples))
 
-    def _changed(self, **changes: Any) -> Record:
+    def changed(self, **changes: Any) -> Record:
+        """Copy with other fields.
+
+        Parameters
+        ----------
+        **changes
+            Arguments of `Record`, by name.
+        """
         fields = {field: getattr(self, field) for field in self.__dataclass_fields__}
         return Record(**{**fields, **changes})
 

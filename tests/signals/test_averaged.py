@@ -22,6 +22,11 @@ def test_readings_stand_where_their_step_ends_and_inputs_where_theirs_begins(ave
     assert len(said) == 1 and averaged in said[0]
 
 
+def test_readings_alone_may_be_means() -> None:
+    record = rt.read_record(LOG, inputs=["q"], outputs=["T1"], averaged="readings")
+    assert record.averaged and record["q"].tolist() == [1.0, 2.0, 3.0, 4.0] and record["T1"].tolist()[0] == 300.0
+
+
 def test_without_a_word_values_are_readings_at_the_stamp() -> None:
     record = rt.read_record(LOG, inputs=["q"], outputs=["T1"])
     assert not record.averaged and record["T1"].size == 4
@@ -38,6 +43,12 @@ def test_parts_too_short_for_a_mean_are_left_out() -> None:
     with pytest.warns(UserWarning, match="shorter than 3 samples"):
         records = rt.read_records(gaps, inputs=["q"], outputs=["T1"], averaged="before")
     assert [one.n_samples for one in records] == [3]
+
+
+def test_means_of_means_are_refused() -> None:
+    record = rt.read_record(LOG, inputs=["q"], outputs=["T1"], averaged="after")
+    with pytest.raises(rt.InputError, match="means already"):
+        rt.signals.as_means(record, "after")
 
 
 @pytest.mark.parametrize("wrong", ["yes", "end"])

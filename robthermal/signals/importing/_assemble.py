@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._glitches import filter_note, filtered, glitch_rows, window_samples
+from .._means import as_means
 from .._record import Record
 from ._columns import Channel, SystemLike
 from ._options import Declared
@@ -62,12 +63,11 @@ def make_records(
     made = [(_sampled(part, values.inputs, driven), _sampled(part, values.outputs, read)) for part in parts]
     for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
         _freeze(matrix)
-    starts = [part.start for part in parts]
-    if choice.record.averaged:
-        made = [(U[1:], Y[:-1]) for U, Y in made]
-        starts = [part.start + part.sample_time * (choice.record.averaged == "after") for part in parts]
-        text = (f"every value is the mean over the step {choice.record.averaged} its stamp, as declared: readings stand "
-                "where their step ends, inputs where theirs begins")
+    averaged = choice.record.averaged
+    if averaged:
+        text = ("readings are means over the step before their stamp, as declared" if averaged == "readings" else
+                f"every value is the mean over the step {averaged} its stamp, as declared: readings stand where their "
+                "step ends, inputs where theirs begins")
         table.actions.append(Action("averaged", len(parts), text))
     say_dropped(table, values, time)
     report = make_report(source, table, clock, time, values, parts, glitches, choice, system)
@@ -80,22 +80,22 @@ def make_records(
             + (" …" if len(unknown) > 12 else "")
         )
     units = {c.name: c.unit for c in (*driven, *read) if c.unit}
-    return tuple(
+    records = (
         Record(
             sample_time=part.sample_time,
             inputs=U,
             outputs=Y,
             input_names=[c.name for c in driven],
             output_names=[c.name for c in read],
-            start_time=start,
+            start_time=part.start,
             units=units,
-            averaged=choice.record.averaged is not None,
             name=report.file if len(parts) == 1 else f"{report.file} part {k + 1}",
             notes=said + notes,
             imported=report,
         )
-        for k, (part, start, (U, Y)) in enumerate(zip(parts, starts, made, strict=True))
+        for k, (part, (U, Y)) in enumerate(zip(parts, made, strict=True))
     )
+    return tuple(as_means(record, averaged) if averaged else record for record in records)
 
 
 def _say_glitches(table: Table, part: Part, channel: Channel, column: Array) -> int:

@@ -10,6 +10,7 @@ from zoneinfo import ZoneInfo
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from ...errors import InputError
+from .._means import Averaged
 from .._names import suggestion
 from .._thermistor import Thermistor
 
@@ -83,8 +84,9 @@ class ImportOptions(_Table):
         Rows with one time stamp and different values.
     restarts : {"refuse", "split"}
         Time that jumps back.
-    averaged : {"before", "after"}, optional
-        Every value is the mean over the step before its stamp, or after it; default: read at the stamp.
+    averaged : {"before", "after", "readings"}, optional
+        Every value is the mean over the step before its stamp, or after it; or readings alone are, over the step before,
+        and inputs hold from the stamp on. Default: values at the stamp.
     """
 
     time: str | tuple[str, ...] | None = None
@@ -108,7 +110,7 @@ class ImportOptions(_Table):
     jitter: Fraction = 0.25
     duplicates: Literal["refuse", "first", "last", "mean"] = "refuse"
     restarts: Literal["refuse", "split"] = "refuse"
-    averaged: Literal["before", "after"] | None = None
+    averaged: Averaged | None = None
 
     @property
     def least(self) -> int:
