@@ -192,7 +192,7 @@ def concluded(judged: Judged) -> Diagnosis:
         adequacy=judged.adequacy, hold_out=judged.hold_out, joint=state.joint,
         nearest=nearest(judged, gap),
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves,
-        ambients=found_ambients(fit))
+        ambients=found_ambients(fit), means=judged.means)
     caveats = _caveats(judged, diagnosis)
     return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=_text(diagnosis, caveats)))
 

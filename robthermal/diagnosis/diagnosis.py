@@ -106,6 +106,8 @@ class Diagnosis:
     refinement : Refinement or None
         What splitting a lump does to the remainder, if it was asked for and there is one; the rest of the answer is of
         the network as it is.
+    means : str
+        What the log would be if its values were means over a step, where that explains as much or more; else empty.
     caveats : tuple of str
         What to hold against a name, a sentence each; the outcome's text has them too.
     nearest : str
@@ -138,6 +140,7 @@ class Diagnosis:
     resolving: Resolving | None = None
     reference: Compared | None = None
     refinement: Refinement | None = None
+    means: str = ""
     caveats: tuple[str, ...] = ()
     nearest: str = ""
     ambients: tuple[FoundAmbient, ...] = ()

@@ -124,7 +124,8 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     -------
     Record
         Same inputs; outputs are the noise-free readings of all sensors [K, or V] (of all lumps if the system has no
-        sensor), means over the sample before where those of `record` are. The voltage of a row is that at the current of the same row.
+        sensor). Where those of `record` are means over the sample before, these are too; its first is kept, because the
+        sample that it is the mean of is not in the record. The voltage of a row is that at the current of the same row.
 
     Raises
     ------
@@ -155,6 +156,7 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
         kept = run_implicit(eq, start_lumps(eq, record, initial), u, record.sample_time, tolerance,
                             np.array(measured, np.intp)).lumps
         readings = read_sampled(eq, measured, kept, u, record.sample_time) if system.sensors else kept
+        _keep_first(eq, record, readings)
     volts = {name: unit for name, unit in system.sensor_units.items() if unit == "V"}
     return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
                   input_names=record.input_names, output_names=system.sensor_names or system.lump_names, units=volts,
@@ -212,6 +214,7 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
     start = start_lumps(eq, record, initial)
     run = run_implicit(eq, start, u, record.sample_time, tolerance, everything)
     readings = read_sampled(eq, everything.tolist(), run.lumps, u, record.sample_time)
+    _keep_first(eq, record, readings)
     return Trajectory(system, record.time, run.lumps, readings, run.stored, run.ambient_heat,
                       run.heater_heat, run.electrical_energy, run.source_heat, (),
                       partial(_refuse_large, system), "implicit")
@@ -227,6 +230,18 @@ def _equations(system: System, record: Record) -> Equations:
                          where="argument record", expected="thermometers alone where readings are means over a sample",
                          remedy="Log samples, or leave the voltage out of the system.")
     return replace(eq, averaged=True)
+
+
+def _first_measured(eq: Equations, record: Record) -> list[tuple[int, str]]:
+    """Column and name of sensors whose first reading is the record's: the step that it is the mean of is not in it."""
+    if not eq.averaged:
+        return []
+    return [(i, name) for i, name in enumerate(eq.system.sensors) if name in record.output_names]
+
+
+def _keep_first(eq: Equations, record: Record, readings: Array) -> None:
+    for column, name in _first_measured(eq, record):
+        readings[0, column] = record[name][0]
 
 
 def _refuse_large(system: System, names: Sequence[str]) -> NoReturn:
@@ -251,6 +266,7 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
     states = path.z[at, :layout.n_free]
     derivative = _Derivative(record, initial, by, plan, path)
     readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, plan.w[at], h)
+    _keep_first(eq, record, readings)
     lumps, meters = states[:, :n], path.z[at]
     return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
                       meters[:, layout.ambient_meters], meters[:, layout.heater_meters],
@@ -282,9 +298,11 @@ class _Derivative:
         slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))
         if len(at) < len(slopes):  # else every segment is a sample
             slopes = slopes[at]
-        return reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
+        out = reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
                               _rate_slopes(along, states, plan, slopes) if self.delayed else None,
                               {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time)
+        out[0, [column for column, _ in _first_measured(eq, self.record)]] = 0.0
+        return out
 
 
 def _around(plan: Schedule) -> tuple[Array, Array]:

@@ -33,7 +33,8 @@ def answer_sentence(found: Diagnosis) -> str:
     what = ("Something has changed that no parameter and no effect of the catalog explains" if found.reference else
             "Something is missing in the model that no effect of the catalog explains")
     return " ".join([f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
-                     f"{gap.noise:.2g} {gap.unit}.", *remarks, *filter(None, [labels_in_words(found.nearest)])])
+                     f"{gap.noise:.2g} {gap.unit}.", *remarks,
+                     *filter(None, [found.means, labels_in_words(found.nearest)])])
 
 
 def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
