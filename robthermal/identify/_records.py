@@ -35,7 +35,7 @@ def as_records(records: Any) -> tuple[Record, ...]:
             raise _not_a_record(record, f"records[{place}]")
         if record.averaged:
             raise InputError("the readings are means over every sample", where=f"records[{place}]",
-                             expected="readings at the samples: a mean is half a sample late and has its own attenuation",
+                             expected="readings at the samples: a mean is half a sample late, and attenuates",
                              remedy="Log samples for a frequency response; calibrate and diagnose take this record.")
         _check_alike(found[0], record, place)
     for names, kind in ((found[0].input_names, "input"), (found[0].output_names, "output")):

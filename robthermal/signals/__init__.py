@@ -10,8 +10,8 @@ from ._excitation_set import Excitation as Excitation
 from ._export import save_records as save_records
 from ._glitches import find_glitches as find_glitches
 from ._glitches import median_filter as median_filter
-from ._multisine import multisine as multisine
 from ._means import as_means as as_means
+from ._multisine import multisine as multisine
 from ._outcomes import SignalsCode as SignalsCode
 from ._record import Record as Record
 from ._staircase import staircase as staircase

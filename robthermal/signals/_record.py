@@ -29,8 +29,8 @@ class Record:
     """Measured or simulated signals, sampled uniformly; temperatures in kelvin.
 
     Inputs (heaters, currents, ambient temperatures) are held: row k acts over [t_k, t_k + sample_time).
-    Outputs are read at t_k, before row k of the inputs has had any effect; or, where they are `averaged`, they are means
-    over the sample that ends at t_k.
+    Outputs are read at t_k, before row k of the inputs has had any effect; or, where they are `averaged`, they are
+    means over the sample that ends at t_k.
 
     Parameters
     ----------

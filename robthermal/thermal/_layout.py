@@ -12,8 +12,9 @@ from ._equations import Equations
 class Layout:
     """State z = [lumps, lagged sensors, lagged drives, memories, periodic loads (sine, cosine), integrals, meters].
 
-    The integrals are those of what thermometers read, where readings are means over a sample. The meters feed nothing back. They integrate the heat received from every ambient, the electrical energy of every
-    module, the heat of every heater, and that of all other sources, so that the balance of a simulation can be checked.
+    The integrals are those of what thermometers read, where readings are means over a sample. The meters feed nothing
+    back. They integrate the heat received from every ambient, the electrical energy of every module, the heat of every
+    heater, and that of all other sources, so that the balance of a simulation can be checked.
 
     Parameters
     ----------

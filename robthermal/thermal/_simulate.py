@@ -13,7 +13,7 @@ from .._celsius import ZERO_CELSIUS
 from .._drawing import axes_for
 from ..errors import InputError
 from ..signals import Record
-from ._drive import Initial, held_inputs, record_of, held_slopes, start_lumps, start_slope, start_state
+from ._drive import Initial, held_inputs, held_slopes, record_of, start_lumps, start_slope, start_state
 from ._equations import Equations
 from ._exponential import Integrator, Path
 from ._implicit import refuse_memory, run_implicit

@@ -8,7 +8,8 @@ import pytest
 
 import robthermal as rt
 
-LOG = pd.DataFrame({"time": [0.0, 60.0, 120.0, 180.0], "q": [1.0, 2.0, 3.0, 4.0], "T1 [K]": [300.0, 301.0, 302.0, 303.0]})
+LOG = pd.DataFrame({"time": [0.0, 60.0, 120.0, 180.0], "q": [1.0, 2.0, 3.0, 4.0],
+                    "T1 [K]": [300.0, 301.0, 302.0, 303.0]})
 
 
 @pytest.mark.parametrize(("averaged", "start"), [("after", 60.0), ("before", 0.0)])

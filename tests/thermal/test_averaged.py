@@ -98,7 +98,8 @@ def test_large_networks_take_the_mean_of_both_ends() -> None:
                     lumps={f"x{i}": {"capacity": 50.0} for i in range(n)},
                     links=[*links, {"between": ("x0", "room"), "conductance": 1.0}], inputs={"q": {"lump": "x0"}},
                     sensors={"T": {"lump": "x3"}})
-    drive = rt.Record(sample_time=5.0, inputs=np.ones(40), outputs=np.zeros((40, 0)), input_names=["q"], output_names=[])
+    drive = rt.Record(sample_time=5.0, inputs=np.ones(40), outputs=np.zeros((40, 0)), input_names=["q"],
+                      output_names=[])
     y = rt.thermal.simulate(bar, drive)["T"]
     mean = rt.thermal.simulate(bar, drive.changed(averaged=True))["T"]
     assert np.allclose(mean[1:], 0.5 * (y[1:] + y[:-1]), atol=1e-9)
@@ -119,10 +120,11 @@ def test_a_diagnosis_of_means_compares_with_means() -> None:
     u = steps(300, 3)
     y = means(u, 0.0) + 0.02 * np.random.default_rng(3).standard_normal((300, 2))
     raw = log(u, y)
-    found = rt.diagnose(OVEN, raw, effects=["sensor_lag", "input_delay", "missing_link"])
+    few = ["sensor_lag", "input_delay", "missing_link"]
+    found = rt.diagnose(OVEN, raw, effects=few)
     assert found.verdict == "unexplained" and not found.effects
     assert 'averaged = "after"' in found.means and found.means in found.outcome.text
-    declared = rt.diagnose(OVEN, rt.signals.as_means(raw, "after"), effects=["sensor_lag", "input_delay", "missing_link"])
+    declared = rt.diagnose(OVEN, rt.signals.as_means(raw, "after"), effects=few)
     assert declared.verdict == "consistent" and declared.means == ""
 
 

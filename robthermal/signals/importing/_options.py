@@ -85,8 +85,8 @@ class ImportOptions(_Table):
     restarts : {"refuse", "split"}
         Time that jumps back.
     averaged : {"before", "after", "readings"}, optional
-        Every value is the mean over the step before its stamp, or after it; or readings alone are, over the step before,
-        and inputs hold from the stamp on. Default: values at the stamp.
+        Every value is the mean over the step before its stamp, or after it; or readings alone are, over the step
+        before, and inputs hold from the stamp on. Default: values at the stamp.
     """
 
     time: str | tuple[str, ...] | None = None
