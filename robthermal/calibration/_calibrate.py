@@ -259,4 +259,4 @@ def _by_sensor(one: Data, values: Floats) -> dict[str, Floats]:
 
 
 def _by_lump(system: System, temperatures: Floats) -> dict[str, float]:
-    return dict(zip(system.lump_names, temperatures.tolist(), strict=True))
+    return dict(zip(system.lump_names, temperatures.tolist(), strict=False))  # lagged thermometers come behind

@@ -50,8 +50,8 @@ def asked_of_means(judged: Judged, refitted: Callable[[Sequence[Record]], Refit]
     what, declare = _WORDS[how]
     falls = f"the error falls from {nominal.rms:.2g} to {least:.2g} {nominal.unit} without any effect"
     if not better:
-        return replace(judged, means=f"If {what}, {falls}, as with what is named: then that is the answer. Declare "
-                                     f"{declare} in [record].")
+        return replace(judged, means=f"If {what}, {falls}, about as far as with what is named: then declare {declare} in "
+                                     "[record], and diagnose again.")
     text = f"If {what}, {falls}: declare {declare} in [record], and diagnose again."
     return replace(judged, verdict="unexplained", evidence=(), plain=None, means=text,
                    outcome=judged.outcome if not named else DiagnosisCode.UNEXPLAINED.outcome(

@@ -77,7 +77,7 @@ class Problem:
         return self.ranges.values(v[:len(self.ranges.names)])
 
     def temperatures(self, v: Floats) -> list[Floats]:
-        """Initial lump temperatures of every record [K]."""
+        """Initial temperatures of lumps and lagged thermometers of every record [K]."""
         out, at = [], len(self.ranges.names)
         for start in self.starts:
             out.append(start.mean + start.sigma * v[at:at + start.n_free] if start.n_free else start.mean)
@@ -87,7 +87,8 @@ class Problem:
     def systems(self, v: Floats) -> list[System]:
         """System of every record: the parameters, and its own initial temperatures."""
         values = self.ranges.assigned(self.parameters(v))
-        return [self.system.with_parameters({**start_values(self.system, T), **values}) for T in self.temperatures(v)]
+        return [self.system.with_parameters({**start_values(start, T), **values})
+                for start, T in zip(self.starts, self.temperatures(v), strict=True)]
 
     def residuals(self, v: Floats) -> list[Floats]:
         """Measured − modelled of every record, (n, n_sensors) [K]."""
@@ -99,7 +100,7 @@ class Problem:
         slopes = self.ranges.slopes(self.parameters(v))
         out = []
         for system, one, start in zip(self.systems(v), self.data, self.starts, strict=True):
-            free = list(start_values(system, start.mean)) if start.n_free else []
+            free = list(start.names) if start.n_free else []
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
             J: Floats = np.asarray(run.sensitivity[:, one.columns], np.float64)

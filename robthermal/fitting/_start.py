@@ -23,14 +23,17 @@ class Initial:
 
     Parameters
     ----------
-    mean : ndarray, shape (n_lumps,)
-        Fixed value, or center of the prior [K].
+    mean : ndarray, shape (n,)
+        Fixed value, or center of the prior [K]: of all lumps, then of lagged thermometers.
     sigma : float
-        Standard deviation of the prior of every lump [K]; 0 if fixed.
+        Standard deviation of the prior of every one [K]; 0 if fixed.
+    names : tuple of str
+        What is unknown, as parameters of the system.
     """
 
     mean: Floats
     sigma: float
+    names: tuple[str, ...] = ()
 
     @property
     def n_free(self) -> int:
@@ -44,12 +47,18 @@ def initial_of(system: System, one: Data, start: Start) -> Initial:
     The center is the nearest sensor's first reading (by thermal resistance); with "system", the file's `initial` where
     it has one. A free start has a prior of max(5 K, spread of the first readings): the lumps without a sensor are
     hardly determined by data, and without a prior the directions nobody can see would spoil the conditioning.
+
+    A record may begin while the machine moves: a lagged thermometer then shows another temperature than its lump has,
+    and what it shows first is an unknown of its own, with the first reading in its center.
     """
     mean = first_temperatures(system if start == "system" else _without_initial(system), one)
+    names = tuple(f"lumps.{name}.initial" for name in system.lumps)
     if start != "free":
-        return Initial(mean, 0.0)
+        return Initial(mean, 0.0, names)
+    shown = _shown_first(system, one)
+    mean, names = np.append(mean, list(shown.values())), (*names, *(f"sensors.{name}.initial" for name in shown))
     warm = [T for name, T in zip(one.sensors, one.readings[0], strict=True) if name in system.thermometers]
-    return Initial(mean, max(SIGMA, float(np.ptp(warm)) if warm else 0.0))
+    return Initial(mean, max(SIGMA, float(np.ptp(warm)) if warm else 0.0), names)
 
 
 def first_temperatures(system: System, one: Data) -> Floats:
@@ -57,11 +66,39 @@ def first_temperatures(system: System, one: Data) -> Floats:
     return trajectory(system, one.record[:2]).lumps[0]
 
 
-def start_values(system: System, temperatures: Floats) -> dict[str, float]:
-    """Initial temperatures as named parameters."""
-    return {f"lumps.{name}.initial": float(T) for name, T in zip(system.lump_names, temperatures, strict=True)}
+def started(system: System) -> tuple[str, ...]:
+    """Everything with an initial temperature of its own: lumps and lagged thermometers.
+
+    Parameters
+    ----------
+    system : System
+        Model of a record.
+    """
+    return (*system.lumps, *(name for name, sensor in system.thermometers.items() if sensor.time_constant))
+
+
+def _shown_first(system: System, one: Data) -> dict[str, float]:
+    """What lagged thermometers in the record show at its start, without their gain and offset [K]."""
+    reference = next(iter(system.ambients.values())).temperature
+    first = dict(zip(one.sensors, one.readings[0].tolist(), strict=True))
+    return {name: reference + (first[name] - sensor.offset - reference) / sensor.gain
+            for name, sensor in system.thermometers.items() if sensor.time_constant and name in first}
+
+
+def start_values(start: Initial, temperatures: Floats) -> dict[str, float]:
+    """Initial temperatures as named parameters.
+
+    Parameters
+    ----------
+    start : Initial
+        Prior of the initial temperatures of a record.
+    temperatures : ndarray, shape (n,)
+        Their values [K], as many as `start.mean`.
+    """
+    return dict(zip(start.names, map(float, temperatures), strict=True))
 
 
 def _without_initial(system: System) -> System:
     lumps = {name: lump.model_copy(update={"initial": None}) for name, lump in system.lumps.items()}
-    return system.model_copy(update={"lumps": lumps})
+    sensors = {name: sensor.model_copy(update={"initial": None}) for name, sensor in system.sensors.items()}
+    return system.model_copy(update={"lumps": lumps, "sensors": sensors})

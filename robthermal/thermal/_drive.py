@@ -71,9 +71,10 @@ def start_lumps(eq: Equations, record: Record, initial: Initial) -> Array:
 
 
 def settle(eq: Equations, layout: Layout, z: Array, w: Array, time: float) -> None:
-    """States beside the lumps at the start: lags settled, no memory of the polarity, periodic loads by the clock."""
+    """States beside the lumps at the start: lags settled but where it is said otherwise, no memory of the polarity, periodic loads by the clock."""
     for name, state in layout.sensors.items():
-        z[state] = z[eq.index[eq.system.sensors[name].lump]]
+        sensor = eq.system.sensors[name]
+        z[state] = z[eq.index[sensor.lump]] if sensor.initial is None else sensor.initial
     for column, state in layout.drives.items():
         z[state] = w[column]
     for name, sine in layout.periodic.items():
@@ -95,7 +96,9 @@ def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence
         _lumps_slope(eq, record, names, out)
     for column, name in enumerate(names):
         for sensor, row in layout.sensors.items():
-            out[row, column] = out[eq.index[eq.system.sensors[sensor].lump], column]
+            part = eq.system.sensors[sensor]
+            settled = part.initial is None
+            out[row, column] = out[eq.index[part.lump], column] if settled else name == f"sensors.{sensor}.initial"
         for drive, row in layout.drives.items():
             out[row, column] = held[name][0, drive] if name in held else 0.0
         for lump, sine in layout.periodic.items():

@@ -20,7 +20,7 @@ from ._units import celsius_to_kelvin, kelvin_to_celsius
 
 _MAX_BYTES = 200_000_000
 _TEMPERATURES = {"ambients": ("temperature",), "lumps": ("initial", "condensation.dew_point"),
-                 "modules": ("reference_temperature",)}
+                 "modules": ("reference_temperature",), "sensors": ("initial",)}
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 

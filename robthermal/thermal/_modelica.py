@@ -221,7 +221,8 @@ def _sensor(system: System, text: Text, name: str, sensor: Sensor, heats: dict[s
     source = text[sensor.lump]
     if sensor.time_constant:
         tau = text.parameter(f"{name}_time_constant", sensor.time_constant, "s")
-        source = text.lag(f"{name}_lagged", "K", tau, source, source)
+        start = source if sensor.initial is None else text.parameter(f"{name}_initial", sensor.initial, "K")
+        source = text.lag(f"{name}_lagged", "K", tau, source, start)
     if sensor.delay:
         source = f"delay({source}, {text.parameter(f'{name}_delay', sensor.delay, 's')})"
     nominal = text.known("nominal")

@@ -42,7 +42,7 @@ WORDS: dict[str, dict[str, tuple[str, str]]] = {  # by table and key: words and 
     "sensors": {
         "noise": ("noise of {0}", "K"), "time_constant": ("lag of {0}", "s"), "offset": ("offset of {0}", "K"),
         "gain": ("gain of {0}", "-"), "delay": ("delay of {0}", "s"), "self_heating": ("self-heating of {0}", "W"),
-        "lead_resistance": ("lead resistance of {0}", "Ω")},
+        "lead_resistance": ("lead resistance of {0}", "Ω"), "initial": ("initial temperature of {0}", "K")},
 }
 
 

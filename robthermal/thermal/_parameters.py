@@ -27,7 +27,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
                 "hysteresis.time_constant", *_DRIVE),
     "leads": ("resistance",),
-    "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating", "lead_resistance"),
+    "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating", "lead_resistance",
+                "initial"),
 }
 LISTED = ("links", "leads")  # tables that are lists of named parts
 

@@ -253,6 +253,8 @@ class Sensor(Part):
         Heat of a thermometer into its lump [W].
     lead_resistance : float, optional
         Resistance of the wires between the module and the terminals where the voltage is read [Ω]; it heats no lump.
+    initial : float, optional
+        Temperature of a lagged thermometer at the start [K]; default that of its lump: settled.
     """
 
     lump: str = Field(default="", max_length=200)
@@ -265,6 +267,7 @@ class Sensor(Part):
     delay: NonNegative = 0.0
     self_heating: Finite = 0.0
     lead_resistance: NonNegative | None = None
+    initial: Kelvin | None = None
 
     @property
     def unit(self) -> str:
@@ -282,7 +285,7 @@ class Sensor(Part):
                              "temperature, a module a voltage")
         if voltage:
             object.__setattr__(self, "quantity", "voltage")
-        wrong = [key for key in (("time_constant", "delay", "self_heating") if voltage else ("lead_resistance",))
+        wrong = [key for key in (("time_constant", "delay", "self_heating", "initial") if voltage else ("lead_resistance",))
                  if getattr(self, key)]
         if wrong:
             raise ValueError(f"{wrong[0]} does not belong to a {self.quantity}: "

@@ -146,7 +146,7 @@ def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h
             columns.append(sensor.gain * volts[name].value(sampled, current) + sensor.offset)
             continue
         source = sampled[:, at[eq.index[sensor.lump]]]
-        read = _lag(source, sensor.time_constant, h) if sensor.time_constant else source
+        read = _lag(source, sensor.initial, sensor.time_constant, h) if sensor.time_constant else source
         read = _delayed_linear(read[:, None], sensor.delay, h)[:, 0]
         if eq.averaged:
             read = np.concatenate([read[:1], 0.5 * (read[1:] + read[:-1])])
@@ -154,12 +154,12 @@ def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h
     return np.column_stack(columns) if columns else np.zeros((len(sampled), 0))
 
 
-def _lag(x: Array, tau: float, h: float) -> Array:
-    """First-order lag of a signal that is linear between samples, started at rest."""
+def _lag(x: Array, initial: float | None, tau: float, h: float) -> Array:
+    """First-order lag of a signal that is linear between samples, started at rest unless it is said otherwise."""
     p = np.exp(-h / tau)
     ramp = 1 - tau / h * (1 - p)  # weight of the newest sample
     drive = ramp * x[1:] + (1 - p - ramp) * x[:-1]
-    return all_pole(np.array([1.0, -p]), np.concatenate([x[:1], drive]))
+    return all_pole(np.array([1.0, -p]), np.concatenate([x[:1] if initial is None else [initial], drive]))
 
 
 def _of(rates: Rates, state: int) -> tuple[Array, Array] | None:

@@ -66,14 +66,16 @@ class DataSet(Protocol):
             Where the initial temperatures come from, as in `rt.calibrate`.
         """
 
-    def started(self, system: System, temperatures: Array) -> System:
+    def started(self, system: System, start: Initial, temperatures: Array) -> System:
         """The system with the initial temperatures of this data set.
 
         Parameters
         ----------
         system : System
             Model common to all data sets.
-        temperatures : ndarray, shape (n_lumps,)
+        start : Initial
+            Prior of the initial temperatures, which says what they belong to.
+        temperatures : ndarray, shape (n,)
             Initial temperatures [K]; empty if the data set has none.
         """
 

@@ -38,7 +38,7 @@ class ResponseData(MeasuredResponse):
         """As `DataSet.initial`: none."""
         return NO_START
 
-    def started(self, system: System, temperatures: Array) -> System:
+    def started(self, system: System, start: Initial, temperatures: Array) -> System:
         """As `DataSet.started`: the system as it is."""
         return system
 

@@ -40,9 +40,9 @@ class RecordData(Data):
         """As `DataSet.initial`."""
         return initial_of(system, self, start)
 
-    def started(self, system: System, temperatures: Array) -> System:
+    def started(self, system: System, start: Initial, temperatures: Array) -> System:
         """As `DataSet.started`."""
-        return system.with_parameters(start_values(system, temperatures))
+        return system.with_parameters(start_values(start, temperatures))
 
     def hides(self, system: System, candidate: Candidate) -> str:
         """As `DataSet.hides`: a record may show every effect."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...fitting import Initial, Ranges
+from ...fitting import Initial, Ranges, started
 from ...thermal import System
 from ..data import DataSet
 from ..effects import Candidate
@@ -154,18 +154,16 @@ class Structure:
         return np.concatenate([self.ranges.coordinates(parameters), coordinates, np.zeros(self.n_coarse + self.n_own)])
 
     def carried(self, other: Structure, v: Array, quantities: Sequence[dict[str, float]]) -> Array:
-        """Unknowns at the parameters and initial temperatures of another structure; a lump that it lacks starts at its
-        prior.
-        """
+        """Unknowns at the parameters and initial temperatures of another structure; what it lacks, at its prior."""
         out = self.start(other.ranges.values(v[:other.n_parameters]), quantities)
         if self.n_coarse and self.n_coarse == other.n_coarse:
             out[self.n_common - self.n_coarse:self.n_common] = v[other.n_common - other.n_coarse:other.n_common]
         at = self.n_common
-        known = other.temperatures(v)
-        for start, T in zip(self.starts, known, strict=True):
-            if start.n_free:
-                n = min(start.mean.size, T.size)
-                out[at:at + n] = (T[:n] - start.mean[:n]) / start.sigma
+        for start, before, T in zip(self.starts, other.starts, other.temperatures(v), strict=True):
+            known = dict(zip(before.names, T.tolist(), strict=True))
+            for i, name in enumerate(start.names if start.n_free else ()):
+                if name in known:
+                    out[at + i] = (known[name] - start.mean[i]) / start.sigma
             at += start.n_free
         n_gains = self.n_own - self.n_starts
         out[out.size - n_gains:] = v[v.size - n_gains:]
@@ -216,7 +214,7 @@ class Structure:
         return system
 
     def temperatures(self, v: Array) -> list[Array]:
-        """Initial lump temperatures of every record [K]; empty for a frequency response."""
+        """Initial temperatures of every record [K], of lumps and lagged thermometers; empty for a frequency response."""
         out, at = [], self.n_common
         for start in self.starts:
             free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0
@@ -227,8 +225,8 @@ class Structure:
     def systems(self, v: Array) -> list[System]:
         """System of every record, with its initial temperatures and session gains; of a response, the common one."""
         system = self.system(v)
-        return [self.sessions.applied(one.started(system, T), g)
-                for one, T, g in zip(self.data, self.temperatures(v), self.gains(v), strict=True)]
+        return [self.sessions.applied(one.started(system, start, T), g)
+                for one, start, T, g in zip(self.data, self.starts, self.temperatures(v), self.gains(v), strict=True)]
 
     def gains(self, v: Array) -> list[Array]:
         """Session gains of every record, in units of their priors; empty for a frequency response."""
@@ -282,7 +280,7 @@ class Structure:
         at, gain_at = self.n_common, v.size - (self.n_own - self.n_starts)
         for one, start in zip(self.data, self.starts, strict=True):
             n_gains = self.sessions.n_free * one.n_sessions
-            yield Unknowns(v, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start.sigma,
+            yield Unknowns(v, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start,
                            slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma,
                            coarse)
             at, gain_at = at + start.n_free, gain_at + n_gains
@@ -310,13 +308,18 @@ class Structure:
 
     def with_effects(self, effects: tuple[Candidate, ...]) -> Structure:
         """The same base with these effects."""
+        system = self._with_typical(effects)
+        if started(system) == started(self._with_typical(self.effects)):
+            return replace(self, effects=effects)
+        starts = tuple(one.initial(system, "free" if start.n_free else "measured")
+                       for one, start in zip(self.data, self.starts, strict=True))
+        return replace(self, effects=effects, starts=starts)
+
+    def _with_typical(self, effects: tuple[Candidate, ...]) -> System:
         system = self.base
         for candidate in effects:
             system = candidate.add(system, candidate.effect.size.typical)
-        starts = tuple(start if start.mean.size == len(system.lumps) else
-                       one.initial(system, "free" if start.n_free else "measured")
-                       for one, start in zip(self.data, self.starts, strict=True))
-        return replace(self, effects=effects, starts=starts)
+        return system
 
     def first(self, n: int) -> Structure:
         """The same on the first samples of every record.

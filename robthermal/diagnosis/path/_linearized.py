@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...fitting import ResponseWhitener
+from ...fitting import Initial, ResponseWhitener
 from ...thermal import System
 from ..data import DataSet, ResponseData
 from ..effects import Candidate, TrialContext
@@ -39,8 +39,8 @@ class Unknowns:
         Their derivatives by the common unknowns.
     start : slice
         Places of the initial temperatures of this data set.
-    start_sigma : float
-        Standard deviation of their prior [K].
+    initial : Initial
+        Their names and prior [K].
     gains : slice
         Places of its session gains.
     gain_names : sequence of str
@@ -58,7 +58,7 @@ class Unknowns:
     names: list[str]
     chain: Array
     start: slice
-    start_sigma: float
+    initial: Initial
     gains: slice
     gain_names: Sequence[str]
     gain_sigma: Sequence[float]

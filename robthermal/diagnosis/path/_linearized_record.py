@@ -184,6 +184,12 @@ class LinearizedRecord:
             common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
             out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
+        initial = unknowns.initial.names if unknowns.initial.n_free else ()
+        J = self.run.derivative([*names, *own, *initial])[:, self.one.columns]
+        out = np.zeros((*J.shape[:2], unknowns.v.size))
+        common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
+        out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
+        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
         out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
         if self.coarse is not None:
