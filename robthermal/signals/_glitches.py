@@ -86,7 +86,7 @@ def median_filter(record: Record, window: float) -> Record:
     for i in range(outputs.shape[1]):
         keep = record.units.get(record.output_names[i]) == "V"
         outputs[:, i] = record.outputs[:, i] if keep else filtered(record.outputs[:, i], samples)
-    return record._changed(outputs=outputs, notes=(*record.notes, filter_note(window, samples)))
+    return record.changed(outputs=outputs, notes=(*record.notes, filter_note(window, samples)))
 
 
 def glitch_rows(column: Array) -> NDArray[np.intp]:

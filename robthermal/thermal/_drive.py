@@ -71,7 +71,10 @@ def start_lumps(eq: Equations, record: Record, initial: Initial) -> Array:
 
 
 def settle(eq: Equations, layout: Layout, z: Array, w: Array, time: float) -> None:
-    """States beside the lumps at the start: lags settled but where it is said otherwise, no memory of the polarity, periodic loads by the clock."""
+    """States beside the lumps at the start.
+
+    Lags are settled unless it is said otherwise, no polarity is remembered, periodic loads go by the clock.
+    """
     for name, state in layout.sensors.items():
         sensor = eq.system.sensors[name]
         z[state] = z[eq.index[sensor.lump]] if sensor.initial is None else sensor.initial

@@ -285,8 +285,8 @@ class Sensor(Part):
                              "temperature, a module a voltage")
         if voltage:
             object.__setattr__(self, "quantity", "voltage")
-        wrong = [key for key in (("time_constant", "delay", "self_heating", "initial") if voltage else ("lead_resistance",))
-                 if getattr(self, key)]
+        of_others = ("time_constant", "delay", "self_heating", "initial") if voltage else ("lead_resistance",)
+        wrong = [key for key in of_others if getattr(self, key)]
         if wrong:
             raise ValueError(f"{wrong[0]} does not belong to a {self.quantity}: "
                              + ("a voltage is read at once and heats nothing" if voltage else

@@ -214,7 +214,7 @@ class Structure:
         return system
 
     def temperatures(self, v: Array) -> list[Array]:
-        """Initial temperatures of every record [K], of lumps and lagged thermometers; empty for a frequency response."""
+        """Initial temperatures of every record [K], of lumps, then lagged thermometers; of a response none."""
         out, at = [], self.n_common
         for start in self.starts:
             free = start.sigma * v[at:at + start.n_free] if start.n_free else 0.0

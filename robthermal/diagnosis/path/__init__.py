@@ -6,12 +6,12 @@ from ._coarseness import coarse_names as coarse_names
 from ._heat_splines import N_SPLINES as N_SPLINES
 from ._heat_splines import heat_splines as heat_splines
 from ._linearize import linearize as linearize
+from ._linearize import linearized_record as linearized_record
 from ._linearize import linearized_records as linearized_records
 from ._linearized import Linearized as Linearized
 from ._linearized import Unknowns as Unknowns
 from ._linearized import White as White
 from ._linearized_record import LinearizedRecord as LinearizedRecord
-from ._linearized_record import linearized_record as linearized_record
 from ._linearized_response import LinearizedResponse as LinearizedResponse
 from ._linearized_response import linearized_response as linearized_response
 from ._whitening import SlowNoise as SlowNoise

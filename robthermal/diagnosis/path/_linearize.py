@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...thermal import System, trajectory
+import numpy as np
+
+from ...errors import InputError
+from ...thermal import System, Trajectory, trajectory
 from ..data import DataSet, RecordData, ResponseData
 from ._linearized import Linearized
-from ._linearized_record import LinearizedRecord, linearized_record
+from ._linearized_record import LinearizedRecord
 from ._linearized_response import linearized_response
 
 
@@ -39,3 +42,14 @@ def linearized_records(paths: Sequence[Linearized]) -> tuple[LinearizedRecord, .
         Models beside all data sets of a fit.
     """
     return tuple(path for path in paths if isinstance(path, LinearizedRecord))
+
+
+def linearized_record(system: System, one: RecordData, run: Trajectory | None = None) -> LinearizedRecord:
+    """Simulate a record, unless it has been, and prepare its linearization."""
+    run = trajectory(system, one.record) if run is None else run
+    columns = [one.record[name] if name in one.record.input_names
+               else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
+    if not np.isfinite(run.lumps).all():
+        raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
+    return LinearizedRecord(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
+                            np.column_stack(columns), run)

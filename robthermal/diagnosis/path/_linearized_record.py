@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from ..._recursion import recursion
 from ..._residual import residual
-from ...errors import InputError
 from ...thermal import Equations, System, Trajectory, trajectory, voltage_slopes
 from ..data import RecordData, ResponseData
 from ..effects import Candidate, Response
 from ._coarseness import coarse_responses
 from ._draw_residuals import draw_residuals
+from ._exact_steps import exact_steps, over_steps
 from ._heat_splines import heat_splines
 from ._linearized import Unknowns
 from ._rates import each, heat_slopes
@@ -295,19 +294,10 @@ class LinearizedRecord:
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array]:
-        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end.
-
-        The mean of a state over a sample has the next φ: that of e^{Mt} is φ₁, of t φ₁(Mt) is φ₂, of t² φ₂(Mt) is φ₃.
-        """
+        """A, and what heat at the start and at the end of a sample [W] leaves in the states at its end."""
         M, kind = self.kinds
         core = M.shape[1] - len(self.means)
-        Mh = M[:, :core, :core] * self.h
-        phi = [expm(Mh)]
-        for factor in (1.0, 1.0, 2.0)[:3 if self.means else 2]:
-            phi.append(np.linalg.solve(Mh, phi[-1] - np.eye(core) / factor))
-        A, phi1, phi2 = (np.concatenate([now, of_mean[:, self.means]], axis=1)
-                         for now, of_mean in zip(phi[:3], phi[1:] if self.means else phi[:3], strict=True))
-        A = np.concatenate([A, np.zeros((*A.shape[:2], len(self.means)))], axis=2)  # every sample from 0
+        A, phi1, phi2 = exact_steps(M[:, :core, :core] * self.h, self.means)
         nl = self.x.shape[1]
         per_watt = self.h / self.equations.capacity
         by_end = phi2[..., :nl] * per_watt
@@ -319,12 +309,12 @@ class LinearizedRecord:
         varies = any(self.system.sensors[name].module for name in self.one.sensors)
         core = self.x.shape[1] + len(self.lags)
         C = np.zeros((len(self.x) if varies else 1, len(self.one.sensors), core + len(self.means)))
-        for i, (name, source) in enumerate(zip(self.one.sensors, self.sources, strict=True)):
-            if source < 0:
+        read = [core + self.means.index(source) for source in self.sources] if self.means else self.sources
+        for i, name in enumerate(self.one.sensors):
+            if read[i] < 0:
                 C[:, i, :self.x.shape[1]] = voltage_slopes(self.equations, name, self.x, self.u)
             else:
-                read = core + self.means.index(source) if self.means else source
-                C[:, i, read] = self.system.sensors[name].gain
+                C[:, i, read[i]] = self.system.sensors[name].gain
         return C if varies else np.broadcast_to(C[0], (len(self.x), *C.shape[1:]))
 
     @cached_property
@@ -379,9 +369,7 @@ class LinearizedRecord:
         for j, response in enumerate(responses):
             if response.reading is not None:
                 read = response.reading[:, self.one.columns]
-                if self.means:  # linear between samples
-                    read = np.concatenate([read[:1], 0.5 * (read[1:] + read[:-1])])
-                out[..., j] += read
+                out[..., j] += over_steps(read) if self.means else read
         return out
 
     def answer(self, start: Array, end: Array) -> Array:
@@ -413,14 +401,3 @@ class LinearizedRecord:
             np.matmul(self.C[some], states[:-1], out=out[some])
             state = states[-1]
         return out
-
-
-def linearized_record(system: System, one: RecordData, run: Trajectory | None = None) -> LinearizedRecord:
-    """Simulate a record, unless it has been, and prepare its linearization."""
-    run = trajectory(system, one.record) if run is None else run
-    columns = [one.record[name] if name in one.record.input_names
-               else np.full(len(one.record), system.ambients[name].temperature) for name in system.exogenous_names]
-    if not np.isfinite(run.lumps).all():
-        raise InputError("the simulation is not finite", where="argument system", remedy="Check its parameters.")
-    return LinearizedRecord(system, one, np.asarray(run.lumps, np.float64), np.asarray(run.readings, np.float64),
-                 np.column_stack(columns), run)
