@@ -68,9 +68,10 @@ class Problem:
     @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the unknowns."""
-        reach = np.full(sum(s.n_free for s in self.starts), REACH)
+        within = [start.within(-np.inf, np.inf, REACH) for start in self.starts]
         q = self.ranges.coordinates
-        return np.concatenate([q(self.ranges.lower), -reach]), np.concatenate([q(self.ranges.upper), reach])
+        return (np.concatenate([q(self.ranges.lower), *(low for low, _ in within)]),
+                np.concatenate([q(self.ranges.upper), *(high for _, high in within)]))
 
     def parameters(self, v: Floats) -> Floats:
         """Parameter values."""

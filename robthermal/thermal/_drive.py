@@ -79,7 +79,8 @@ def settle(eq: Equations, layout: Layout, z: Array, w: Array, time: float) -> No
         sensor = eq.system.sensors[name]
         z[state] = z[eq.index[sensor.lump]] if sensor.initial is None else sensor.initial
     for column, state in layout.drives.items():
-        z[state] = w[column]
+        u = _before(eq, column)
+        z[state] = w[column] if u is None else eq.drives(u)[column]
     for name, sine in layout.periodic.items():
         angle = _angle(eq, name, time)
         z[sine], z[sine + 1] = np.sin(angle), np.cos(angle)
@@ -103,7 +104,7 @@ def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence
             settled = part.initial is None
             out[row, column] = out[eq.index[part.lump], column] if settled else name == f"sensors.{sensor}.initial"
         for drive, row in layout.drives.items():
-            out[row, column] = held[name][0, drive] if name in held else 0.0
+            out[row, column] = _settled_slope(eq, drive, name, held)
         for lump, sine in layout.periodic.items():
             load, angle = eq.system.lumps[lump].periodic, _angle(eq, lump, record.start_time)
             turn = 0.0
@@ -113,6 +114,32 @@ def start_slope(eq: Equations, record: Record, initial: Initial, names: Sequence
                 turn = -2 * np.pi * record.start_time / load.period**2
             out[sine, column], out[sine + 1, column] = turn * np.cos(angle), -turn * np.sin(angle)
     return out
+
+
+def _before(eq: Equations, column: int) -> Array | None:
+    """Exogenous vector with the value that a drive had before the record; None if that is its first one."""
+    before = eq.drives.of[column].before
+    if before is None:
+        return None
+    u = np.zeros(eq.drives.n_u)
+    u[column] = before
+    return u
+
+
+def _settled_slope(eq: Equations, column: int, name: str, held: Mapping[str, Array]) -> float:
+    """Derivative of the start of a lagged drive by a parameter."""
+    u = _before(eq, column)
+    if u is None:
+        return float(held[name][0, column]) if name in held else 0.0
+    if name == _name_of_before(eq, column):
+        return float(eq.drives.slopes(u)[column])
+    slopes = eq.drives.parameter(name, u)
+    return 0.0 if slopes is None else float(slopes[column])
+
+
+def _name_of_before(eq: Equations, column: int) -> str:
+    name = eq.system.exogenous_names[column]
+    return f"{'inputs' if name in eq.system.inputs else 'modules'}.{name}.drive.before"
 
 
 def _lumps_slope(eq: Equations, record: Record, names: Sequence[str], out: Array) -> None:
@@ -132,6 +159,10 @@ def held_slopes(eq: Equations, record: Record, names: Sequence[str], plan: Sched
         dw = eq.drives.parameter(name, plan.u)
         if dw is not None:
             found[name] = dw
+    for column, drive in eq.drives.of.items():
+        if drive.delay and drive.before is not None and (name := _name_of_before(eq, column)) in names:
+            found[name] = np.zeros(plan.w.shape)
+            found[name][:, column] = eq.drives.slopes(plan.u)[:, column] * plan.before(drive.delay)
     for ambient in eq.system.ambients:  # an ambient that the record lacks is a parameter
         name = f"ambients.{ambient}.temperature"
         if name in names and ambient not in record.input_names:

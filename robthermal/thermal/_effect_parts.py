@@ -11,7 +11,7 @@ class Drive(Part):
     """What a heater or an amplifier makes of the value u in its record column.
 
     v = (1 + gain) u + offset, then (1 + gain_slope abs(v)) v - cubic v³, then held within ±clip, then delayed, then
-    lagged. Before the record the column had its first value.
+    lagged. Before the record the column had its first value, unless it is said otherwise.
 
     Parameters
     ----------
@@ -29,6 +29,8 @@ class Drive(Part):
         Pure time delay of the drive [s].
     time_constant : float
         Time constant of the first-order lag [s].
+    before : float, optional
+        Value of the column before the record, for delay and lag [unit of the column]; default its first one.
     """
 
     gain: Finite = 0.0
@@ -38,6 +40,7 @@ class Drive(Part):
     clip: Positive | None = None
     delay: NonNegative = 0.0
     time_constant: NonNegative = 0.0
+    before: Finite | None = None
 
 
 class Hysteresis(Part):

@@ -6,7 +6,8 @@ _OF = {"gain": ("gain of the drive of {0}", "-"), "offset": ("offset of the driv
        "gain_slope": ("slope of the gain of the drive of {0}", "1/unit"),
        "cubic": ("cubic term of the drive of {0}", "1/unit²"),
        "clip": ("limit of the drive of {0}", "unit of the input"),
-       "delay": ("delay of the drive of {0}", "s"), "time_constant": ("lag of the drive of {0}", "s")}
+       "delay": ("delay of the drive of {0}", "s"), "time_constant": ("lag of the drive of {0}", "s"),
+       "before": ("value of {0} before the record", "unit of the input")}
 _DRIVE = {f"drive.{field}": words for field, words in _OF.items()}
 WORDS: dict[str, dict[str, tuple[str, str]]] = {  # by table and key: words and unit
     "ambients": {"temperature": ("temperature of {0}", "K")},

@@ -40,6 +40,10 @@ class Schedule:
     w: Array
     samples: Indices
 
+    def before(self, delay: float) -> NDArray[np.bool_]:
+        """Segments in which a drive is still what it was before the record, by its delay [s]."""
+        return np.floor(self.at - delay / self.lengths[0] + _SAME) < 0
+
 
 def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
     """Segments of a record.
@@ -57,19 +61,26 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
     delays = {column: drive.delay / h for column, drive in eq.drives.of.items() if drive.delay}
     steps = {column: (link.step.time - start) / h for link in eq.system.links if link.step
              for column in [eq.drives.steps[link.name]]}
-    jumps = {column: 1 + np.flatnonzero(np.diff(u[:, column])) for column in delays}  # elsewhere nothing happens
+    jumps = {column: _jumps(u[:, column], eq.drives.of[column].before) for column in delays}  # else nothing happens
     cuts = [jumps[column] + delay for column, delay in delays.items()] + [np.array(list(steps.values()))]
     at = _distinct(np.concatenate([np.arange(n, dtype=float), *cuts]), n)
     lengths, kind = _kinds(np.append(np.diff(at), 1.0))
     held = u[np.floor(at + _SAME).astype(np.intp)]
     for column, delay in delays.items():
         source = np.floor(at - delay + _SAME).astype(np.intp)
-        held[:, column] = u[np.maximum(source, 0), column]
+        before = eq.drives.of[column].before
+        held[:, column] = np.where(source < 0, u[0, column] if before is None else before,
+                                   u[np.maximum(source, 0), column])
     w = eq.drives(held)
     for column, time in steps.items():
         w[:, column] = at >= time - _SAME
     return Schedule(tuple(length * h for length in lengths), at, kind, held, w,
                     np.searchsorted(at, np.arange(n) - _SAME).astype(np.intp))
+
+
+def _jumps(values: Array, before: float | None) -> Array:
+    """Samples at which a column changes, and the first where it had another value before the record."""
+    return np.flatnonzero(np.diff(values, prepend=values[0] if before is None else before))
 
 
 def one_sample(eq: Equations, u: Array, h: float) -> Schedule:

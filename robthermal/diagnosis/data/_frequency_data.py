@@ -17,7 +17,7 @@ from ..effects import Candidate
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-NO_START = Initial(np.zeros(0), 0.0)  # a frequency response has no initial temperatures
+NO_START = Initial(np.zeros(0), np.zeros(0))  # a frequency response has no initial temperatures
 
 
 @dataclass(frozen=True, eq=False)

@@ -163,7 +163,7 @@ class Structure:
             known = dict(zip(before.names, T.tolist(), strict=True))
             for i, name in enumerate(start.names if start.n_free else ()):
                 if name in known:
-                    out[at + i] = (known[name] - start.mean[i]) / start.sigma
+                    out[at + i] = (known[name] - start.mean[i]) / start.sigma[i]
             at += start.n_free
         n_gains = self.n_own - self.n_starts
         out[out.size - n_gains:] = v[v.size - n_gains:]
@@ -188,13 +188,9 @@ class Structure:
 
     @property
     def _starts_within(self) -> tuple[Array, Array]:
-        """Bounds of the initial temperatures, in standard deviations: no farther than a system accepts."""
-        coldest, hottest = [np.zeros(0)], [np.zeros(0)]
-        for start in self.starts:
-            if start.n_free:
-                coldest.append(np.clip((_COLDEST - start.mean) / start.sigma, -_FARTHEST, 0.0))
-                hottest.append(np.clip((_HOTTEST - start.mean) / start.sigma, 0.0, _FARTHEST))
-        return np.concatenate(coldest), np.concatenate(hottest)
+        """Bounds of the initial states, in standard deviations: no farther than a system accepts."""
+        bounds = [start.within(_COLDEST, _HOTTEST, _FARTHEST) for start in self.starts]
+        return np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
 
     @cached_property
     def _warmest(self) -> Array:
