@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .._write import write
+from ..errors import InputError
 from ._modelica_text import Text
 from ._parts import Drive, Input, Link, Module, Sensor
 from ._system import System, equations
@@ -109,6 +110,9 @@ def _driven(text: Text, column: str) -> str:
 def _drive(text: Text, column: str, drive: Drive) -> None:
     if drive == Drive():
         return
+    if drive.before is not None:
+        raise InputError(f"{column} has a value from before the record", where="argument system",
+                         expected="drives that begin with their first value", remedy="Leave drive.before out.")
     u = text[column]
     gain, offset = text.parameter(f"{column}_gain", drive.gain, "1"), text.parameter(f"{column}_offset", drive.offset)
     slope = text.parameter(f"{column}_gain_slope", drive.gain_slope)
