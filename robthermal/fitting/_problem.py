@@ -105,7 +105,7 @@ class Problem:
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
             J: Floats = np.asarray(run.sensitivity[:, one.columns], np.float64)
-            by_start: Floats = np.multiply(J[..., len(flat):], -start.sigma)
+            by_start: Floats = np.multiply(J[..., len(flat):], -start.sigma[:start.n_free])
             by_parameter: Floats = np.multiply(self.ranges.joined(J[..., :len(flat)]), -slopes)
             out.append(Run(residual(one.readings, run.readings[:, one.columns]), by_parameter, by_start))
         return out

@@ -78,7 +78,7 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
                     np.searchsorted(at, np.arange(n) - _SAME).astype(np.intp))
 
 
-def _jumps(values: Array, before: float | None) -> Array:
+def _jumps(values: Array, before: float | None) -> Indices:
     """Samples at which a column changes, and the first where it had another value before the record."""
     return np.flatnonzero(np.diff(values, prepend=values[0] if before is None else before))
 

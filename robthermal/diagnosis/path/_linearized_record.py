@@ -188,7 +188,7 @@ class LinearizedRecord:
         out = np.zeros((*J.shape[:2], unknowns.v.size))
         common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
         out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
-        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma
+        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma[:unknowns.initial.n_free]
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
         out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
         if self.coarse is not None:
