@@ -23,8 +23,8 @@ from ._doubts import (
 )
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
-from ._nearest import nearest
 from ._means import asked_of_means
+from ._nearest import nearest
 from ._refine import refine as refined
 from ._searching import searched
 from .change import NAME, relative

@@ -171,8 +171,7 @@ class LinearizedRecord:
         """
         names, chain = unknowns.names, unknowns.chain
         own = [number for number in unknowns.gain_names if number not in names]
-        initial = ([f"lumps.{lump}.initial" for lump in self.run.system.lumps]
-                   if unknowns.start.stop > unknowns.start.start else [])
+        initial = unknowns.initial.names if unknowns.initial.n_free else ()
         J = self.run.derivative([*names, *own, *initial])
         if not np.array_equal(self.one.columns, np.arange(J.shape[1])):
             J = J[:, self.one.columns]
@@ -182,12 +181,6 @@ class LinearizedRecord:
         else:
             common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
             out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
-        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.start_sigma
-        initial = unknowns.initial.names if unknowns.initial.n_free else ()
-        J = self.run.derivative([*names, *own, *initial])[:, self.one.columns]
-        out = np.zeros((*J.shape[:2], unknowns.v.size))
-        common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
-        out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma[:unknowns.initial.n_free]
         at = [[*names, *own].index(number) for number in unknowns.gain_names]
         out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
