@@ -55,6 +55,12 @@ class Initial:
         return np.where(of_input, -WHOLE, low), np.where(of_input, WHOLE, high)
 
     @property
+    def at_rest(self) -> Initial:
+        """The same where lags are settled and delayed inputs have their first value: of lumps alone."""
+        n = sum(name.startswith("lumps.") for name in self.names)
+        return self if n == self.mean.size else Initial(self.mean[:n], self.sigma[:n], self.names[:n])
+
+    @property
     def n_free(self) -> int:
         """Number of unknowns."""
         return self.mean.size if self.sigma.any() else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -28,6 +29,7 @@ ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of thr
 _ROUNDS = 3  # of filter and noise levels
 _PART = 1500  # samples of a long record that are fitted first
 _LONG = 3  # times as many: a long record
+_CLEAR = 10.0  # of BIC
 _FAR = 3.0  # times the decrease that chance promises: from less the whole record converges as soon
 
 
@@ -88,7 +90,8 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEs
         raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
                          expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
     try:
-        return fitted(structure, structure.start(ranges.start, []), floor, NoiseScaling(1.0, {}))
+        found = fitted(structure, structure.start(ranges.start, []), floor, NoiseScaling(1.0, {}))
+        return found if structure.at_rest().n_own == structure.n_own else extended(found, structure, found.v)
     except Diverged as error:
         raise InputError(f"the nominal model runs away: {error}", where="argument system",
                          remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
@@ -144,9 +147,25 @@ def _fitted(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseS
 
 def extended(fit: Refit, structure: Structure, v: Array, limit: int = LIMIT) -> Refit:
     """Fit another structure with the same filters, so that sums of squares can be compared."""
-    found = minimized(structure, v, fit.whiteners, limit)
+    structure, found = _at_rest(structure, minimized(structure, v, fit.whiteners, limit), fit.whiteners, limit)
     structure.keep_only(found.at.v)
     return replace(fit, structure=structure, v=found.at.v, z=found.at.z, outcome=_outcome(found))
+
+
+def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], limit: int
+             ) -> tuple[Structure, Descent]:
+    """With settled lags at the start of the records, unless these ask for more beyond doubt.
+
+    On a step from rest a lag and a start in motion are hard to tell apart, and most experiments begin at rest.
+    """
+    rest = structure.at_rest()
+    price = (structure.n_own - rest.n_own) * (math.log(structure.n_readings) + _CLEAR)
+    if not price:
+        return structure, found
+    other = minimized(rest, rest.carried(structure, found.at.v, structure.quantities(found.at.v)), whiteners, limit)
+    if float(other.at.z @ other.at.z) < float(found.at.z @ found.at.z) + price:
+        return rest, other
+    return structure, found
 
 
 def coarsened(fit: Refit) -> Refit:

@@ -298,6 +298,10 @@ class Structure:
         J[known.size:, first:] = np.eye(n_free)
         return -np.concatenate([self.ranges.prior(values), v[first:]]), J
 
+    def at_rest(self) -> Structure:
+        """The same where every record begins with settled lags."""
+        return replace(self, starts=tuple(start.at_rest for start in self.starts))
+
     def with_effect(self, candidate: Candidate) -> Structure:
         """The same with one more effect; a new lump gets an initial temperature of its own."""
         return self.with_effects((*self.effects, candidate))
