@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -56,6 +56,7 @@ from ._score import score_of
 from ._whiteness import whiteness_of
 
 Method = Literal["output_error", "prediction_error"]
+_CLEAR = 10.0  # of BIC
 _ROUNDS = 8  # of noise estimation
 _SETTLED = 0.01  # relative change of the noise levels
 _STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
@@ -153,7 +154,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     filtered = method == "prediction_error" and has_disturbance(system)
     if filtered:
         refuse_unknown_noise(levels)
-    solution = _solve(problem, levels, loss, max_iterations, filtered)
+    solution = _from_rest(problem, lambda one: _solve(one, levels, loss, max_iterations, filtered))
     return _result(solution, held_out, compared, initial, loss)
 
 
@@ -166,6 +167,20 @@ class Solution:
     noise: dict[str, float]
     converged: bool
     iterations: int
+
+
+def _from_rest(problem: JointProblem, solved: Callable[[JointProblem], Solution]) -> Solution:
+    """With settled lags at the start of the records, unless these ask for more beyond doubt (by BIC)."""
+    starts = [start.at_rest for start in problem.records.starts]
+    settled = solved(replace(problem, records=replace(problem.records, starts=starts)))
+    more = problem.records.v0.size - settled.v.size
+    if not more:
+        return settled
+    free = solved(problem)
+    records = replace(settled.problem.records, weigh=free.problem.records.weigh)  # the same weights for both
+    costs = [float(np.sum(one.vector(v) ** 2)) for one, v in ((replace(settled.problem, records=records), settled.v),
+                                                              (free.problem, free.v))]
+    return free if costs[0] - costs[1] > more * (np.log(problem.n_numbers) + _CLEAR) else settled
 
 
 def _solve(problem: JointProblem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool

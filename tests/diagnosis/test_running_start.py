@@ -99,6 +99,17 @@ def test_the_start_acts_as_a_record_that_begins_earlier_says() -> None:
     assert np.abs(settled.readings - run.readings[cut:]).max() > 0.05
 
 
+def test_a_step_from_rest_is_fitted_from_rest() -> None:
+    """Lag and motion at the start are hard to tell apart there, and nothing asks for motion."""
+    known = OVEN.with_parameters({"sensors.T_block.time_constant": 100.0})
+    free = {"sensors.T_block.time_constant": (10.0, 500.0), "lumps.block.capacity": (50.0, 800.0)}
+    fit = rt.calibrate(known, log("sensor_lag", 120.0, n=140), parameters=free)
+    assert fit.parameters["sensors.T_block.time_constant"] == pytest.approx(120.0, rel=0.01)
+    assert fit.initial_temperatures[0]["block"] == pytest.approx(ROOM, abs=0.05)
+    moving = rt.calibrate(known, log("sensor_lag", 120.0)[57:], parameters=free)
+    assert moving.parameters["sensors.T_block.time_constant"] == pytest.approx(120.0, rel=0.01)
+
+
 def test_a_voltage_has_no_initial_temperature() -> None:
     with pytest.raises(rt.InputError, match="initial does not belong to a voltage"):
         rt.System(**{**rt.systems.two_module().model_dump(), "sensors": {"V": {"module": "m1", "initial": 300.0}}})
