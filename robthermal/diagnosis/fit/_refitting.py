@@ -156,7 +156,7 @@ def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], l
              ) -> tuple[Structure, Descent]:
     """With settled lags at the start of the records, unless these ask for more beyond doubt.
 
-    On a step from rest a lag and a start in motion are hard to tell apart, and most experiments begin at rest.
+    On a step from rest a lag and a start in motion look much the same, and most experiments begin at rest.
     """
     rest = structure.at_rest()
     price = (structure.n_own - rest.n_own) * (math.log(structure.n_readings) + _CLEAR)
