@@ -154,8 +154,9 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     >>> run = rt.thermal.simulate(bar.with_parameters({"sensors.T.time_constant": 30.0}), drive)
     >>> noisy = run.with_outputs(run.outputs + 0.05 * np.random.default_rng(1).standard_normal((200, 1)))
     >>> found = rt.jobs.diagnose_records(bar, (), [noisy])
+    >>> # of one lump, a lag of the heater looks the same: ambiguous
     >>> found.holds, found.diagnosis.effects[0].label, found.residuals[0].kind
-    (True, 'sensor_lag(T)', 'train')
+    (False, 'sensor_lag(T)', 'train')
     """
     try:
         found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
