@@ -120,7 +120,8 @@ def test_nothing_left_is_nothing_to_split() -> None:
 @pytest.mark.exhaustive
 def test_a_name_that_stands_for_the_split_is_said_to_do_so() -> None:
     """With the lag of a sensor as the only effect to try, that is named beside a remainder: wrongly."""
-    found = rt.diagnose(OVEN, measured(3, n=200), validation=measured(4, n=200), effects=["sensor_lag"], refine=True)
+    found = rt.diagnose(OVEN, measured(9, n=200), validation=measured(10, n=200), effects=["sensor_lag"],
+                        refine=True)
     assert found.verdict == "named_with_remainder" and found.refinement is not None
     assert found.refinement.verdict == "consistent"
     assert "Without any effect: sensor_lag(T_" in found.refinement.outcome.text
