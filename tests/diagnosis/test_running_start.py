@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oven import NOISE, OVEN, ROOM
 from scipy.linalg import expm
 
 import robthermal as rt
 
-ROOM, STEP, NOISE, FINE = 295.0, 10.0, 0.02, 10
-OVEN = rt.System(
-    name="oven", ambients={"room": {"temperature": ROOM}},
-    lumps={"block": {"capacity": 200.0}, "plate": {"capacity": 150.0}},
-    links=[{"between": ("block", "plate"), "conductance": 1.5}, {"between": ("plate", "room"), "conductance": 0.8},
-           {"between": ("block", "room"), "conductance": 0.2}],
-    inputs={"q": {"lump": "block", "limits": (0.0, 20.0)}, "p": {"lump": "plate", "limits": (0.0, 20.0)}},
-    sensors={"T_block": {"lump": "block", "noise": NOISE}, "T_plate": {"lump": "plate", "noise": NOISE}},
-    fit={"lumps.block.capacity": {"lower": 50.0, "upper": 800.0},
-         "links.block-plate.conductance": {"lower": 0.2, "upper": 10.0},
-         "links.plate-room.conductance": {"lower": 0.1, "upper": 5.0}})
+STEP, FINE = 10.0, 10
 FEW = ["sensor_lag", "input_lag", "input_delay", "conductance_step", "condensation", "hidden_mass"]
 
 

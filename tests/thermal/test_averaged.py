@@ -4,20 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oven import OVEN, ROOM
 from scipy.linalg import expm
 
 import robthermal as rt
 
-ROOM, STEP = 295.0, 60.0
-OVEN = rt.System(
-    name="oven", ambients={"room": {"temperature": ROOM}},
-    lumps={"block": {"capacity": 200.0}, "plate": {"capacity": 150.0}},
-    links=[{"between": ("block", "plate"), "conductance": 1.5}, {"between": ("plate", "room"), "conductance": 0.8},
-           {"between": ("block", "room"), "conductance": 0.2}],
-    inputs={"q": {"lump": "block"}, "p": {"lump": "plate"}},
-    sensors={"T_block": {"lump": "block", "noise": 0.02}, "T_plate": {"lump": "plate", "noise": 0.02}},
-    fit={"lumps.block.capacity": {"lower": 50.0, "upper": 800.0},
-         "links.block-plate.conductance": {"lower": 0.2, "upper": 10.0}})
+STEP = 60.0
 
 
 def steps(n: int, seed: int) -> np.ndarray:
@@ -126,6 +118,17 @@ def test_a_diagnosis_of_means_compares_with_means() -> None:
     assert 'averaged = "after"' in found.means and found.means in found.outcome.text
     declared = rt.diagnose(OVEN, rt.signals.as_means(raw, "after"), effects=few)
     assert declared.verdict == "consistent" and declared.means == ""
+
+
+def test_a_long_log_of_means_is_asked_by_its_first_part_and_then_as_a_whole() -> None:
+    u = steps(4200, 7)
+    raw = log(u, means(u, 0.0) + 0.02 * np.random.default_rng(7).standard_normal((4200, 2)))
+    found = rt.diagnose(OVEN, raw, effects=["heat_source"])
+    assert found.verdict == "unexplained" and 'averaged = "after"' in found.means
+    late = rt.thermal.simulate(OVEN.with_parameters({"inputs.q.drive.delay": 20.0}), raw.select(outputs=[]))
+    noisy = late.with_outputs(late.outputs + 0.02 * np.random.default_rng(8).standard_normal((4200, 2)))
+    right = rt.diagnose(OVEN, noisy, effects=["input_delay"])
+    assert right.verdict == "named" and right.effects[0].where == ("q",) and right.means == ""
 
 
 @pytest.mark.exhaustive
