@@ -18,13 +18,14 @@ from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
 from ._equations import Equations
 from ._fixed_point import HOTTEST, FixedPoint
 from ._layout import Layout
-from ._march import Marching, holds, library
+from ._march import Marching, holds, library, march
 from ._ports import PortHeat
 from ._schedule import Schedule
 from ._terms import Array
 
 WINDOW = 16
 FINEST = 14  # a sample is halved at most this many times
+_MIXED = 512  # segments of several lengths in one recursion: each brings its own matrices
 _TAIL = 20.0  # the last kept coefficients are at least this much larger than what is cut off (measured: 1000 times)
 
 
@@ -139,9 +140,8 @@ class Integrator:
         k, level = 0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
             while k < n - 1:
-                if not self.nq and (whole := _whole(plan, k)):
-                    self._advance_linear(z, plan, k, whole)
-                    k += whole
+                if not self.nq:
+                    k += self._advance_linear(z, plan, k)
                     continue
                 if level == 0 and (done := self._advance_samples(z, plan, k)):
                     k += done
@@ -151,13 +151,18 @@ class Integrator:
         return _path(z, refined)
 
     def _advance_samples(self, z: Array, plan: Schedule, k: int) -> int:
-        """Whole samples from segment k on while that is easy: how many were computed."""
-        march = self.compiled(0, 0)
-        if march is not None:
-            stop = k + _whole(plan, k)
-            return march(z[k:stop + 1], plan.w[k:stop])
+        """Segments from k on while that is easy: how many were computed."""
+        if (marched := self._march(z[k:], plan.kind[k:-1], plan.w[k:-1])) is not None:
+            return marched[0]
         whole = len(plan.w) - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
         return WINDOW if whole and self._advance_window(z, plan.w, k) else 0
+
+    def _march(self, z: Array, kind: NDArray[np.intp], w: Array, level: int = 0) -> tuple[int, float] | None:
+        """Compiled steps of lengths[kind] / 2**level: how many, and their worst last coefficients; None: not built."""
+        lengths = [self.compiled(one, level) for one in range(len(self.lengths))]
+        if any(one is None for one in lengths):
+            return None
+        return march([one for one in lengths if one is not None], kind, z, w)
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:
         matrices, gain, fixed = self.window()
@@ -170,15 +175,22 @@ class Integrator:
         z[k + 1:k + 1 + WINDOW] = (base[rows:] + matrices.M[rows:] @ q.ravel()).reshape(WINDOW, self.nz)
         return True
 
-    def _advance_linear(self, z: Array, plan: Schedule, k: int, whole: int) -> None:
-        """Whole samples without nonlinear heats: one recursion."""
-        step, stop = self.step(0, 0), k + whole
-        driven = plan.w[k:stop] @ step.Ku.T
-        steady = np.broadcast_to(step.K, (whole, *step.K.shape))
-        z[k:stop + 1] = recursion(steady, driven[..., None], z[k][:, None])[..., 0]
+    def _advance_linear(self, z: Array, plan: Schedule, k: int) -> int:
+        """Segments from k on without nonlinear heats, as one recursion: how many were computed."""
+        whole = _whole(plan, k)
+        stop = k + whole if whole else min(k + _MIXED, len(z) - 1)
+        kind = plan.kind[k:stop]
+        steps = [self.step(one, 0) for one in range(1 if whole else len(self.lengths))]
+        if whole:
+            A, driven = np.broadcast_to(steps[0].K, (whole, self.nz, self.nz)), plan.w[k:stop] @ steps[0].Ku.T
+        else:
+            A = np.stack([one.K for one in steps])[kind]
+            driven = np.einsum("sij,sj->si", np.stack([one.Ku for one in steps])[kind], plan.w[k:stop])
+        z[k:stop + 1] = recursion(A, driven[..., None], z[k][:, None])[..., 0]
         hot = np.flatnonzero(~(np.abs(z[k:stop + 1, :len(self.eq.capacity)]).max(axis=1) < HOTTEST))
         if hot.size:
             self._give_up(z[k + hot[0]], plan.at[k + hot[0]] * self.lengths[0])
+        return stop - k
 
     def _advance_segment(self, z: Array, plan: Schedule, k: int, level: int, refined: dict[int, Array]) -> int:
         """One segment in 2**level steps, refined as needed; return the level to start the next one with."""
@@ -199,6 +211,11 @@ class Integrator:
         return level - 1 if level and tail < _TAIL * self.tolerance / 300 else level
 
     def _try_segment(self, start: Array, w: Array, kind: int, level: int) -> tuple[Array, float] | None:
+        """States of a segment in 2**level steps, and their worst last coefficients [K]; None where it needs more."""
+        steps, z = 2**level, np.empty((2**level + 1, self.nz))
+        z[0] = start
+        if (marched := self._march(z, np.full(steps, kind), np.repeat(w, steps, axis=0), level)) is not None:
+            return (z, marched[1]) if marched[0] == steps else None
         step, gain, fixed = self.step(kind, level), self.gain(kind, level), self.fixed(kind, level)
         nodes = DEGREE * self.ports.size
         states, worst = [start], 0.0

@@ -1,4 +1,4 @@
-/* One sample of exponential collocation after the other, for small systems: what _exponential.py does with numpy; and
+/* One segment of exponential collocation after the other, for small systems: what _exponential.py does with numpy; and
  * the derivatives of many samples, what _sensitivity.py does.
  *
  * Called through _march.py, which checks sizes. The heats of a sample are found by the fixed point T = base + M q(T) at
@@ -167,8 +167,8 @@ static void add(const double *A, const double *x, int64_t rows, int64_t columns,
     }
 }
 
-/* Whether the heats of a sample are smooth: their last coefficients are worth little. */
-static int smooth(const problem *at, const double *q)
+/* What the last coefficients of the heats of a sample are worth [K]: little where the heats are smooth. */
+static double roughness(const problem *at, const double *q)
 {
     double worst = 0.0;
     for (int64_t j = 0; j < at->n_q; j++) {
@@ -181,7 +181,7 @@ static int smooth(const problem *at, const double *q)
         }
         worst = fmax(worst, sum * at->gain[j]);
     }
-    return worst <= at->roughest;
+    return worst;
 }
 
 /* Heats q at all nodes of a sample from z, where the temperatures there are V; 0 where the fixed point is not found.
@@ -224,13 +224,17 @@ static int fixed_point(const problem *at, const double *z, const double *w, doub
     return 0;
 }
 
-/* One sample from z to the n_z numbers after it; 0 where it is left to the caller. */
-static int sample(const problem *at, const double *z, const double *w, double *end)
+/* One sample from z to the n_z numbers after it; 0 where it is left to the caller. worst: its roughness, if larger. */
+static int sample(const problem *at, const double *z, const double *w, double *end, double *worst)
 {
     const int64_t nodes = DEGREE * at->n_ports, columns = NODES * at->n_q;
     double V[NODES * MOST], q[NODES * MOST], base[DEGREE * MOST + MOST];
-    if (!fixed_point(at, z, w, V, q, base) || !smooth(at, q))
+    if (!fixed_point(at, z, w, V, q, base))
         return 0;
+    const double rough = roughness(at, q);
+    if (!(rough <= at->roughest))
+        return 0;
+    *worst = fmax(*worst, rough);
     memcpy(end, base + nodes, sizeof(double) * at->n_z);
     add(at->M + nodes * columns, q, at->n_z, columns, end);
     return 1;
@@ -357,13 +361,16 @@ int64_t robthermal_derivatives(const problem *at)
     return at->count;
 }
 
-/* Samples that were computed, at most `count`. */
-int64_t robthermal_march(const problem *at)
+/* Segments that were computed, at most `count` of the first: segment k is as long as a step of kinds[kind[k]].
+ * worst: the largest roughness of them. */
+int64_t robthermal_march(const problem *kinds, const int64_t *kind, double *worst)
 {
-    if (!fits(at))
+    const int64_t count = kinds->count, n_z = kinds->n_z, n_w = kinds->n_w;
+    *worst = 0.0;
+    if (!fits(kinds))
         return 0;
-    for (int64_t k = 0; k < at->count; k++)
-        if (!sample(at, at->z + k * at->n_z, at->w + k * at->n_w, at->z + (k + 1) * at->n_z))
+    for (int64_t k = 0; k < count; k++)
+        if (!sample(kinds + kind[k], kinds->z + k * n_z, kinds->w + k * n_w, kinds->z + (k + 1) * n_z, worst))
             return k;
-    return at->count;
+    return count;
 }

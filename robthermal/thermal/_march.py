@@ -6,13 +6,14 @@ Sizes, types and layout of every array are made here, for the other side trusts 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._library import library as compiled_from
 from ._collocation import DEGREE, TAIL, Step
@@ -26,19 +27,20 @@ _MOST, _MOST_PORTS, _NUMBERS = 64, 12, 8  # as in the source
 _FINEST = 1e-11  # K: below it a change of a temperature is rounding
 _CLOSER = 0.01  # of the change at which numpy stops: one iteration more costs little here
 
-March = Callable[[Any], int]  # of a pointer to a problem: samples that were computed
+March = Callable[..., int]  # of a pointer to a problem: samples that were computed
 
 
 @dataclass(frozen=True)
 class Steps:
-    """Functions of the library, each of a pointer to a problem.
+    """Functions of the library.
 
     Parameters
     ----------
     march : callable
-        Computes samples, and says how many.
+        Of problems, one for each length of a segment, and which of them every segment is: computes segments, and says
+        how many.
     derivatives : callable
-        Differentiates samples, and says how many.
+        Of a pointer to a problem: differentiates samples, and says how many.
     """
 
     march: March
@@ -86,17 +88,18 @@ def library(folder: Path = SOURCE.parent) -> Steps | None:
     found = compiled_from(SOURCE, folder)
     if found is None:
         return None
-    size, *both = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
-    size.restype = ctypes.c_int64
+    size, march, derivatives = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
+    for function in (size, march, derivatives):
+        function.restype = ctypes.c_int64
     if size() != ctypes.sizeof(_Problem):
         return None
-    for function in both:
-        function.restype, function.argtypes = ctypes.c_int64, [ctypes.POINTER(_Problem)]
-    return Steps(*both)
+    march.argtypes = [ctypes.POINTER(_Problem), ctypes.c_void_p, ctypes.POINTER(ctypes.c_double)]
+    derivatives.argtypes = [ctypes.POINTER(_Problem)]
+    return Steps(march, derivatives)
 
 
 class Marching:
-    """Steps of one length, one after the other.
+    """Steps of one length.
 
     Parameters
     ----------
@@ -121,15 +124,7 @@ class Marching:
         self._arrays = [np.ascontiguousarray(a, float) for a in (step.K, step.Ku, step.M)]
         self._arrays += [np.ascontiguousarray(a, np.int64) for a in (heat.ports, pairs)]
         self._arrays += [np.ascontiguousarray(a, float) for a in (numbers, _in_pairs(heat), gain, TAIL)]
-        self._limits = max(_CLOSER * goal, _FINEST), roughest, hottest
-
-    def __call__(self, z: Array, w: Array) -> int:
-        """Fill the states z (count + 1, n_z) after the first with the drives w (count, n_w); how many were computed."""
-        n_z, n_w = self._size[:2]
-        if z.shape != (len(w) + 1, n_z) or w.shape[1] != n_w or z.dtype != float or not z.flags.c_contiguous:
-            raise ValueError("states and drives do not fit")
-        held = np.ascontiguousarray(w, float)
-        return self._built.march(ctypes.byref(self._problem(held, z)))
+        self._of_step = (*(one.ctypes.data for one in self._arrays), max(_CLOSER * goal, _FINEST), roughest, hottest)
 
     def linearized(self, z: Array, w: Array, n_free: int) -> Linearized | None:
         """Steps from states z (S, n_z) with drives w (S, n_w) and their derivatives; None where one does not converge.
@@ -147,8 +142,35 @@ class Marching:
         return out if self._built.derivatives(ctypes.byref(problem)) == S else None
 
     def _problem(self, w: Array, z: Array, *rest: int) -> _Problem:
-        return _Problem(*self._size, len(w), *(one.ctypes.data for one in self._arrays), *self._limits, w.ctypes.data,
-                        z.ctypes.data, *rest)
+        return _Problem(*self._size, len(w), *self._of_step, w.ctypes.data, z.ctypes.data, *rest)
+
+
+def march(lengths: Sequence[Marching], kind: NDArray[np.intp], z: Array, w: Array) -> tuple[int, float]:
+    """Compute the states after the first, segment by segment.
+
+    How many were computed, and what the last coefficients of the heats are worth at most in these [K].
+
+    Parameters
+    ----------
+    lengths : sequence of Marching
+        Steps of every length that segments have, all of one system.
+    kind : ndarray of int, shape (count,)
+        Which of them every segment is.
+    z : ndarray, shape (count + 1, n_z)
+        States; filled after the first.
+    w : ndarray, shape (count, n_w)
+        Drives.
+    """
+    first, count = lengths[0], len(kind)
+    n_z, n_w = first._size[:2]
+    if z.shape != (count + 1, n_z) or w.shape != (count, n_w) or z.dtype != float or not z.flags.c_contiguous:
+        raise ValueError("states and drives do not fit")
+    if not count or not 0 <= kind.min() <= kind.max() < len(lengths):
+        raise ValueError("no segments, or of another length")
+    held, kinds = np.ascontiguousarray(w, float), np.ascontiguousarray(kind, np.int64)
+    problems = (_Problem * len(lengths))(*(one._problem(held, z) for one in lengths))
+    worst = ctypes.c_double()
+    return first._built.march(problems, kinds.ctypes.data, ctypes.byref(worst)), worst.value
 
 
 def holds(heat: PortHeat, n_z: int) -> bool:

@@ -41,8 +41,8 @@ def lumps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     def simulated(system: rt.System, record: rt.Record, tolerance: float, built: bool) -> tuple[np.ndarray, list[int]]:
         counts: list[int] = []
 
-        def counted(problem: Any) -> int:
-            counts.append(found.march(problem))
+        def counted(*problem: Any) -> int:
+            counts.append(found.march(*problem))
             return counts[-1]
 
         monkeypatch.setattr(_exponential, "library", lambda: replace(found, march=counted) if built else None)
@@ -74,11 +74,18 @@ def test_a_tight_tolerance_is_met(every: rt.System, drive: Any, lumps: Any) -> N
     np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-9)
 
 
-def test_samples_that_are_too_long_are_left_to_numpy(every: rt.System, drive: Any, lumps: Any) -> None:
-    """As that in the middle of which the conductance changes."""
-    record = drive(60, system=every, sample_time=1.0)
+def test_samples_that_are_too_long_are_halved(every: rt.System, drive: Any, lumps: Any) -> None:
+    record = drive(60, system=every, sample_time=8.0)
     (exact, _), (here, counts) = lumps(every, record, 1e-8, False), lumps(every, record, 1e-4, True)
-    assert 0 < sum(counts) < 59
+    assert 0 in counts and {2, 4} & set(counts)  # a sample that is not computed as a whole, and its halves
+    np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
+
+
+def test_samples_of_a_delayed_current_are_computed_in_parts(every: rt.System, drive: Any, lumps: Any) -> None:
+    every = every.with_parameters({"modules.tem.drive.delay": 0.7})
+    record = drive(80, system=every, sample_time=0.25)
+    (exact, _), (here, counts) = lumps(every, record, 1e-9, False), lumps(every, record, 1e-4, True)
+    assert max(counts) > 100  # two parts of a sample, in one call
     np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
 
 
@@ -123,7 +130,10 @@ def test_sizes_that_do_not_fit_are_refused(full: rt.System) -> None:
     for states, drives in ((z[:-1], w), (z[:, :-1], w), (z, w[:, 1:]), (np.zeros((11, 2 * by.nz))[:, ::2], w),
                            (z.astype(np.float32), w)):
         with pytest.raises(ValueError, match="do not fit"):
-            march(states, drives)
+            _march.march([march], np.zeros(10, int), states, drives)
+    for kinds in (np.zeros(0, int), np.full(10, 1), np.full(10, -1)):
+        with pytest.raises(ValueError, match="no segments, or of another length"):
+            _march.march([march], kinds, z[:len(kinds) + 1], w[:len(kinds)])
     for states, drives, n_free in ((z[:9], w, 3), (z[:, :-1], w, 3), (z[:10], w[:, 1:], 3), (z[:10], w, by.nz + 1)):
         with pytest.raises(ValueError, match="do not fit"):
             march.linearized(states, drives, n_free)
@@ -137,14 +147,15 @@ def test_numpy_takes_what_the_library_does_not_hold(full: rt.System, monkeypatch
     assert not _march.holds(heat, 10)
 
 
-def test_a_sample_without_a_fixed_point_is_left_to_numpy(full: rt.System) -> None:
+def test_a_sample_without_a_fixed_point_is_not_computed(full: rt.System) -> None:
     """At a current of a megaampere."""
     by = _exponential.Integrator(rt.thermal.Equations(full), (1.0,))
     march = _march.Marching(compiled.steps(), by.port_heat, by.step(0, 0), by.gain(0, 0), 1e-7, 1e-3, 3000.0)
     z, w = np.full((2, by.nz), 300.0), np.tile(by.eq.drives(by.eq.nominal()), (2, 1))
     assert march.linearized(z, w, 4) is not None
     w[1, by.eq.drives.column["tem"]] = 1e6
-    assert march.linearized(z, w, 4) is None and march(np.full((3, by.nz), 300.0), w) == 1
+    assert march.linearized(z, w, 4) is None
+    assert _march.march([march], np.zeros(2, int), np.full((3, by.nz), 300.0), w)[0] == 1
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:

@@ -99,6 +99,31 @@ offset = -0.2
     assert rt.thermal.simulate(system, record)["T"] == pytest.approx(300 + 1.1 * lagged - 0.2, abs=2e-4)
 
 
+def test_linear_network_with_delayed_heaters_is_that_of_shifted_inputs_on_a_finer_grid():
+    """600 samples, more than one recursion takes; delays that are multiples of 0.2 s."""
+    n, delays = 600, {"q": 3.4, "p": 1.2}
+    values = np.random.default_rng(0).uniform(0.0, 40.0, (n, 2))
+
+    def system(**delay):
+        return rt.System(
+            ambients={"room": {"temperature": 295.0}}, lumps={f"x{i}": {"capacity": 30.0} for i in range(3)},
+            links=[{"between": ("x0", "x1"), "conductance": 2.0}, {"between": ("x1", "x2"), "conductance": 2.0},
+                   {"between": ("x0", "room"), "conductance": 0.5}],
+            inputs={name: {"lump": lump, "drive": {"delay": delay.get(name, 0.0)}} for name, lump in
+                    (("q", "x2"), ("p", "x0"))}, sensors={"T0": {"lump": "x0"}, "T2": {"lump": "x2"}})
+
+    def simulated(system, inputs, sample_time):
+        record = rt.Record(sample_time=sample_time, inputs=inputs, outputs=np.zeros((len(inputs), 0)),
+                           input_names=["q", "p"], output_names=[])
+        return rt.thermal.simulate(system, record).outputs
+
+    fine = np.repeat(values, 5, axis=0)
+    for column, delay in enumerate(delays.values()):
+        late = round(delay / 0.2)
+        fine[:, column] = np.concatenate([np.full(late, fine[0, column]), fine[:-late, column]])
+    assert simulated(system(**delays), values, 1.0) == pytest.approx(simulated(system(), fine, 0.2)[::5], abs=1e-8)
+
+
 @pytest.mark.exhaustive
 def test_sensitivities_are_the_derivatives_of_the_simulation(full, drive):
     record = drive(14)
