@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -274,19 +275,36 @@ def heard() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
-    child = subprocess.Popen([sys.executable, "-c", CHILD, "demo", "--out", "out"], cwd=tmp_path, env=environment(),
+def interrupted(folder: Path, when: Callable[[], None]) -> str:
+    """What a demo says that is interrupted from outside."""
+    child = subprocess.Popen([sys.executable, "-c", CHILD, "demo", "--out", "out"], cwd=folder, env=environment(),
                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                              preexec_fn=heard)  # noqa: PLW1509
     assert child.stdout is not None and child.stdout.readline() == "ready\n"
-    time.sleep(2.5)  # in the middle of the job, which takes several times as long
+    when()
     child.send_signal(signal.SIGINT)
     sent = time.monotonic()
     _, said = child.communicate(timeout=60)
     assert time.monotonic() - sent < 20
     assert child.returncode == 130
+    return said
+
+
+def test_interrupt_by_signal_leaves_nothing(tmp_path: Path) -> None:
+    said = interrupted(tmp_path, lambda: time.sleep(0.3))  # during the first stage, before it keeps anything
     assert said == "robthermal: interrupted; nothing was written\n"
     assert everything(tmp_path) == set()
+
+
+def test_interrupt_between_stages_keeps_what_is_finished_and_nothing_else(tmp_path: Path) -> None:
+    def kept() -> None:
+        while all(path.name.startswith("part-") for path in tmp_path.glob("out/.cache/*")):
+            time.sleep(0.01)
+
+    said = interrupted(tmp_path, kept)
+    assert said == "robthermal: interrupted; finished stages are kept in out: the same command goes on from there\n"
+    assert "calibrated.toml" in {path.name for path in (tmp_path / "out").iterdir()}
+    assert {path.name for path in (tmp_path / "out" / ".cache").iterdir()} == {"calibrate.json"}
 
 
 def test_an_interrupt_that_python_loses_ends_the_job_at_its_next_step() -> None:

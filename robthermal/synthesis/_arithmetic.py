@@ -19,6 +19,7 @@ from .._arrays import Array
 
 _LARGE = 80  # states above which the sign function replaces the Schur form, in floats
 _STEPS = 80  # of the sign function, which converges quadratically
+_ROUNDING = 1e-14  # of a column: what is left where two products cancel
 _ZERO = 1e-11  # of a solution in floats, in balanced coordinates: nothing but rounding
 _ASYMMETRY = 1e-5  # of a solution, relative: above it the invariant subspace was not the right one
 
@@ -31,6 +32,9 @@ class Arithmetic(Protocol):
 
     def inv(self, matrix: Array) -> Array:
         """Inverse; LinAlgError where there is none."""
+
+    def difference(self, left: Array, right: Array) -> Array:
+        """left - right, what is only rounding set to zero: its sign would decide whether a solution is definite."""
 
     def orthogonal(self, matrix: Array) -> tuple[Array, Array]:
         """Q, R with matrix = Q [R; 0], Q orthogonal and square."""
@@ -47,6 +51,10 @@ class Floats:
 
     def inv(self, matrix: Array) -> Array:
         return np.linalg.inv(matrix)
+
+    def difference(self, left: Array, right: Array) -> Array:
+        found = left - right
+        return np.where(abs(found) <= _ROUNDING * np.linalg.norm(right, axis=0), 0.0, found)
 
     def orthogonal(self, matrix: Array) -> tuple[Array, Array]:
         Q, R = np.linalg.qr(matrix, mode="complete")
@@ -105,6 +113,9 @@ class Balls:
             return _from_balls(_to_balls(matrix).inv())
         except ZeroDivisionError:
             raise np.linalg.LinAlgError("singular to the working precision") from None
+
+    def difference(self, left: Array, right: Array) -> Array:
+        return left - right  # its rounding is far below `zero` of the solution
 
     def orthogonal(self, matrix: Array) -> tuple[Array, Array]:
         """Gram-Schmidt, twice, with unit vectors where the columns end."""

@@ -96,8 +96,8 @@ def _equation(A: Array, B1: Array, B2: Array, C1: Array, D11: Array, n_u: int, s
     except np.linalg.LinAlgError:
         return None
     n = len(A)
-    H = np.block([[A - B @ gain[:, :n], -B @ gain[:, n:]],
-                  [C1.T @ (D @ gain[:, :n]) - C1.T @ C1, -A.T + C1.T @ D @ gain[:, n:]]])
+    weight = C1.T @ arithmetic.difference(D @ gain[:, :n], C1)
+    H = np.block([[A - B @ gain[:, :n], -B @ gain[:, n:]], [weight, -A.T + C1.T @ D @ gain[:, n:]]])
     return arithmetic.riccati(H)
 
 

@@ -159,7 +159,7 @@ def march(lengths: Sequence[Marching], kind: NDArray[np.intp], z: Array, w: Arra
     z : ndarray, shape (count + 1, n_z)
         States; filled after the first.
     w : ndarray, shape (count, n_w)
-        Drives.
+        Drives, constant over every segment.
     """
     first, count = lengths[0], len(kind)
     n_z, n_w = first._size[:2]

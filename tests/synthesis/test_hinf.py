@@ -13,6 +13,9 @@ from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.errors import InputError
+from robthermal.synthesis._arithmetic import Floats
+from robthermal.synthesis._central import regular, solutions
+from robthermal.synthesis._plant import balanced, read_generalized
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data" / "compleib"
 
@@ -33,6 +36,15 @@ def test_published_optima(P, optimum):
     d = rt.design.hinf(P, 1, 1)
     assert optimum * (1 - 1e-6) < d.value < 1.005 * optimum and abs(d.lower / optimum - 1) < 1e-3
     assert proven(d, P)
+
+
+@pytest.mark.parametrize("factor", np.linspace(0.8, 1.2, 7))
+def test_rounding_does_not_decide_whether_there_is_a_solution(factor):
+    """w reaches y directly, so Y is zero at every level: its rounding must not count as a sign."""
+    P = mixed_sensitivity(1.0)
+    own = regular(balanced(read_generalized(factor * P, 1, 1)), Floats())
+    levels = factor * 1.365925 * np.geomspace(1.001, 3, 40)
+    assert all(solutions(own, level, Floats()) is not None for level in levels)
 
 
 def test_optimum_of_one_state_in_closed_form():
