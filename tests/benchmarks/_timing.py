@@ -25,11 +25,12 @@ def best_of(run: Callable[[], Result], *, repeats: int = 3) -> tuple[float, Resu
 
 
 def processor() -> str:
-    """Name of the processor, how many of its cores this machine has, and its kind."""
+    """Name of the processor, its family and model, how many of its cores this machine has, and its kind."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        name = next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
+        lines = (line.partition(":") for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines())
+        found = {key.strip(): value.strip() for key, _, value in lines}
+        name = f"{found['model name']} (family {found['cpu family']}, model {found['model']})"
+    except (OSError, KeyError):
         name = platform.processor() or "unnamed processor"
     return f"{name}, {os.cpu_count()} cores, {platform.machine()}"
 
