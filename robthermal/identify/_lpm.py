@@ -106,7 +106,7 @@ def undetermined_inputs(response: Array, frequencies: Array, names: Sequence[str
     """What to say about inputs without power (or not distinguishable) in some bins; refuses those without any."""
     notes: list[str] = []
     lost: list[str] = []
-    if not np.isnan(np.vdot(response, response)):
+    if not np.isnan(np.vdot(response[0], response[0])):  # an input that is lost is so for all outputs
         return notes  # the sum is a number, so all are: half the passes
     for i, name in enumerate(names):
         missing = np.isnan(response[:, i]).any(axis=0)
