@@ -43,15 +43,19 @@ class ResponseWhitener:
     factor: Complex
     n_outputs: int
 
-    def __call__(self, r: Array) -> Array:
-        """Whiten; real and imaginary parts of variance one."""
+    def __call__(self, r: Array, out: Array | None = None) -> Array:
+        """Whiten, into `out` of the same shape if it is given; real and imaginary parts of variance one."""
         n, m = self.roots.shape[:2]
         flat = as_complex(r.reshape(2 * n, m, -1))
         z = np.sqrt(2.0) * (self.roots @ flat)  # circular noise: half the variance in either part
         if self.factor.size:
             columns = z.reshape(n * m // self.n_outputs, -1)
             z = scipy.linalg.solve_triangular(self.factor, columns, lower=True).reshape(n, m, -1)
-        return as_real(z).reshape(r.shape)
+        white = as_real(z).reshape(r.shape)
+        if out is None:
+            return white
+        out[...] = white
+        return out
 
 
 def as_real(z: Complex) -> Array:

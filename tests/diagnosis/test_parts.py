@@ -8,12 +8,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import lsq_linear, nnls
 
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
-from robthermal.diagnosis.fit import descend
-from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_record, whitener
+from robthermal.diagnosis.fit import descend, orthonormal, turned
+from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_record, settled, whitener
 
 
 def machine(plate: bool = False) -> rt.System:
@@ -226,3 +227,54 @@ def test_an_effect_at_its_declared_limit_is_mostly_detected(plant: rt.System, hi
         again = rt.diagnosis.score(rt.diagnosis.refit(plant, noisy), ["sensor_gain"])
         seen += bool(again.p_value[0] < 0.01)
     assert seen >= 10
+
+
+@pytest.mark.parametrize("condition", [1.0, 1e3, 1e7, 1e12])
+@pytest.mark.parametrize("left", [1.0, 0.0])
+def test_a_small_problem_has_the_answers_of_the_long_one(condition: float, left: float) -> None:
+    """By products of columns where they are apart, by reflections where they are not, or nothing of z is left."""
+    rng = np.random.default_rng(5)
+    U, V = (np.linalg.qr(rng.standard_normal(shape))[0] for shape in ((1300, 9), (9, 9)))
+    J = U * np.geomspace(1.0, 1.0 / condition, 9) @ V * np.geomspace(1e-4, 1e5, 9)
+    z = left * rng.standard_normal(1300) + J @ (rng.standard_normal(9) / np.linalg.norm(J, axis=0))
+    R, right = turned(J, z)
+    assert R.shape == (10, 9) and right.shape == (10,)
+    for _ in range(5):
+        a = rng.standard_normal(9) / np.linalg.norm(J, axis=0)
+        assert np.linalg.norm(right - R @ a) == pytest.approx(np.linalg.norm(z - J @ a), rel=1e-9)
+    long, small = (np.linalg.lstsq(columns / np.linalg.norm(J, axis=0), target, rcond=None)[0]
+                   for columns, target in ((J, z), (R, right)))
+    np.testing.assert_allclose(small, long, atol=1e-15 * min(condition, 1e5)**2 * condition * np.abs(long).max())
+
+
+def test_columns_that_vanish_are_turned_too() -> None:
+    J = np.column_stack([np.arange(1.0, 31.0), np.zeros(30)])
+    R, right = turned(J, np.ones(30))
+    assert np.linalg.norm(right - R @ [0.1, 7.0]) == pytest.approx(np.linalg.norm(1.0 - J @ [0.1, 7.0]))
+
+
+def test_an_orthonormal_basis_leaves_out_what_is_flat() -> None:
+    rng = np.random.default_rng(6)
+    J = rng.standard_normal((800, 5)) * np.geomspace(1e-6, 1e6, 5)
+    J = np.column_stack([J, J @ rng.standard_normal(5), np.zeros(800)])
+    basis = orthonormal(J, 1e-9)
+    assert basis.shape == (800, 5)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(5), atol=1e-13)
+    np.testing.assert_allclose((J - basis @ (basis.T @ J)) / np.abs(J).max(), 0.0, atol=1e-13)
+
+
+def test_the_settled_covariance_solves_the_riccati_equation() -> None:
+    """Against the equation itself, and scipy's solution by eigenvalues."""
+    rng = np.random.default_rng(7)
+    for _ in range(40):
+        n, s = rng.integers(1, 9), rng.integers(1, 4)
+        M = rng.standard_normal((n, n))
+        A = expm(-(M @ M.T + 1e-3 * np.eye(n)) * rng.uniform(1e-3, 1.0))
+        C, R = rng.standard_normal((s, n)), np.diag(10.0 ** rng.uniform(-6.0, 0.0, s))
+        Q = np.diag(10.0 ** rng.uniform(-8.0, 0.0, n) * (rng.random(n) < 0.7) + 1e-12)
+        P = settled(A, C, R, Q)
+        kept = P - P @ C.T @ np.linalg.solve(C @ P @ C.T + R, C @ P)
+        np.testing.assert_allclose(A @ kept @ A.T + Q, P, atol=1e-9 * np.abs(P).max())
+        np.testing.assert_allclose(P, solve_discrete_are(A.T, C.T, Q, R), atol=1e-6 * np.abs(P).max())
+    with pytest.raises(np.linalg.LinAlgError, match="does not settle"):
+        settled(np.eye(1) * 1.1, np.zeros((1, 1)), np.eye(1), np.eye(1))

@@ -2,7 +2,6 @@
 
 from ._descent import Point as Point
 from ._descent import descend as descend
-from ._descent import turned as turned
 from ._noise_scaling import LARGEST_FACTOR as LARGEST_FACTOR
 from ._noise_scaling import WIDE as WIDE
 from ._noise_scaling import NoiseScaling as NoiseScaling
@@ -23,6 +22,8 @@ from ._sessions import Sessions as Sessions
 from ._sessions import sessions_of as sessions_of
 from ._structure import Structure as Structure
 from ._structure import structure_of as structure_of
+from ._turned import orthonormal as orthonormal
+from ._turned import turned as turned
 from ._unknown_ambients import FoundAmbient as FoundAmbient
 from ._unknown_ambients import found_ambients as found_ambients
 from ._unknown_ambients import too_warm as too_warm
@@ -31,5 +32,5 @@ from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
-           "fitted", "found_ambients", "only_heated", "refit", "relinearized", "sessions_of", "structure_of",
-           "too_warm", "turned", "with_slow_part", "with_unknown_ambients"]
+           "fitted", "found_ambients", "only_heated", "orthonormal", "refit", "relinearized", "sessions_of",
+           "structure_of", "too_warm", "turned", "with_slow_part", "with_unknown_ambients"]

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtpqrt
 
 from ...errors import Diverged, InputError
+from ._turned import turned
 
 Array = NDArray[np.float64]
 _FLAT = 1e-10  # relative singular value that is rounding
@@ -19,8 +19,6 @@ _DAMPINGS = tuple(10.0**power for power in range(-2, 6))  # relative to the squa
 _LESS = 0.1  # factor on a damping that was not needed
 _NONE = 1e-7  # damping below which the full step is tried
 _WORTH = 0.05  # of the decrease that the linearization predicts: less is left to a larger damping
-_ROWS = 512  # turned at once: they stay in the cache
-_COLUMNS = 8  # of them in one product
 _AS_PREDICTED = 0.75  # of the predicted decrease: the model is nearly linear along the step, which may be longer
 
 
@@ -63,33 +61,6 @@ class Point:
     def small(self) -> tuple[Array, Array]:
         """Derivatives (p + 1, p) and residuals (p + 1,) turned so that all other rows are 0: for linear problems."""
         return turned(self.J, self.z)
-
-
-def turned(J: Array, z: Array) -> tuple[Array, Array]:
-    """Columns J (m, p) and z (m,) turned so that all but the first p + 1 rows are 0: |z - J a| is the same for every a.
-
-    Some rows at a time below the triangle that is left of those before (Golub and Van Loan 2013, section 5.2.2): a
-    whole record does not fit into a cache.
-
-    Parameters
-    ----------
-    J : ndarray, shape (m, p)
-        Columns of a least-squares problem.
-    z : ndarray, shape (m,)
-        Its right side.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (p + 1, p) and (p + 1,)
-    """
-    size = J.shape[1] + 1
-    R = np.zeros((size, size), order="F")
-    for first in range(0, len(J), _ROWS):
-        some = slice(first, first + _ROWS)
-        rows = np.empty((len(z[some]), size), order="F")
-        rows[:, :-1], rows[:, -1] = J[some], z[some]
-        R = dtpqrt(0, min(_COLUMNS, size), R, rows, overwrite_a=1, overwrite_b=1)[0]
-    return R[:, :-1], R[:, -1]
 
 
 @dataclass(frozen=True, eq=False)

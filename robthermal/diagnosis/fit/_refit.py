@@ -19,6 +19,7 @@ from ..path import Linearized, LinearizedRecord, White, linearized_records
 from ._noise_scaling import NoiseScaling
 from ._sessions import session_table
 from ._structure import Structure
+from ._turned import orthonormal
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
@@ -96,10 +97,7 @@ class Refit:
     @cached_property
     def basis(self) -> Array:
         """Orthonormal basis (m, r) of what the unknowns can explain."""
-        J = self.J[:, ~self.structure.at_warmest(self.v)]
-        scale = np.linalg.norm(J, axis=0)
-        U, s, _ = np.linalg.svd(J / np.where(scale > 0, scale, 1.0), full_matrices=False)
-        return U[:, s > _FLAT * s[0]]
+        return orthonormal(self.J[:, ~self.structure.at_warmest(self.v)], _FLAT)
 
     @cached_property
     def rest(self) -> Array:

@@ -36,6 +36,11 @@ class Whitened:
 
     def slopes(self, v: Array) -> Array:
         """Derivatives (m, p) of the model."""
-        each = zip(self.structure.slopes(v), self.whiteners, strict=True)
-        return np.concatenate([*(white(slopes).reshape(-1, v.size) for slopes, white in each),
-                               self.structure.prior(v)[1]])
+        prior = self.structure.prior(v)[1]
+        J, row = np.empty((self.structure.n_readings + len(prior), v.size)), 0
+        for slopes, white in zip(self.structure.slopes(v), self.whiteners, strict=True):
+            rows = slopes.shape[0] * slopes.shape[1]
+            white(slopes, J[row:row + rows].reshape(slopes.shape))
+            row += rows
+        J[row:] = prior
+        return J

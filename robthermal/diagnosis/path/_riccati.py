@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _SHORTEST = 32  # samples of a block: below, a loop over the samples is as fast
+_DOUBLINGS = 60  # more samples than any record has
+_SETTLED = 1e-13  # relative change
+_UNBOUNDED = 1e60  # K², beyond any temperature
 
 
 def filtered(A: Array, C: Array, R: Array, Q: Array, P: Array) -> tuple[Array, Array]:
@@ -40,6 +43,32 @@ def filtered(A: Array, C: Array, R: Array, Q: Array, P: Array) -> tuple[Array, A
         P = a @ (P - weighed @ weighed.swapaxes(1, 2)) @ a.swapaxes(1, 2) + q
         P = 0.5 * (P + P.swapaxes(1, 2))
     return gains.reshape(-1, n_z, n_s)[:n], roots.reshape(-1, n_s, n_s)[:n]
+
+
+def settled(A: Array, C: Array, R: Array, Q: Array) -> Array:
+    """Covariance (n_z, n_z) to which that of the prediction settles: the same step doubled until it no longer changes.
+
+    Parameters
+    ----------
+    A, C, R, Q : ndarray, shapes (n_z, n_z), (n_s, n_z), (n_s, n_s), (n_z, n_z)
+        Transition, sensors, covariances of the readings' noise and of what every sample adds.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Where it grows without limit.
+    """
+    one, a, g, h = np.eye(len(A)), A, C.T @ np.linalg.solve(R, C), Q
+    for _ in range(_DOUBLINGS):
+        W = np.linalg.inv(one + h @ g)
+        passed, through = W @ a, a @ W
+        added = through @ h @ a.T
+        a, g, h = a @ passed, g + a.T @ g @ passed, h + 0.5 * (added + added.T)
+        if not np.abs(h).max() < _UNBOUNDED:
+            break
+        if np.abs(added).max() <= _SETTLED * np.abs(h).max():
+            return h
+    raise np.linalg.LinAlgError("the covariance of the prediction does not settle")
 
 
 def spread(A: Array, Q: Array) -> Array:

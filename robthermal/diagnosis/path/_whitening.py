@@ -9,10 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm, solve_discrete_are
+from scipy.linalg import block_diag, expm
 
 from ...thermal import Equations
-from ._riccati import filtered, spread
+from ._riccati import filtered, settled, spread
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -111,15 +111,24 @@ class Whitener:
     gains: Array
     roots: Array
 
-    def __call__(self, r: Array) -> Array:
-        """Whiten along time."""
+    def __call__(self, r: Array, out: Array | None = None) -> Array:
+        """Whiten along time, into `out` of the same shape if it is given: columns of a long record are copied once."""
         flat = r.reshape(*r.shape[:2], -1)
-        if not self.gains.any():
-            return (self.roots @ flat).reshape(r.shape)
-        out = np.empty(flat.shape)
-        for first in range(0, flat.shape[2], _COLUMNS):
-            out[..., first:first + _COLUMNS] = self._filtered(flat[..., first:first + _COLUMNS])
-        return out.reshape(r.shape)
+        z = np.empty(flat.shape) if out is None else out.reshape(flat.shape)
+        if self._scale is not None:
+            np.multiply(self._scale, flat, out=z)
+        else:
+            for first in range(0, flat.shape[2], _COLUMNS):
+                z[..., first:first + _COLUMNS] = self._filtered(flat[..., first:first + _COLUMNS])
+        return z.reshape(r.shape)
+
+    @cached_property
+    def _scale(self) -> Array | None:
+        """What every reading is multiplied by, (n, n_sensors, 1); None where readings are combined."""
+        diagonal = np.einsum("kii->ki", self.roots)
+        if self.gains.any() or np.count_nonzero(self.roots) > np.count_nonzero(diagonal):
+            return None
+        return np.ascontiguousarray(diagonal[:, :, None])
 
     def _filtered(self, r: Array) -> Array:
         (n, n_sensors, columns), n_z = r.shape, self.A.shape[1]
@@ -220,7 +229,7 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
     Q, R = gathered(path, disturbance, M), np.diag(noise**2)
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
-    P = solve_discrete_are(A.T, C.T, Q, R)
+    P = settled(A, C, R, Q)
     S = C @ P @ C.T + R
     gain = P @ C.T @ np.linalg.inv(S)
     poles, V = np.linalg.eig(A - A @ gain @ C)  # x(k+1) = (A - A K C) x + A K r, mode by mode
