@@ -52,6 +52,23 @@ def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Nam
     return said
 
 
+def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
+    """Where a lag is named beside a remainder: lumps whose body may take that time itself, a sentence each.
+
+    Parameters
+    ----------
+    system : System
+        With the lumps of heaters and sensors.
+    effects : sequence of tuple
+        Named effects with their places, and what the records cannot tell from them.
+    """
+    lumps = [system.inputs[where[0]].lump if name == "input_lag" else system.sensors[where[0]].lump
+             for name, where in effects if name in ("input_lag", "sensor_lag")]
+    return [f"A lag at {lump} may also be the time that heat takes within {lump}, from where it enters to the "
+            f"thermometer: see whether a network with {lump} split in two does as well."
+            for lump in dict.fromkeys(filter(None, lumps))]
+
+
 def periods_undecided(rounds: Sequence[Accepted], remainder: bool) -> list[str]:
     """Where records of different times leave several periods possible, a sentence each.
 

@@ -26,6 +26,7 @@ from .search import (
     revise,
     revised,
     with_neighbors,
+    with_other_end,
     without,
 )
 
@@ -222,11 +223,11 @@ def _with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Se
     """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
 
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
-    was accepted; the same effect at neighboring lumps is added there. A rival with which the validation data keep their
-    gap could not be named itself, and is none.
+    was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there. A rival with
+    which the validation data keep their gap could not be named itself, and is none.
     """
     if finer.structure.n_coarse:
-        return replace(state, rounds=tuple(map(with_neighbors, state.rounds)))
+        return replace(state, rounds=tuple(with_other_end(with_neighbors(one)) for one in state.rounds))
     rounds = []
     for place, round_ in enumerate(state.rounds):
         less = without(state.fit, place, finer, round_.before)

@@ -20,6 +20,7 @@ from ._doubts import (
     may_drift,
     periods_undecided,
     place_undecided,
+    within_the_body,
 )
 from ._graded import evidence_of, graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
@@ -211,6 +212,10 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said = [judged.means] if judged.means else []
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
+    if judged.plain is not None:
+        listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)
+                  for name in (one.key, *others)]
+        said += within_the_body(nominal.system, listed)
     if verdict in ("named", "named_with_remainder", "ambiguous"):
         said += periods_undecided(state.rounds, verdict != "named")
     said += held_ambients(nominal)

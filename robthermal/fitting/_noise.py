@@ -16,6 +16,9 @@ from ._data import Data
 Loss = Literal["linear", "soft_l1", "huber"]
 LOSSES = ("linear", "soft_l1", "huber")
 _SMALLEST = {"K": 1e-4, "V": 1e-6}  # the simulation's own truncation (of modules of 10 mV/K): nothing is known better
+_STILL = 0.1  # part of the readings that equal the one before, where readings are rounded to steps
+_SOON = 10  # samples from one resting reading to the next: farther apart, the temperature has moved
+_STEPS = 5  # of them at least
 _TUNING = 1.345  # Huber (1964): 95 % efficient for Gaussian noise
 
 
@@ -48,10 +51,37 @@ def _given(used: list[str], noise: Mapping[str, float] | float | None) -> dict[s
 
 def quantum(readings: Floats) -> float:
     """Step of a quantized reading [K or V], 0 if it is not quantized."""
-    levels = np.unique(np.round(readings, 9))
+    rounded = np.round(readings, 9)
+    return _step_between_rests(rounded) or _usual_gap(rounded)
+
+
+def _step_between_rests(readings: Floats) -> float:
+    """Step from one resting reading to the next, 0 where they are neither even nor between the same few readings.
+
+    A log with jitter is interpolated to its grid: where two neighbors are equal they are still what was read.
+    """
+    still = np.flatnonzero(readings[1:] == readings[:-1]) + 1
+    if still.size < _STILL * readings.size:
+        return 0.0
+    steps = np.abs(np.diff(readings[still]))
+    steps = steps[(steps > 0.0) & (np.diff(still) <= _SOON)]
+    if steps.size < _STEPS:
+        return 0.0
+    step = float(np.quantile(steps, 0.25, method="lower"))
+    even = np.allclose(steps / step, np.round(steps / step), atol=1e-4)
+    return step if even or 2 * np.unique(readings[still]).size <= steps.size + 1 else 0.0
+
+
+def _usual_gap(readings: Floats) -> float:
+    """Usual gap between neighboring values, each counted as often as it was read; 0 where few values repeat."""
+    levels, counts = np.unique(readings, return_counts=True)
     if levels.size < 2 or 4 * levels.size > readings.size:
         return 0.0
-    return float(np.median(np.diff(levels)))
+    gaps = np.diff(levels)
+    weights = np.minimum(counts[1:], counts[:-1])  # a fast rise skips levels: a gap there is no step
+    order = np.argsort(gaps)
+    total = np.cumsum(weights[order])
+    return float(gaps[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def smallest_noise(system: System, name: str) -> float:

@@ -127,7 +127,7 @@ def _of_reading(system: System, name: str, y: Array, one: Data) -> Iterator[str]
         yield (f"{place} changes at every {every}th sample only: its readings are held, which looks like missing "
                f"physics. Keep one sample in {every}, {every * one.record.sample_time:.4g} s apart.")
         return
-    if quantum(y):  # steps repeat by themselves
+    if quantum(y) or _repeated(y) > _OFTEN:  # steps repeat by themselves
         return
     for extreme, what in ((y.max(), "largest"), (y.min(), "smallest")):
         share = float(np.mean(y == extreme))
@@ -135,6 +135,12 @@ def _of_reading(system: System, name: str, y: Array, one: Data) -> Iterator[str]
             yield (f"{place} is at its {what} reading, {_shown(system, name, float(extreme))}, in {share:.0%} of the "
                    "samples: saturated? What it does not show looks like missing physics. Cut these parts out.")
             return
+
+
+def _repeated(y: Array) -> float:
+    """Part of the samples that repeat the one before, other than at either end of the range."""
+    same = y[1:][y[1:] == y[:-1]]
+    return float(np.sum((same > y.min()) & (same < y.max()))) / y.size
 
 
 def _held_for(y: Array) -> int:

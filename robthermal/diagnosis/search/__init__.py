@@ -14,6 +14,7 @@ from ._joint_sets import refit_set as refit_set
 from ._neighbors import ALIKE as ALIKE
 from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
+from ._other_end import with_other_end as with_other_end
 from ._periods import between_trials as between_trials
 from ._periods import other_periods as other_periods
 from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
@@ -41,5 +42,5 @@ __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", 
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
            "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods", "quantities_of",
            "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise", "revised",
-           "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_wider_noise", "without",
-           "without_contradicted"]
+           "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
+           "with_wider_noise", "without", "without_contradicted"]

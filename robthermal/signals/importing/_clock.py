@@ -29,7 +29,10 @@ _NAMES = (
     "elapsed",
     "elapsed time",
     "seconds",
+    "millis",
+    "milliseconds",
 )  # with a blank for every "/", "_", "-" and "&"
+_MILLISECONDS = ("millis", "milliseconds")  # headers that are their unit, as microcontrollers call their clock
 _PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
 
 
@@ -53,7 +56,7 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
     if options.time is not None:
         asked = (options.time,) if isinstance(options.time, str) else options.time
         return tuple(_place(table, name) for name in asked)
-    names = [re.sub(r"[\s_/&-]+", " ", split_header(header)[0]).strip().lower() for header in table.headers]
+    names = [_plain(header) for header in table.headers]
     free = [
         k
         for k, header in enumerate(table.headers)
@@ -115,10 +118,17 @@ def time_reader(source: Source, places: tuple[int, ...], options: ImportOptions)
         return date_reader(table, places, most, options)
     header = table.headers[places[0]]
     unit = table.units[places[0]] if table.units and table.units[places[0]].strip("-") else split_header(header)[1]
+    if unit is None and _plain(header) in _MILLISECONDS:
+        unit = "ms"
     cells: Any = table.columns[places[0]]
     if cells.dtype.kind == "O" and unit is not None and unit_of(unit) is None:
         unit = None  # "Time [dd.mm.yyyy]" says how the text looks, which the text itself says
     return stamp_reader(table, places, most, unit, options)
+
+
+def _plain(header: str) -> str:
+    """Name of a header without its unit, with a blank for every sign between words: `millis()` is `millis`."""
+    return re.sub(r"[\s_/&-]+", " ", split_header(header)[0]).strip().lower().removesuffix("()")
 
 
 def _place(table: Table, name: str) -> int:
@@ -140,6 +150,8 @@ def _in_seconds(header: str) -> bool:
     unit = split_header(header)[1]
     found = unit_of(unit) if unit is not None else None
     bare = re.sub(r"[\W_]+", "", split_header(header)[0]).lower()
+    if unit is None and bare in _MILLISECONDS:
+        return True
     return (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit")) or (
         found is not None and found.quantity == "time"
     )

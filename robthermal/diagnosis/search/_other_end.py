@@ -1,0 +1,62 @@
+"""A lag of a heater or of the thermometer of its lump: where the model is not exact, both are listed.
+
+Every other sensor sees a lag of the heater and none of the thermometer. That difference is of the size of what the
+lump's inside does to it, and the refit of the other lag, which starts where there is none, may end far from its best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ...errors import Diverged, InputError
+from ...thermal import System
+from ..effects import Candidate, candidates
+from ..fit import Refit, extended
+from ._decide import Accepted
+from ._neighbors import ALIKE
+from ._short_list import Entry, delta_bic
+
+_LAGS = ("input_lag", "sensor_lag")
+_TIME = "time_constant"
+
+
+def with_other_end(round_: Accepted) -> Accepted:
+    """List beside a lag that of the other end of its lump, refitted from the same time, if it does nearly as much.
+
+    Parameters
+    ----------
+    round_ : Accepted
+        Effect accepted beside a network that may be too coarse.
+    """
+    best, before = round_.best, round_.before
+    if best.candidate.effect.name not in _LAGS:
+        return round_
+    known = {entry.candidate.key for entry in round_.contenders}
+    others = [one for one in before.testable(candidates(before.structure.base, _LAGS))
+              if one.key not in known and _ends_of_a_lump(before.structure.base, one, best.candidate)]
+    try:
+        own = _refitted(best, best.candidate, before) if others else before
+        fits = [(one, _refitted(best, one, before)) for one in others]
+    except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
+        return round_
+    listed = tuple(Entry(one, fit, delta_bic(before, fit), best.p_value) for one, fit in fits
+                   if before.rss - fit.rss > ALIKE * (before.rss - own.rss))
+    return replace(round_, contenders=(*round_.contenders, *listed))
+
+
+def _refitted(best: Entry, candidate: Candidate, before: Refit) -> Refit:
+    """The fit before with one of the lags, from the time constant and the parameters of the accepted one."""
+    found = best.fit.structure
+    values = {one.key: value for fit in (before, best.fit)  # the later fit need not have all effects of the earlier one
+              for one, value in zip(fit.structure.effects, fit.structure.quantities(fit.v), strict=True)}
+    structure = before.structure.with_effect(candidate)
+    at = [*(values[one.key] for one in before.structure.effects),
+          {**candidate.shape, _TIME: values[best.candidate.key][_TIME]}]
+    return extended(before, structure, structure.carried(found, best.fit.v, at))
+
+
+def _ends_of_a_lump(system: System, one: Candidate, other: Candidate) -> bool:
+    """Whether one of two lags is of a heater, the other of a thermometer, of the same lump."""
+    ends = {candidate.effect.name: candidate.where[0] for candidate in (one, other)}
+    heater, sensor = system.inputs.get(ends.get("input_lag", "")), system.sensors.get(ends.get("sensor_lag", ""))
+    return heater is not None and sensor is not None and heater.lump == sensor.lump
