@@ -135,6 +135,10 @@ def _along(obs: Observer, record: Record, initial: ArrayLike | None) -> Estimate
     if missing:
         raise InputError(f"the record has no column {missing[0]!r}", where="argument record",
                          expected="the observer's sensors and every heater and current")
+    if record.averaged:
+        raise InputError("the readings are means over every sample", where="argument record",
+                         expected="readings at the samples: a mean is half a sample late, and attenuates",
+                         remedy="Log samples to see what the observer will do on the machine.")
     if abs(record.sample_time - model.sample_time) > 1e-9 * model.sample_time:
         raise InputError(f"the record is sampled every {record.sample_time:g} s", where="argument record",
                          expected=f"{model.sample_time:g} s", remedy="Design the observer for this sample time.")

@@ -14,20 +14,25 @@ from .._write import whole_file
 from ..errors import InputError
 from ._checks import channel_names
 from ._names import suggestion
+from ._stated import KEY, comment
 from ._units import kelvin_to_celsius
 
 if TYPE_CHECKING:
     from ._record import Record
 
+_MEANS = "readings"  # rows of a record of means: readings over the step before, inputs from the stamp on
 _SHOWN_NAME = 24  # characters of a channel name in the table on the screen
 
 
 def frame(record: Record) -> pd.DataFrame:
-    """Columns time, inputs, outputs."""
+    """Columns time, inputs, outputs; that readings are means stands in `attrs`."""
     if "time" in record.names:
         raise InputError("a channel is called 'time'", where="record", remedy="Rename it: that column holds the time.")
     columns = {"time": record.time} | {name: np.array(record[name]) for name in record.names}
-    return pd.DataFrame(columns)
+    table = pd.DataFrame(columns)
+    if record.averaged:
+        table.attrs[KEY] = _MEANS
+    return table
 
 
 def summary(record: Record) -> str:
@@ -82,6 +87,9 @@ def save_records(records: Sequence[Record], path: str | Path, temperature_unit: 
     path = Path(path)
     if any(record.names != records[0].names for record in records):
         raise InputError("the parts have different channels", where="argument records", expected="the same in all")
+    if any(record.averaged != records[0].averaged for record in records):
+        raise InputError("some parts hold means, others do not", where="argument records", expected="the same in all",
+                         remedy="Save them in files of their own.")
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise InputError(
@@ -89,7 +97,7 @@ def save_records(records: Sequence[Record], path: str | Path, temperature_unit: 
         )
     table = pd.concat([_in_unit(record, frame(record), temperature_unit, temperatures) for record in records])
     with whole_file(path) as part:
-        writer(table, part, path)
+        writer(table, part, path, _MEANS if records[0].averaged else "")
 
 
 def _in_unit(record: Record, table: pd.DataFrame, unit: str, temperatures: Sequence[str] | None) -> pd.DataFrame:
@@ -119,7 +127,7 @@ def _in_unit(record: Record, table: pd.DataFrame, unit: str, temperatures: Seque
     return table
 
 
-def _write_csv(table: pd.DataFrame, part: Path, path: Path) -> None:
+def _write_csv(table: pd.DataFrame, part: Path, path: Path, averaged: str) -> None:
     for name in table.columns:
         if name != name.strip() or any(sign in name for sign in ',;\t"\r\n#[]'):
             raise InputError(
@@ -127,16 +135,19 @@ def _write_csv(table: pd.DataFrame, part: Path, path: Path) -> None:
                 where=f"{path}",
                 remedy="Rename it: no separators, quotes, '#', brackets or outer spaces.",
             )
-    table.to_csv(part, index=False, lineterminator="\n", encoding="utf-8")
+    with part.open("w", encoding="utf-8", newline="") as file:
+        file.write(comment(averaged) if averaged else "")
+        table.to_csv(file, index=False, lineterminator="\n")
 
 
-def _write_parquet(table: pd.DataFrame, part: Path, path: Path) -> None:
+def _write_parquet(table: pd.DataFrame, part: Path, path: Path, averaged: str) -> None:
     pyarrow, parquet = require_pyarrow()
-    arrow = pyarrow.table({name: table[name].to_numpy() for name in table.columns})
+    arrow = pyarrow.table({name: table[name].to_numpy() for name in table.columns},
+                          metadata={KEY: averaged} if averaged else None)
     parquet.write_table(arrow, part)
 
 
-def _write_matlab(table: pd.DataFrame, part: Path, path: Path) -> None:
+def _write_matlab(table: pd.DataFrame, part: Path, path: Path, averaged: str) -> None:
     for name in table.columns:
         if not (name.isidentifier() and name.isascii() and name[0] != "_" and len(name) <= 63):
             raise InputError(
@@ -144,7 +155,10 @@ def _write_matlab(table: pd.DataFrame, part: Path, path: Path) -> None:
                 where=f"{path}",
                 remedy="Use letters, digits and underscores, or save as .csv.",
             )
-    columns = {name: table[name].to_numpy() for name in table.columns}
+    if averaged and KEY in table.columns:
+        raise InputError(f"a channel is called {KEY!r}", where=f"{path}",
+                         remedy="Rename it: in a file of means that variable says so.")
+    columns = {name: table[name].to_numpy() for name in table.columns} | ({KEY: averaged} if averaged else {})
     with part.open("wb") as file:
         scipy.io.savemat(file, columns, do_compression=True, oned_as="column", long_field_names=True)
 

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
-
 from ..errors import InputError
 from ._record import Record
-
-Averaged = Literal["before", "after", "readings"]
-MEANS = get_args(Averaged)
+from ._stated import MEANS, Averaged
 
 
 def as_means(record: Record, averaged: Averaged) -> Record:

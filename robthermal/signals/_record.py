@@ -48,7 +48,6 @@ class Record:
         Channel name to unit. Temperatures are in kelvin: ``"K"``.
     averaged : bool, optional
         Whether outputs are means over the sample before t_k, as loggers that average record them; default: read at t_k.
-        A file that is saved does not say it.
     name : str, optional
         Name of the record, as reports show it.
     notes : sequence of str, optional
@@ -266,7 +265,8 @@ class Record:
         Parameters
         ----------
         path : str or Path
-            ``.csv``, ``.parquet`` or ``.mat``. Names, numbers and time are written; units, name and notes are not.
+            ``.csv``, ``.parquet`` or ``.mat``. Names, numbers and time are written, and that readings are means over
+            the sample before, in words that `read_record` finds; units, name and notes are not.
         temperature_unit : {"K", "degC"}, optional
             Unit of the temperatures in the file.
         temperatures : sequence of str, optional

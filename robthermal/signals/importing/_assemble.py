@@ -11,6 +11,7 @@ import numpy as np
 from .._glitches import filter_note, filtered, glitch_rows, window_samples
 from .._means import as_means
 from .._record import Record
+from .._stated import KEY
 from ._columns import Channel, SystemLike
 from ._options import Declared
 from ._parts import Part
@@ -64,11 +65,7 @@ def make_records(
     for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
         _freeze(matrix)
     averaged = choice.record.averaged
-    if averaged:
-        text = ("readings are means over the step before their stamp, as declared" if averaged == "readings" else
-                f"every value is the mean over the step {averaged} its stamp, as declared: readings stand where their "
-                "step ends, inputs where theirs begins")
-        table.actions.append(Action("averaged", len(parts), text))
+    say_averaged(table, len(parts), choice)
     say_dropped(table, values, time)
     report = make_report(source, table, clock, time, values, parts, glitches, choice, system)
     said = [action.text for action in table.actions if action.what in _LOUD]
@@ -96,6 +93,18 @@ def make_records(
         for k, (part, (U, Y)) in enumerate(zip(parts, made, strict=True))
     )
     return tuple(as_means(record, averaged) if averaged else record for record in records)
+
+
+def say_averaged(table: Table, n_parts: int, choice: Declared) -> None:
+    """Say of values that are means over which step, and who says so."""
+    averaged, who = choice.record.averaged, "the file says" if table.facts.get(KEY) else "declared"
+    if averaged:
+        text = (f"readings are means over the step before their stamp, as {who}" if averaged == "readings" else
+                f"every value is the mean over the step {averaged} its stamp, as {who}: readings stand where their "
+                "step ends, inputs where theirs begins")
+        if any(action.what == "resampled" for action in table.actions):
+            text += "; means over steps of unequal length are interpolated like samples, so they are means only nearly"
+        table.actions.append(Action("averaged", n_parts, text))
 
 
 def _say_glitches(table: Table, part: Part, channel: Channel, column: Array) -> int:

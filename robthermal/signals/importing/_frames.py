@@ -12,6 +12,7 @@ import numpy as np
 
 from ..._pandas import pd
 from ...errors import InputError
+from .._stated import KEY, of_value
 from ._table import Lines, Table
 
 
@@ -77,9 +78,8 @@ def frame_table(frame: pd.DataFrame, where: str, first_row: int = 0) -> Table:
     elif index.name is not None and pd.api.types.is_numeric_dtype(index):
         headers.insert(0, str(index.name))
         columns.insert(0, np.asarray(index, float))
-    return Table(
-        where, tuple(headers), columns, Lines(np.arange(first_row, first_row + len(frame))), facts={"rows": len(frame)}
-    )
+    facts = {"rows": len(frame), KEY: of_value(frame.attrs.get(KEY))}
+    return Table(where, tuple(headers), columns, Lines(np.arange(first_row, first_row + len(frame))), facts=facts)
 
 
 def plain_column(column: pd.Series[Any]) -> Any:

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._glitches import glitch_rows
-from ._assemble import make_report, say_dropped
+from .._stated import KEY
+from ._assemble import make_report, say_averaged, say_dropped
 from ._cells import NumberReader, take_codes
 from ._clock import time_columns, time_reader
 from ._columns import Channel
 from ._open import open_source
-from ._options import Declared, declared
+from ._options import Declared, declared, with_own_word
 from ._report import Import, ImportedColumn
 from ._shorten import short_errors
 from ._table import Source
@@ -59,6 +60,7 @@ def inspect(
         choice = declared(*tables, (options, {}, "arguments"))
         opened = open_source(source, choice.record)
         table = opened.table
+        choice = with_own_word(choice, choice, table.facts.get(KEY, ""), table.where)
         time = time_columns(table, choice.record, frozenset())
         numeric = [
             k
@@ -71,6 +73,7 @@ def inspect(
         parts = find_parts(table, clock, alone, choice)
         if table.lines is not before:  # rows that repeat a time are gone
             values.keep(np.isin(before.numbers(), table.lines.numbers()))
+        say_averaged(table, len(parts), choice)
         say_dropped(table, values, time)
         glitches = {c.name: sum(_glitches(values.column(c)[part.rows]) for part in parts) for c in values.channels}
         report = make_report(source, table, clock, time, values, parts, glitches, choice, None)

@@ -10,8 +10,8 @@ from zoneinfo import ZoneInfo
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from ...errors import InputError
-from .._means import Averaged
 from .._names import suggestion
+from .._stated import Averaged
 from .._thermistor import Thermistor
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -114,8 +114,8 @@ class ImportOptions(_Table):
 
     @property
     def least(self) -> int:
-        """Samples that a part needs: of means the first input and the last reading go."""
-        return max(self.shortest, 3) if self.averaged else self.shortest
+        """Samples that a part needs: where inputs are means too, the first input and the last reading go."""
+        return max(self.shortest, 3) if self.averaged in ("before", "after") else self.shortest
 
     @field_validator("delimiter")
     @classmethod
@@ -206,6 +206,37 @@ def declared(*places: tuple[Mapping[str, Any], Mapping[str, Any], str]) -> Decla
                 )
             columns[name] = ColumnChoice(**_checked(ColumnChoice, table, f"{place} [columns] {name}"))
     return Declared(record=ImportOptions(**record), columns=columns)
+
+
+def with_own_word(choice: Declared, asked: Declared, stated: str, where: str) -> Declared:
+    """Options with what a file states of its own values: it knows better than the description of the machine.
+
+    Parameters
+    ----------
+    choice : Declared
+        Options from all places.
+    asked : Declared
+        Those beside the system file: what is asked of this file.
+    stated : str
+        Word of the file; empty where it has none.
+    where : str
+        File, for messages.
+
+    Raises
+    ------
+    InputError
+        Another word is asked for.
+    """
+    if not stated:
+        return choice
+    if asked.record.averaged not in (None, stated):
+        raise InputError(
+            f'the file states averaged = "{stated}", and averaged = "{asked.record.averaged}" is declared',
+            where=where,
+            expected="one of the two",
+            remedy="Leave the declaration out for this file, or take the word out of the file if it is wrong.",
+        )
+    return choice.model_copy(update={"record": choice.record.model_copy(update={"averaged": stated})})
 
 
 def _checked(schema: type[_Table], table: Mapping[str, Any], where: str) -> dict[str, Any]:

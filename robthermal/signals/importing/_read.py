@@ -9,11 +9,12 @@ from typing import Any
 from ...errors import InputError
 from .._checks import channel_names, distinct, positive_number
 from .._record import Record
+from .._stated import KEY
 from ._assemble import make_records, system_names
 from ._clock import time_columns, time_reader
 from ._columns import SystemLike, channels_of_names, channels_of_system
 from ._open import open_source
-from ._options import declared
+from ._options import declared, with_own_word
 from ._shorten import short_errors
 from ._values import check_limits, find_parts, read_values
 
@@ -188,6 +189,8 @@ def _read(
         wanted = frozenset((*ins, *outs, *(system_names(system) if system is not None else ())))
         opened = open_source(source, choice.record, limit)
         table = opened.table
+        asked = declared(*tables, (given, {}, "arguments"))
+        choice = with_own_word(choice, asked, table.facts.get(KEY, ""), table.where)
         place = time_columns(table, choice.record, wanted)
         channels = (
             channels_of_names(table, ins, outs, choice, place)

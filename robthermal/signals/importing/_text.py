@@ -14,6 +14,7 @@ import numpy as np
 
 from ..._pandas import pd
 from ...errors import InputError
+from .._stated import KEY, of_comments
 from ._decode import examine
 from ._layout import Layout, find_layout
 from ._options import ImportOptions
@@ -82,6 +83,7 @@ class TextSource:
                 "decimal": layout.decimal,
                 "header_line": layout.header_line,
                 "skipped_lines": len(layout.skipped),
+                KEY: of_comments(lines),
             },
         )
         self.most_rows = self._encoded.most_lines

@@ -13,6 +13,7 @@ from ..._pandas import pd
 from ...errors import InputError
 from .._export import require_pyarrow
 from .._source import memory_limit, refuse_large
+from .._stated import KEY, of_value
 from .._tdms import TdmsSource
 from ._frames import frame_table
 from ._options import ImportOptions
@@ -39,6 +40,8 @@ def read_parquet(path: Path, max_bytes: float | None) -> Table:
         file = parquet.ParquetFile(path)
         refuse_large(path, 8.0 * file.metadata.num_rows * len(file.schema_arrow.names), "bytes unpacked", max_bytes)
         frame = file.read().to_pandas()
+        if word := of_value((file.schema_arrow.metadata or {}).get(KEY.encode())):
+            frame.attrs[KEY] = word
     except InputError:
         raise
     except broken as error:
@@ -85,7 +88,9 @@ def read_mat(path: Path, options: ImportOptions, max_bytes: float | None) -> Tab
             remedy="Timetables, tables and timeseries are opaque outside MATLAB: writetimetable(tt, 'run.csv'), "
             "or save a struct made with table2struct(..., 'ToScalar', true).",
         )
-    return _with_hash(_equally_long(columns, left_out, path), path)
+    table = _equally_long(columns, left_out, path)
+    table.facts[KEY] = of_value(found.get(KEY))
+    return _with_hash(table, path)
 
 
 def _equally_long(columns: dict[str, Any], left_out: dict[str, str], path: Path) -> Table:
