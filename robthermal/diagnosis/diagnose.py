@@ -141,7 +141,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         progress("once more, with a room no warmer than beside a machine that is only heated")
         judged = _judged(only_heated(nominal), names, checked, progress)
     judged = asked_of_means(judged, lambda others: refit(system, others, floor, parameters=parameters,
-                                                         session_gain=session_gain))
+                                                         session_gain=session_gain), checked)
     progress("locating the misfit and planning the next experiment")
     found = concluded(judged)
     if not refine:

@@ -32,6 +32,7 @@ from ..fit import (
     relinearized,
     sessions_of,
     structure_of,
+    with_late_means,
     with_unknown_ambients,
 )
 from ._held import Held, root_of
@@ -98,7 +99,8 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
         raise InputError("a frequency response is compared between two days", where="argument reference",
                          expected="records", remedy="Give the records themselves.")
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
-    sessions = with_unknown_ambients(sessions_of(system, session_gain), system, records_of([*data, *later]))
+    every = records_of([*data, *later])
+    sessions = with_late_means(with_unknown_ambients(sessions_of(system, session_gain), system, every), every)
     starts = [one.initial(system, "free") for one in data]
     listed = _lasting(ranges)
     structure = structure_of(system, _with_others(listed, system), data, starts, sessions)

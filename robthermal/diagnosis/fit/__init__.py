@@ -20,6 +20,7 @@ from ._refitting import relinearized as relinearized
 from ._sessions import SessionGain as SessionGain
 from ._sessions import Sessions as Sessions
 from ._sessions import sessions_of as sessions_of
+from ._sessions import with_late_means as with_late_means
 from ._structure import Structure as Structure
 from ._structure import structure_of as structure_of
 from ._turned import orthonormal as orthonormal
@@ -33,4 +34,5 @@ from ._whitened import Whitened as Whitened
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
            "fitted", "found_ambients", "only_heated", "orthonormal", "refit", "relinearized", "sessions_of",
-           "structure_of", "too_warm", "turned", "with_slow_part", "with_unknown_ambients"]
+           "structure_of", "too_warm", "turned", "with_late_means", "with_slow_part",
+           "with_unknown_ambients"]

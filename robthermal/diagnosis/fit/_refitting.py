@@ -18,7 +18,7 @@ from ..path import Linearized, White, linearized_records
 from ._descent import Descent, Point, decrease, descend
 from ._noise_scaling import NoiseScaling, refined
 from ._refit import Refit
-from ._sessions import SessionGain, sessions_of
+from ._sessions import SessionGain, sessions_of, with_late_means
 from ._structure import Structure, structure_of
 from ._unknown_ambients import with_unknown_ambients
 from ._whitened import Whitened
@@ -84,6 +84,7 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEs
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
     starts = [one.initial(system, "free") for one in data]
     sessions = with_unknown_ambients(sessions_of(system, session_gain), system, records_of(data), ranges.flat)
+    sessions = with_late_means(sessions, records_of(data))
     structure = structure_of(system, ranges, data, starts, sessions)
     n_unknown = structure.n_parameters + structure.n_own
     if structure.n_readings <= 2 * n_unknown:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...thermal import System
-from ..data import DataSet
+from ..data import DataSet, RecordData
 from ..effects import Candidate
+from ..path import LATE_MEANS
 
 Array = NDArray[np.float64]
 SessionGain = bool | Mapping[str, float]
 SIGMA = 0.05  # relative
 _FARTHEST = 0.9  # relative: an input never vanishes
 _OTHERS = 8.0  # standard deviations
+_LATE, _LATEST = 0.03, 0.1  # of a step, that means are late: of 16 samples by 0.03, of 5 by 0.1
 _WARMEST = 30.0  # K: a room is never farther from what the system says
 
 
@@ -67,8 +69,19 @@ class Sessions:
         """
         if not g.size:
             return system
-        return system.with_parameters({name: system.parameter(name) + sigma * float(value)
-                                       for name, sigma, value in zip(self.numbers, self.sigma, g, strict=True)})
+        return system.with_parameters({name: system.parameter(name) + sigma * float(value) for name, sigma, value
+                                       in zip(self.numbers, self.sigma, g, strict=True) if name != LATE_MEANS})
+
+    def late(self, g: Array) -> float:
+        """How many steps the means of one session are late [-].
+
+        Parameters
+        ----------
+        g : ndarray, shape (n_free,)
+            Gains in units of their priors.
+        """
+        return next((sigma * float(value) for name, sigma, value in zip(self.numbers, self.sigma, g, strict=False)
+                     if name == LATE_MEANS), 0.0)
 
     def warmest(self, system: System, data: Sequence[DataSet]) -> Array:
         """Upper bounds of the unknowns of all sessions, in units of their priors: of ambients, others have none.
@@ -119,6 +132,22 @@ def sessions_of(system: System, session_gain: SessionGain) -> Sessions:
     return Sessions(tuple(table), numbers, tuple(float(sigma) for sigma in table.values()))
 
 
+def with_late_means(sessions: Sessions, records: Sequence[RecordData]) -> Sessions:
+    """Sessions whose means may be late or early by half a sample of the logger, if any record is of means.
+
+    Parameters
+    ----------
+    sessions : Sessions
+        Gains of the records.
+    records : sequence of RecordData
+        Records of all sessions.
+    """
+    if not any(one.record.averaged for one in records):
+        return sessions
+    return replace(sessions, inputs=(*sessions.inputs, "steps that means are late"),
+                   numbers=(*sessions.numbers, LATE_MEANS), sigma=(*sessions.sigma, _LATE))
+
+
 def session_table(sessions: Sessions, labels: Sequence[str], gains: Sequence[Array]) -> list[str]:
     """Estimated gains of every record, in words."""
     return [f"session {label}: " + ", ".join(_moved(number, name, sigma * float(value)) for number, name, sigma, value
@@ -134,6 +163,8 @@ def _reach(number: str, sigma: float) -> float:
     """Bound in standard deviations of an ambient, a gain, or another number of which these are a few per cent."""
     if _is_ambient(number):
         return _WARMEST / sigma
+    if number == LATE_MEANS:
+        return _LATEST / sigma
     return min(20.0, _FARTHEST / sigma) if _is_gain(number) else _OTHERS
 
 

@@ -249,8 +249,8 @@ class Structure:
         if key not in self._last:
             while len(self._last) >= _KEPT:
                 del self._last[next(iter(self._last))]
-            paths = [linearize(system, one, self.tolerance) for system, one in zip(self.systems(v), self.data,
-                                                                                   strict=True)]
+            paths = [linearize(system, one, self.tolerance, self.sessions.late(g))
+                     for system, one, g in zip(self.systems(v), self.data, self.gains(v), strict=True)]
             if self.coarse:
                 b = v[self.n_common - self.n_coarse:self.n_common]
                 paths = [path.refined(columns, b) for path, columns in zip(paths, self.coarse, strict=True)]

@@ -5,6 +5,7 @@ from ._averaged import averaged_record as averaged_record
 from ._coarseness import coarse_names as coarse_names
 from ._heat_splines import N_SPLINES as N_SPLINES
 from ._heat_splines import heat_splines as heat_splines
+from ._late_means import LATE_MEANS as LATE_MEANS
 from ._linearize import linearize as linearize
 from ._linearize import linearized_record as linearized_record
 from ._linearize import linearized_records as linearized_records
@@ -22,7 +23,7 @@ from ._whitening import heat_spread as heat_spread
 from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
-__all__ = ["AveragedRecord", "Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES", "SlowNoise",
-           "Unknowns", "White", "Whitener", "averaged_record", "coarse_names", "gathered", "heat_splines",
+__all__ = ["AveragedRecord", "LATE_MEANS", "Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES",
+           "SlowNoise", "Unknowns", "White", "Whitener", "averaged_record", "coarse_names", "gathered", "heat_splines",
            "heat_spread", "linearize", "linearized_record", "linearized_records", "linearized_response",
            "settled", "settled_cost", "whitener"]

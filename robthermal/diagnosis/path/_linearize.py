@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ._linearized_record import LinearizedRecord
 from ._linearized_response import linearized_response
 
 
-def linearize(system: System, one: DataSet, tolerance: float = 1e-4) -> Linearized:
+def linearize(system: System, one: DataSet, tolerance: float = 1e-4, late: float = 0.0) -> Linearized:
     """Simulate a record, or compute a frequency response, and prepare the linearization there.
 
     Parameters
@@ -25,11 +26,14 @@ def linearize(system: System, one: DataSet, tolerance: float = 1e-4) -> Lineariz
         Record or frequency response.
     tolerance : float
         Tolerance of the simulation [K].
+    late : float
+        Of a record of means: how many steps these are late [-].
     """
     if isinstance(one, ResponseData):
         return linearized_response(system, one)
     if isinstance(one, RecordData):
-        return linearized_record(system, one, trajectory(system, one.record, tolerance=tolerance))
+        path = linearized_record(system, one, trajectory(system, one.record, tolerance=tolerance))
+        return replace(path, late=late) if late else path
     raise TypeError(f"{type(one).__name__} is neither a record nor a frequency response")
 
 

@@ -23,8 +23,9 @@ from ._coarseness import coarse_responses
 from ._draw_residuals import draw_residuals
 from ._exact_steps import exact_steps, over_steps
 from ._heat_splines import heat_splines
+from ._late_means import LATE_MEANS, late_means
 from ._linearized import Unknowns
-from ._rates import each, heat_slopes
+from ._rates import each, heat_slopes, heats_of
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
@@ -56,6 +57,8 @@ class LinearizedRecord:
         Changes of the readings by which a finer network may differ, from `coarse_columns`.
     b : ndarray, shape (k,), optional
         How large they are here.
+    late : float
+        Of a record of means: how many steps these are late [-].
     """
 
     system: System
@@ -66,6 +69,7 @@ class LinearizedRecord:
     run: Trajectory
     coarse: Array | None = None
     b: Array | None = None
+    late: float = 0.0
 
     @property
     def h(self) -> float:
@@ -108,7 +112,14 @@ class LinearizedRecord:
     def residual(self) -> Array:
         """Free-run residual, measured − modelled, (n, n_sensors) [K, V]; without what a finer network would change."""
         free = residual(self.one.readings, self.readings[:, self.one.columns])
+        free = free - self.late * self.late_columns if self.late else free
         return free if self.coarse is None or self.b is None else free - self.coarse @ self.b
+
+    @cached_property
+    def late_columns(self) -> Array:
+        """Change of the readings per step that means are late, (n, n_sensors) [K]."""
+        read = self.readings[:, self.one.columns]
+        return late_means(self.system, self.one.sensors, read, self.x) if self.means else np.zeros(read.shape)
 
     def coarse_columns(self, base: System) -> Array:
         """As `Linearized.coarse_columns`.
@@ -170,7 +181,7 @@ class LinearizedRecord:
             Where, and what they are.
         """
         names, chain = unknowns.names, unknowns.chain
-        own = [number for number in unknowns.gain_names if number not in names]
+        own = [number for number in unknowns.gain_names if number not in names and number != LATE_MEANS]
         initial = unknowns.initial.names if unknowns.initial.n_free else ()
         J = self.run.derivative([*names, *own, *initial])
         if not np.array_equal(self.one.columns, np.arange(J.shape[1])):
@@ -182,8 +193,9 @@ class LinearizedRecord:
             common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
             out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
         out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma[:unknowns.initial.n_free]
-        at = [[*names, *own].index(number) for number in unknowns.gain_names]
-        out[..., unknowns.gains] = J[..., at] * unknowns.gain_sigma
+        at = {number: J[..., place] for place, number in enumerate([*names, *own])}
+        for i, (number, sigma) in enumerate(zip(unknowns.gain_names, unknowns.gain_sigma, strict=True)):
+            out[..., unknowns.gains.start + i] = sigma * (self.late_columns if number == LATE_MEANS else at[number])
         if self.coarse is not None:
             out[..., unknowns.coarse] = self.coarse
         return out
@@ -350,15 +362,7 @@ class LinearizedRecord:
         ndarray, shape (n, n_sensors, m)
             [K].
         """
-        def heat(some: slice) -> tuple[Array, Array]:
-            start = np.zeros((*self.x[some].shape, len(responses)))
-            end = np.zeros_like(start)
-            for j, response in enumerate(responses):
-                if response.heat is not None:
-                    start[..., j], end[..., j] = response.heat[0][some], response.heat[1][some]
-            return start, end
-
-        out = self._answered(heat, len(responses))
+        out = self._answered(lambda some: heats_of(responses, self.x[some].shape, some), len(responses))
         for j, response in enumerate(responses):
             if response.reading is not None:
                 read = response.reading[:, self.one.columns]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...thermal import Equations
+from ..effects import Response
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -27,3 +30,23 @@ def heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
                 if row < nl and column < nl:
                     out[:, row, column] += slope[..., pair]
     return out
+
+
+def heats_of(responses: Sequence[Response], shape: tuple[int, ...], some: slice) -> tuple[Array, Array]:
+    """Heats at the start and at the end of some samples, (n, n_lumps, m) [W], that m responses add.
+
+    Parameters
+    ----------
+    responses : sequence of Response
+        Of effects; without a heat, 0.
+    shape : tuple of int
+        How many samples and lumps.
+    some : slice
+        Which samples of the record.
+    """
+    start = np.zeros((*shape, len(responses)))
+    end = np.zeros_like(start)
+    for j, response in enumerate(responses):
+        if response.heat is not None:
+            start[..., j], end[..., j] = response.heat[0][some], response.heat[1][some]
+    return start, end

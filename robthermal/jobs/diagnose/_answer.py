@@ -18,7 +18,7 @@ def answer_sentence(found: Diagnosis) -> str:
     gap, records = _shown(found)
     if found.effects:
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
-            f"The model lacks {accepted_in_words(found)}")
+            f"The model lacks {accepted_in_words(found)}{', or the log holds means' if found.means else ''}")
         both = f"{gap.before:.2g} to {gap.after:.2g} {gap.unit}"
         falls = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records} falls from {both}."
         return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])

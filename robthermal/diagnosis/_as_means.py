@@ -1,0 +1,171 @@
+"""Fits to a log whose values are taken as means over a step: without effects, with those accepted, with one more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, get_args
+
+import numpy as np
+
+from ..errors import Diverged, InputError
+from ..fitting import rmse
+from ..signals import Record, as_means
+from .evidence import promised, score
+from .fit import NoiseScaling, Refit, fitted
+from .search import refit_short_list
+
+Reading = Literal["after", "readings"]
+Refitted = Callable[[Sequence[Record]], Refit]
+CLEARLY = 0.5  # of a mean square: what is clearly less
+_READINGS = get_args(Reading)
+
+
+@dataclass(frozen=True, eq=False)
+class AsMeans:
+    """A fit to the records as means.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with no, some or all effects.
+    how : {"after", "readings"}
+        Which means the values are.
+    """
+
+    fit: Refit
+    how: Reading
+
+    @property
+    def square(self) -> float:
+        """Mean square of the free-run residual [K²]."""
+        return square(self.fit)
+
+    @property
+    def late(self) -> float:
+        """How many steps the means are late or early, the largest of all records [-]."""
+        structure = self.fit.structure
+        return max(abs(structure.sessions.late(g)) for g in structure.gains(self.fit.v))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Effects in it."""
+        return tuple(candidate.label for candidate in self.fit.structure.effects)
+
+
+def as_means_of_both_kinds(records: Sequence[Record], refitted: Refitted, found: Refit, alike: float,
+                           fewer: bool) -> list[AsMeans]:
+    """Fits to the records as means without effects, with those of another fit, and with every part of these.
+
+    Effects that made up for means are not needed beside them: a part of them then does as well.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Rows as they stand in the log.
+    refitted : callable
+        Fits the nominal system to other records.
+    found : Refit
+        Fit to the records as readings at their stamps.
+    alike : float
+        Mean square of a fit as good as that [K²]: parts of the effects are tried where all of them leave no more.
+    fewer : bool
+        Whether only fits with fewer effects are asked for.
+    """
+    effects, fits = len(found.structure.effects), []
+    for how in _READINGS:
+        try:
+            plain = refitted([as_means(one, how) for one in records])
+        except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
+            continue
+        fits.append(AsMeans(plain, how))
+        whole = [AsMeans(fit, how) for fit in with_some(plain, found, effects)] if effects > fewer else []
+        fits += whole
+        if whole and whole[0].square <= alike:
+            fits += [AsMeans(fit, how) for n in range(1, effects) for fit in with_some(plain, found, n)]
+    return fits
+
+
+def with_one_effect(plain: AsMeans, names: Sequence[str] | None, enough: float) -> AsMeans | None:
+    """The fit with the effect that scores best beside means, if it promises to leave no more than enough.
+
+    Parameters
+    ----------
+    plain : AsMeans
+        Fit without effects.
+    names : sequence of str or None
+        Effects to try; None for the whole catalog.
+    enough : float
+        Mean square of the residual [K²].
+    """
+    fit = plain.fit
+    try:
+        scores = score(fit, names)
+        least = min((promised(fit, scores, i) for i in scores.order), default=fit.rss)
+        if least * plain.square > enough * fit.rss:
+            return None
+        entries = refit_short_list(fit, scores, length=1).entries
+    except (Diverged, InputError):  # a model that runs away explains nothing
+        return None
+    return AsMeans(_of_its_own(plain.fit, entries[0].fit), plain.how) if entries else None
+
+
+def simplest(fits: Sequence[AsMeans], most: float) -> AsMeans | None:
+    """The fit with the fewest effects that leaves no more than this; of several the best.
+
+    Parameters
+    ----------
+    fits : sequence of AsMeans
+        Fits to choose from.
+    most : float
+        Mean square of the residual [K²].
+    """
+    good = [one for one in fits if one.square <= most]
+    return min(good, key=lambda one: (len(one.labels), one.square)) if good else None
+
+
+def square(fit: Refit, n: int | None = None) -> float:
+    """Mean square of the free-run residual on the first samples of every record [K²], the very first left out.
+
+    That one tells of the time before the record: a mean over it, or a lag that was in motion.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit to records.
+    n : int, optional
+        Number of samples; default all.
+    """
+    return rmse([path.residual[1:n] for path in fit.records]) ** 2
+
+
+def with_some(plain: Refit, found: Refit, n: int) -> Iterator[Refit]:
+    """The fit with n effects of another one, in all choices, each from where it is there.
+
+    Parameters
+    ----------
+    plain : Refit
+        Fit without effects.
+    found : Refit
+        Fit with effects.
+    n : int
+        How many of its effects.
+    """
+    effects, quantities = found.structure.effects, found.structure.quantities(found.v)
+    for places in combinations(range(len(effects)), n):
+        values = [quantities[i] for i in places]
+        try:
+            structure = plain.structure.with_effects(tuple(effects[i] for i in places))
+            if len(structure.data) == len(found.structure.data):
+                v = structure.carried(found.structure, found.v, values)
+            else:
+                v = structure.start(plain.structure.ranges.values(plain.v[:structure.n_parameters]), values)
+            yield fitted(structure, np.clip(v, *structure.bounds), plain.floor, NoiseScaling(1.0, {}))
+        except (Diverged, InputError):  # an effect upon one that is left out, or a model that runs away
+            continue
+
+
+def _of_its_own(plain: Refit, other: Refit) -> Refit:
+    """A fit beside the filters of another one, with its own."""
+    return fitted(other.structure, other.v, plain.floor, NoiseScaling(1.0, {}))
