@@ -92,7 +92,9 @@ def asked_of_means(judged: Judged, refitted: Refitted, validation: Validation) -
             return judged
     asked = _compared(judged, square(nominal), square(found))
     answer = _explained(records, refitted, judged, asked)
-    if answer is None or not asked.clearly(answer) and _distinguished([*records, *_sampled(validation)], refitted, judged):
+    if answer is None:
+        return judged
+    if not asked.clearly(answer) and _distinguished([*records, *_sampled(validation)], refitted, judged):
         return judged
     return _answered(judged, asked, answer)
 
