@@ -80,10 +80,15 @@ class LocalEstimate:
         """q of a window with full rank."""
         return sum(points_per_record(self.spectra, self.basis)) - self.unknowns
 
+    @property
+    def _sliding(self) -> bool:
+        """Whether windows of the interior slide over the bins of all records alike."""
+        return self.basis.sliding and all(s.n_samples == self.basis.n_samples for s in self.spectra)
+
     @cached_property
-    def _kernel(self) -> Kernel | None:
-        equal = all(s.n_samples == self.basis.n_samples for s in self.spectra)
-        return Kernel(self.spectra, self.basis) if equal and self.basis.sliding else None
+    def _kernel(self) -> Kernel:
+        """For bins in which products of columns would cost digits: not always asked for."""
+        return Kernel(self.spectra, self.basis)
 
     def run(self) -> LocalArrays:
         """Response, gram block, noise and degrees of freedom of bins 1 ... F."""
@@ -147,16 +152,17 @@ class LocalEstimate:
             degrees_of_freedom=np.full(count, self.nominal_degrees_of_freedom, dtype=np.int32),
         )
         exact = np.ones(count, dtype=bool)  # bins that are left to the exact solver
-        if self._kernel is not None:
-            self._solve_interior(self._kernel, found, exact, start)
+        if self._sliding:
+            self._solve_interior(found, exact, start)
         for part in self._parts(start + np.flatnonzero(exact)):
             self._solve_exactly(found, part, part - start)
         return found
 
-    def _solve_interior(self, kernel: Kernel, found: LocalArrays, exact: Array, start: int) -> None:
+    def _solve_interior(self, found: LocalArrays, exact: Array, start: int) -> None:
         first, last = self.basis.half_width + 1, self.n_bins - self.basis.half_width + 1
         points = len(self.spectra) * self.basis.n_points
-        chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * kernel.n_columns * points)))
+        columns = self.n_u * self.basis.size + self.n_y
+        chunk = max(64, min(_CHUNK_MOST, _CHUNK_BYTES // (16 * columns * points)))
         normal = interior_kernel(self.spectra, self.basis)
         block = normal.chunk
         full = found.noise is not None
@@ -171,7 +177,7 @@ class LocalEstimate:
             else:
                 there, fit = None, normal.solve(a, b, full_noise=full)
             if fit.doubtful.mean() > _FEW_WEAK:
-                there, fit = None, kernel.solve(a, b, chunk=chunk, full_noise=full)
+                there, fit = None, self._kernel.solve(a, b, chunk=chunk, full_noise=full)
             if there is None:
                 found.response[..., part], found.gram[..., part] = fit.response[..., mine], fit.gram[..., mine]
                 _store_noise(found, part, fit.noise[..., mine])

@@ -33,10 +33,10 @@ def suspect_bins(variance: Array, degrees_of_freedom: Array, half_width: int, ro
         gap, reach = min(gap, n_f // 2), max(1, n_f // 4)
     # F(2q, 2q') with q' the independent bins of the reference times their q: a median of correlated estimates.
     independent = max(2.0, 1.5 * reach / gap)
-    q = np.arange(1.0, max(1, int(degrees_of_freedom.max())) + 1.0)
-    place: Array | int = np.maximum(degrees_of_freedom, 1) - 1
-    if degrees_of_freedom.min() == degrees_of_freedom.max():
-        place = int(q.size) - 1  # one number for all bins, as without weak ones: nothing to look up
+    least, most = (max(1, int(one)) for one in (degrees_of_freedom.min(), degrees_of_freedom.max()))
+    q = np.arange(1.0, most + 1.0)
+    # One number for all bins, as without weak ones: nothing to look up.
+    place = most - 1 if least == most else np.maximum(degrees_of_freedom, 1) - 1
     limit = np.broadcast_to(scipy.special.fdtri(2.0 * q, 2.0 * q * independent, 1.0 - _LEVEL / n_y)[place], n_f)
     ratio = np.broadcast_to(_median_ratio(q)[place], n_f)
     by_output = np.zeros((n_y, n_f), dtype=bool)

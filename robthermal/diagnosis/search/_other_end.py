@@ -13,11 +13,11 @@ from ...thermal import System
 from ..effects import Candidate, candidates
 from ..fit import Refit, extended
 from ._decide import Accepted
-from ._neighbors import ALIKE
 from ._short_list import Entry, delta_bic
 
 _LAGS = ("input_lag", "sensor_lag")
 _TIME = "time_constant"
+_ALIKE = 0.98  # of the sum of squares that the accepted lag removes: the inside of a lump is worth less than the rest
 
 
 def with_other_end(round_: Accepted) -> Accepted:
@@ -40,7 +40,7 @@ def with_other_end(round_: Accepted) -> Accepted:
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
     listed = tuple(Entry(one, fit, delta_bic(before, fit), best.p_value) for one, fit in fits
-                   if before.rss - fit.rss > ALIKE * (before.rss - own.rss))
+                   if before.rss - fit.rss > _ALIKE * (before.rss - own.rss))
     return replace(round_, contenders=(*round_.contenders, *listed))
 
 
