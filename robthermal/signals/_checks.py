@@ -150,3 +150,64 @@ def _unpacked(raw: NDArray[Any], where: str, expected: str) -> Array:
                 expected=expected,
             ) from None
     return flat.reshape(raw.shape)
+
+
+def ripple_of(value: object, names: Sequence[str], n: int) -> dict[str, Array]:
+    """`value` as read-only columns (n,), not negative, by input; those that are zero throughout are left out."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not set(value) <= set(names):
+        raise InputError(f"ripple is {value!r}"[:200], where="argument ripple",
+                         expected="a mapping from input to its ripple in every sample")
+    columns = {str(name): _real_numbers(column, "ripple") for name, column in value.items()}
+    for name, column in columns.items():
+        if column.shape != (n,) or not np.isfinite(column).all() or column.min() < 0.0:
+            raise InputError(f"the ripple of {name!r} is no column of {n} finite values, none negative",
+                             where="argument ripple")
+        column.setflags(write=False)
+    return {name: column for name, column in columns.items() if column.any()}
+
+
+def same_length(U: Array, Y: Array) -> None:
+    """Refuse inputs and outputs without a channel, of different lengths, or of fewer than two samples."""
+    if U.shape[1] == 0 and Y.shape[1] == 0:
+        raise InputError(
+            "the record has neither inputs nor outputs",
+            where="arguments inputs and outputs",
+            expected="at least one channel",
+            remedy="Give input_names or output_names.",
+        )
+    if U.shape[0] != Y.shape[0]:
+        raise InputError(
+            f"inputs have {U.shape[0]} rows and outputs have {Y.shape[0]} rows: their lengths differ",
+            where="arguments inputs and outputs",
+            expected="the same number of samples",
+            remedy="A record without inputs has inputs of shape (n_samples, 0)." if 0 in (U.size, Y.size) else "",
+        )
+    if U.shape[0] < 2:
+        raise InputError(
+            f"the record has {U.shape[0]} samples: it is {'empty' if U.shape[0] == 0 else 'a single sample'}",
+            where="arguments inputs and outputs",
+            expected="at least two samples",
+        )
+
+
+def truth(value: object) -> bool:
+    """`value` of the argument `averaged`."""
+    if not isinstance(value, bool):
+        raise InputError(f"averaged is {value!r}", where="argument averaged", expected="True or False")
+    return value
+
+
+def text(value: object, where: str) -> str:
+    """`value` as text."""
+    if not isinstance(value, str):
+        raise InputError(f"{where} is {value!r}", where=f"argument {where}", expected="text")
+    return value
+
+
+def texts(value: object) -> tuple[str, ...]:
+    """`value` of the argument `notes`, a list of texts."""
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f"notes is {value!r}", where="argument notes", expected="a list of texts")
+    return tuple(text(note, "notes") for note in value)

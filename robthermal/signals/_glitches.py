@@ -97,7 +97,7 @@ def glitch_rows(column: Array) -> NDArray[np.intp]:
     # On a steep stretch the median is the sample itself and hides the noise; second differences see it there too.
     noise = _MAD * max(_median_of(_residual, column, 0), _median_of(_bends, column, 2))
     rounding = 1e-9 * max(abs(float(column.min())), abs(float(column.max())))
-    least = max(_NOISE * noise, _QUANTA * _quantum(column), rounding)
+    least = max(_NOISE * noise, _QUANTA * quantum(column), rounding)
     found = []
     for start, stop in _pieces(len(column)):
         # A fast but real swing bends its neighbors too; a glitch leaves them where they were.
@@ -168,7 +168,7 @@ def filter_note(window: float, samples: int) -> str:
     return f"outputs replaced by their running median over {window:g} s ({samples} samples), as asked"
 
 
-def _quantum(column: Array) -> float:
+def quantum(column: Array) -> float:
     """Quantization step: the usual distance between neighboring values that occur."""
     gaps = np.sort(column)
     for start, stop in _pieces(len(gaps) - 1):

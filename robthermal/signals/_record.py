@@ -13,7 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._html import short_table
 from ..errors import InputError
-from ._checks import Array, channel_matrix, channel_names, channel_units, distinct, finite_number, positive_number
+from ._checks import (
+    Array,
+    channel_matrix,
+    channel_names,
+    channel_units,
+    distinct,
+    finite_number,
+    positive_number,
+    ripple_of,
+    same_length,
+    text,
+    texts,
+    truth,
+)
 from ._export import frame, summary, write
 from ._figure import draw
 from ._names import suggestion
@@ -48,6 +61,9 @@ class Record:
         Channel name to unit. Temperatures are in kelvin: ``"K"``.
     averaged : bool, optional
         Whether outputs are means over the sample before t_k, as loggers that average record them; default: read at t_k.
+    ripple : mapping of str to array_like, optional
+        Of inputs that change within samples and whose rows are means over these: the root mean square of what they are
+        off the mean, (n_samples,). Modules heat by it. A file that is saved does not hold it.
     name : str, optional
         Name of the record, as reports show it.
     notes : sequence of str, optional
@@ -86,6 +102,7 @@ class Record:
     start_time: float
     units: Mapping[str, str]
     averaged: bool
+    ripple: Mapping[str, Array]
     name: str
     notes: tuple[str, ...]
     imported: Import | None
@@ -101,6 +118,7 @@ class Record:
         start_time: float = 0.0,
         units: Mapping[str, str] | None = None,
         averaged: bool = False,
+        ripple: Mapping[str, ArrayLike] | None = None,
         name: str = "",
         notes: Sequence[str] = (),
         imported: Import | None = None,
@@ -111,7 +129,7 @@ class Record:
         distinct(input_list, output_list)
         U = channel_matrix(inputs, input_list, "inputs", h, t0)
         Y = channel_matrix(outputs, output_list, "outputs", h, t0)
-        _check_shapes(U, Y)
+        same_length(U, Y)
         fields = {
             "sample_time": h,
             "inputs": U,
@@ -120,9 +138,10 @@ class Record:
             "output_names": output_list,
             "start_time": t0,
             "units": channel_units(units, input_list + output_list),
-            "averaged": _truth(averaged),
-            "name": _text(name, "name"),
-            "notes": _texts(notes),
+            "averaged": truth(averaged),
+            "ripple": ripple_of(ripple, input_list, U.shape[0]),
+            "name": text(name, "name"),
+            "notes": texts(notes),
             "imported": imported,
         }
         for field, value in fields.items():
@@ -224,6 +243,7 @@ class Record:
             input_names=ins,
             output_names=outs,
             units={name: unit for name, unit in self.units.items() if name in ins + outs},
+            ripple={name: column for name, column in self.ripple.items() if name in ins},
         )
 
     def with_outputs(self, outputs: ArrayLike, output_names: Sequence[str] | None = None) -> Record:
@@ -335,6 +355,7 @@ class Record:
             inputs=self.inputs[start:stop],
             outputs=self.outputs[start:stop],
             start_time=self.start_time + start * self.sample_time,
+            ripple={name: column[start:stop] for name, column in self.ripple.items()},
         )
 
     def _row_at(self, time: float, where: str) -> int:
@@ -346,7 +367,7 @@ class Record:
         return int(min(max(math.ceil(offset - 1e-9 * max(1.0, abs(offset))), 0), self.n_samples))
 
     def changed(self, **changes: Any) -> Record:
-        """Copy with other fields.
+        """Copy with other fields; other inputs have no ripple unless it is given.
 
         Parameters
         ----------
@@ -354,45 +375,6 @@ class Record:
             Arguments of `Record`, by name.
         """
         fields = {field: getattr(self, field) for field in self.__dataclass_fields__}
+        if "inputs" in changes:
+            fields["ripple"] = None
         return Record(**{**fields, **changes})
-
-
-def _check_shapes(U: Array, Y: Array) -> None:
-    if U.shape[1] == 0 and Y.shape[1] == 0:
-        raise InputError(
-            "the record has neither inputs nor outputs",
-            where="arguments inputs and outputs",
-            expected="at least one channel",
-            remedy="Give input_names or output_names.",
-        )
-    if U.shape[0] != Y.shape[0]:
-        raise InputError(
-            f"inputs have {U.shape[0]} rows and outputs have {Y.shape[0]} rows: their lengths differ",
-            where="arguments inputs and outputs",
-            expected="the same number of samples",
-            remedy="A record without inputs has inputs of shape (n_samples, 0)." if 0 in (U.size, Y.size) else "",
-        )
-    if U.shape[0] < 2:
-        raise InputError(
-            f"the record has {U.shape[0]} samples: it is {'empty' if U.shape[0] == 0 else 'a single sample'}",
-            where="arguments inputs and outputs",
-            expected="at least two samples",
-        )
-
-
-def _truth(value: object) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"averaged is {value!r}", where="argument averaged", expected="True or False")
-    return value
-
-
-def _text(value: object, where: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"{where} is {value!r}", where=f"argument {where}", expected="text")
-    return value
-
-
-def _texts(value: object) -> tuple[str, ...]:
-    if isinstance(value, str) or not isinstance(value, Sequence):
-        raise InputError(f"notes is {value!r}", where="argument notes", expected="a list of texts")
-    return tuple(_text(note, "notes") for note in value)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ._drives import Drives
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
-from ._module_term import ModuleTerm
+from ._module_term import ModuleTerm, RippleTerm
 from ._parts import Link
 from ._terms import Array, Indices, NaturalTerm, RadiationTerm, Term
 
@@ -24,6 +24,8 @@ def terms_of(system: System, index: Index, drives: Drives) -> tuple[Term, ...]:
     found: list[Term] = []
     if system.modules:
         found.append(_modules(system, index, drives))
+    if drives.ripples:
+        found.append(_ripples(system, index, drives))
     found.extend(_links(system, index, drives))
     found.extend(_effects(system, index, drives))
     return tuple(found)
@@ -34,11 +36,24 @@ def _modules(system: System, index: Index, drives: Drives) -> ModuleTerm:
     return ModuleTerm(
         components=tuple(system.modules), a=_indices(index[m.hot] for m in modules),
         b=_indices(index[m.cold] for m in modules), drive=_indices(drives.column[name] for name in system.modules),
+        supply_index=np.arange(len(modules)),
         S=np.array([m.seebeck.value for m in modules]), S_slope=np.array([m.seebeck.slope for m in modules]),
         R=np.array([m.resistance.value for m in modules]), R_slope=np.array([m.resistance.slope for m in modules]),
         K_slope=np.array([m.conductance.slope for m in modules]),
         T_ref=np.array([m.reference_temperature for m in modules]),
         thomson=np.array([m.thomson for m in modules]), split=np.array([m.joule_split for m in modules]))
+
+
+def _ripples(system: System, index: Index, drives: Drives) -> RippleTerm:
+    modules = [system.modules[name] for name in drives.ripples]
+    none = np.zeros(len(modules))
+    return RippleTerm(
+        components=tuple(drives.ripples), a=_indices(index[m.hot] for m in modules),
+        b=_indices(index[m.cold] for m in modules), drive=_indices(drives.ripples.values()),
+        supply_index=_indices(system.module_names.index(name) for name in drives.ripples), S=none, S_slope=none,
+        R=np.array([m.resistance.value for m in modules]), R_slope=np.array([m.resistance.slope for m in modules]),
+        K_slope=none, T_ref=np.array([m.reference_temperature for m in modules]), thomson=none,
+        split=np.array([m.joule_split for m in modules]))
 
 
 def _links(system: System, index: Index, drives: Drives) -> list[Term]:

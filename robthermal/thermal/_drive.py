@@ -163,6 +163,11 @@ def held_slopes(eq: Equations, record: Record, names: Sequence[str], plan: Sched
         if drive.delay and drive.before is not None and (name := _name_of_before(eq, column)) in names:
             found[name] = np.zeros(plan.w.shape)
             found[name][:, column] = eq.drives.slopes(plan.u)[:, column] * plan.before(drive.delay)
+    for module, column in eq.drives.ripples.items():
+        name, lag = f"modules.{module}.drive.time_constant", eq.system.modules[module].drive.time_constant
+        if name in names and lag:
+            found.setdefault(name, np.zeros(plan.w.shape))
+            found[name][:, column] = -12.0 * lag / (plan.lengths[0] ** 2 + 12.0 * lag**2) * plan.w[:, column]
     for ambient in eq.system.ambients:  # an ambient that the record lacks is a parameter
         name = f"ambients.{ambient}.temperature"
         if name in names and ambient not in record.input_names:

@@ -1,11 +1,13 @@
-"""From the columns of a record to what really drives the network: w = [heaters, currents, ambients, 1, signs, steps].
+"""From the columns of a record to what really drives the network: w = [heaters, currents, ambients, 1, ...].
 
 Static part of a `Drive` (gain, offset, saturation); delay and lag are the simulation's. The column of ones carries
-constant heats, a sign column the polarity that a hysteresis remembers, a step column is 0 before and 1 after its time.
+constant heats, a sign column the polarity that a hysteresis remembers, a step column is 0 before and 1 after its time,
+a ripple column holds what a current is off its mean within a sample (rms).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,9 +30,11 @@ class Drives:
     ----------
     system : System
         System whose heaters and modules are driven.
+    ripple : sequence of str
+        Modules whose currents have a ripple.
     """
 
-    def __init__(self, system: System):
+    def __init__(self, system: System, ripple: Sequence[str] = ()):
         self.system = system
         self.n_u = len(system.exogenous_names)
         self.column = {name: i for i, name in enumerate(system.exogenous_names)}
@@ -42,11 +46,13 @@ class Drives:
         self.signs = {name: self.one + 1 + i for i, name in enumerate(remembering)}
         stepping = [link.name for link in system.links if link.step is not None]
         self.steps = {name: self.one + 1 + len(remembering) + i for i, name in enumerate(stepping)}
-        self.width = self.one + 1 + len(remembering) + len(stepping)
+        before = self.one + 1 + len(remembering) + len(stepping)
+        self.ripples = {name: before + i for i, name in enumerate(ripple)}
+        self.width = before + len(self.ripples)
         self._shaped = {column: drive for column, drive in self.of.items() if _is_shaped(drive)}
 
     def __call__(self, u: Array) -> Array:
-        """Columns w (..., width) of u (..., n_u), before any step."""
+        """Columns w (..., width) of u (..., n_u), before any step and without ripple."""
         w = np.zeros((*u.shape[:-1], self.width), u.dtype if np.iscomplexobj(u) else float)
         w[..., :self.n_u] = u
         for column, drive in self._shaped.items():

@@ -33,6 +33,8 @@ class Equations:
         What to write down.
     averaged : bool, optional
         Whether readings are means over the sample before them, as in a record of that kind.
+    ripple : tuple of str, optional
+        Modules whose currents have a ripple in the record.
 
     Attributes
     ----------
@@ -56,6 +58,7 @@ class Equations:
 
     system: System
     averaged: bool = False
+    ripple: tuple[str, ...] = ()
 
     @cached_property
     def index(self) -> dict[str, int]:
@@ -65,7 +68,7 @@ class Equations:
     @cached_property
     def drives(self) -> Drives:
         """What heaters and amplifiers make of u."""
-        return Drives(self.system)
+        return Drives(self.system, self.ripple)
 
     @cached_property
     def capacity(self) -> NDArray[np.float64]:

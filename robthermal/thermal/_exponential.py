@@ -1,12 +1,14 @@
 """Exponential collocation in time: exact for the linear network, spectral for the modules.
 
 Sixteen samples are solved at once while the heats are smooth enough (a window); where they are not, a sample is halved
-until the last Chebyshev coefficients of the heats are worth less than the tolerance.
+until the last Chebyshev coefficients of the heats are worth less than the tolerance: first towards its start, where
+the drives jump, so that a lag far shorter than a sample costs a step per halving; then everywhere.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +138,7 @@ class Integrator:
         n = len(plan.w)
         z = np.empty((n, self.nz))
         z[0] = z0
-        refined: dict[int, Array] = {}
+        refined: dict[int, tuple[Array, NDArray[np.intp]]] = {}
         k, level = 0, 0
         with np.errstate(over="ignore", invalid="ignore"):  # a fixed point that diverges is noticed by its change
             while k < n - 1:
@@ -157,12 +159,20 @@ class Integrator:
         whole = len(plan.w) - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
         return WINDOW if whole and self._advance_window(z, plan.w, k) else 0
 
-    def _march(self, z: Array, kind: NDArray[np.intp], w: Array, level: int = 0) -> tuple[int, float] | None:
-        """Compiled steps of lengths[kind] / 2**level: how many, and their worst last coefficients; None: not built."""
-        lengths = [self.compiled(one, level) for one in range(len(self.lengths))]
+    def _march(self, z: Array, kind: NDArray[np.intp], w: Array) -> tuple[int, float] | None:
+        """Compiled steps of lengths[kind]: how many, and their worst last coefficients; None: not built."""
+        lengths = [self.compiled(one, 0) for one in range(len(self.lengths))]
         if any(one is None for one in lengths):
             return None
         return march([one for one in lengths if one is not None], kind, z, w)
+
+    def _march_segment(self, z: Array, w: Array, kind: int, levels: NDArray[np.intp]) -> tuple[int, float] | None:
+        """Compiled steps of lengths[kind] / 2**levels, as `_march`."""
+        most, least = int(levels[0]), int(levels[-1])
+        lengths = [self.compiled(kind, level) for level in range(least, most + 1)]
+        if any(one is None for one in lengths):
+            return None
+        return march([one for one in lengths if one is not None], levels - least, z, w.repeat(len(levels), axis=0))
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:
         matrices, gain, fixed = self.window()
@@ -192,11 +202,15 @@ class Integrator:
             self._give_up(z[k + hot[0]], plan.at[k + hot[0]] * self.lengths[0])
         return stop - k
 
-    def _advance_segment(self, z: Array, plan: Schedule, k: int, level: int, refined: dict[int, Array]) -> int:
-        """One segment in 2**level steps, refined as needed; return the level to start the next one with."""
+    def _advance_segment(self, z: Array, plan: Schedule, k: int, level: int,
+                         refined: dict[int, tuple[Array, NDArray[np.intp]]]) -> int:
+        """One segment, its first step 1/2**level of it or less; return the level to start the next one with."""
         time = plan.at[k] * self.lengths[0]
         while True:
-            done = self._try_segment(z[k], plan.w[k:k + 1], int(plan.kind[k]), level)
+            for levels in _divisions(level):
+                done = self._try_segment(z[k], plan.w[k:k + 1], int(plan.kind[k]), levels)
+                if done is not None:
+                    break
             if done is not None:
                 break
             level += 1
@@ -207,19 +221,19 @@ class Integrator:
             self._give_up(states[-1], time)
         z[k + 1] = states[-1]
         if level:
-            refined[k] = states[:-1]
+            refined[k] = states[:-1], levels
         return level - 1 if level and tail < _TAIL * self.tolerance / 300 else level
 
-    def _try_segment(self, start: Array, w: Array, kind: int, level: int) -> tuple[Array, float] | None:
-        """States of a segment in 2**level steps, and their worst last coefficients [K]; None where it needs more."""
-        steps, z = 2**level, np.empty((2**level + 1, self.nz))
+    def _try_segment(self, start: Array, w: Array, kind: int, levels: NDArray[np.intp]) -> tuple[Array, float] | None:
+        """States of a segment in steps of 1/2**levels, and their worst last coefficients [K]; None if it needs more."""
+        z = np.empty((len(levels) + 1, self.nz))
         z[0] = start
-        if (marched := self._march(z, np.full(steps, kind), np.repeat(w, steps, axis=0), level)) is not None:
-            return (z, marched[1]) if marched[0] == steps else None
-        step, gain, fixed = self.step(kind, level), self.gain(kind, level), self.fixed(kind, level)
+        if (marched := self._march_segment(z, w, kind, levels)) is not None:
+            return (z, marched[1]) if marched[0] == len(levels) else None
         nodes = DEGREE * self.ports.size
         states, worst = [start], 0.0
-        for _ in range(2**level):
+        for level in levels.tolist():
+            step, gain, fixed = self.step(kind, level), self.gain(kind, level), self.fixed(kind, level)
             base = step.K @ states[-1] + step.Ku @ w[0]
             at_ports = np.concatenate([states[-1][self.ports], base[:nodes]])
             q, converged = fixed.solve(at_ports, states[-1], w)
@@ -245,15 +259,22 @@ def _whole(plan: Schedule, k: int) -> int:
     return int(other[0] if other.size else len(plan.kind) - 1 - k)
 
 
-def _path(z: Array, refined: dict[int, Array]) -> Path:
+@cache
+def _divisions(level: int) -> tuple[NDArray[np.intp], ...]:
+    """Ways to cut a segment into steps of 1/2**levels of it: ever shorter towards its start, then evenly."""
+    even = np.full(2**level, level)
+    return (even,) if level < 2 else (np.array([level, *range(level, 0, -1)]), even)
+
+
+def _path(z: Array, refined: dict[int, tuple[Array, NDArray[np.intp]]]) -> Path:
     """Steps of a run: one per segment, several where it was refined."""
     segments = len(z) - 1
     counts = np.ones(segments, np.intp)
-    for k, states in refined.items():
+    for k, (states, _) in refined.items():
         counts[k] = len(states)
     segment = np.repeat(np.arange(segments), counts)
-    starts = z[segment]
+    starts, level = z[segment], np.zeros(len(segment), np.intp)
     first = np.concatenate([[0], np.cumsum(counts)])
-    for k, states in refined.items():
-        starts[first[k]:first[k + 1]] = states
-    return Path(z, starts, segment, np.log2(counts[segment]).astype(np.intp))
+    for k, (states, levels) in refined.items():
+        starts[first[k]:first[k + 1]], level[first[k]:first[k + 1]] = states, levels
+    return Path(z, starts, segment, level)

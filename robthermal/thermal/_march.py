@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._library import library as compiled_from
 from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
-from ._module_term import ModuleTerm
+from ._module_term import ModuleTerm, RippleTerm
 from ._ports import PortHeat
 from ._terms import Array, NaturalTerm, RadiationTerm
 
@@ -211,8 +211,13 @@ def _in_pairs(heat: PortHeat) -> Array:
     return heat.scatter[order]
 
 
+def _of_module(term: ModuleTerm) -> tuple[Array, ...]:
+    return term.S, term.S_slope, term.R, term.R_slope, term.K_slope, term.T_ref, term.thomson, term.split
+
+
 _KINDS: dict[type, tuple[int, Callable[[Any], tuple[Array | float, ...]]]] = {  # numbered as in the source
-    ModuleTerm: (0, lambda t: (t.S, t.S_slope, t.R, t.R_slope, t.K_slope, t.T_ref, t.thomson, t.split)),
+    ModuleTerm: (0, _of_module),
+    RippleTerm: (0, _of_module),
     NaturalTerm: (1, lambda t: (t.gain, t.exponent, t.warmer_b - t.warmer_a)),
     RadiationTerm: (2, lambda t: (t.coefficient, t.warmer_a, t.warmer_b)),
     StepTerm: (3, lambda t: (t.conductance * t.relative, t.warmer)),

@@ -29,6 +29,7 @@ class ModuleTerm:
     a: Indices
     b: Indices
     drive: Indices
+    supply_index: Indices  # every module pays for itself
     S: Array
     S_slope: Array
     R: Array
@@ -37,11 +38,6 @@ class ModuleTerm:
     T_ref: Array
     thomson: Array
     split: Array
-
-    @property
-    def supply_index(self) -> Indices:
-        """Every module pays for itself."""
-        return np.arange(len(self.components))
 
     def heat(self, Ta: Array, Tb: Array, current: Array) -> tuple[Array, Array]:
         """Heat into the hot and the cold face [W]."""
@@ -116,3 +112,13 @@ class ModuleTerm:
         # reference_temperature: every property loses slope x change
         pump, leak = self.S_slope * current, self.K_slope * (Ta - Tb)
         return -pump * Ta - self.R_slope * hot + leak, pump * Tb - self.R_slope * cold - leak
+
+
+@dataclass(frozen=True)
+class RippleTerm(ModuleTerm):
+    """Joule heat of modules by what their currents are off their means over a sample: the drive is its rms.
+
+    The mean of I² over a sample is the square of its mean and the square of this; all other heat goes by the mean.
+    """
+
+    fields: ClassVar[tuple[str, ...]] = ("resistance.value", "resistance.slope", "reference_temperature", "joule_split")

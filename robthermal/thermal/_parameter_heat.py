@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,7 +67,7 @@ def parameter_heat(eq: Equations, name: str, x: Array, u: Array) -> list[tuple[i
     total = np.zeros(x.shape, np.result_type(x, w, float))
     if (table, field) in AFFINE:
         changed, step = unit_change(eq.system, name)
-        other = type(eq)(changed)
+        other = replace(eq, system=changed)
         total = total + ((other.A - eq.A) @ x.T + (other.settled - eq.settled) @ w.T).T / step
     for number, pair, what in touched(eq, name):
         term = eq.terms[number]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._equations import Equations
+from ._parts import Drive
 from ._terms import Array, Indices
 
 _SAME = 1e-9  # of a sample
+NONE: Mapping[str, Array] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ class Schedule:
         return np.floor(self.at - delay / self.lengths[0] + _SAME) < 0
 
 
-def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
+def schedule(eq: Equations, u: Array, h: float, start: float = 0.0, ripple: Mapping[str, Array] = NONE) -> Schedule:
     """Segments of a record.
 
     Parameters
@@ -56,6 +60,8 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
         Columns of the record.
     h, start : float
         Sample time and time of the first sample [s].
+    ripple : mapping of str to ndarray, shape (n_samples,)
+        Of the modules `Equations.ripple` [A].
     """
     n = len(u)
     delays = {column: drive.delay / h for column, drive in eq.drives.of.items() if drive.delay}
@@ -74,6 +80,8 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
     w = eq.drives(held)
     for column, time in steps.items():
         w[:, column] = at >= time - _SAME
+    for name, column in eq.drives.ripples.items():
+        w[:, column] = _late(ripple[name], at, eq.drives.of[eq.drives.column[name]], h)
     return Schedule(tuple(length * h for length in lengths), at, kind, held, w,
                     np.searchsorted(at, np.arange(n) - _SAME).astype(np.intp))
 
@@ -81,6 +89,16 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0) -> Schedule:
 def _jumps(values: Array, before: float | None) -> Indices:
     """Samples at which a column changes, and the first where it had another value before the record."""
     return np.flatnonzero(np.diff(values, prepend=values[0] if before is None else before))
+
+
+def _late(ripple: Array, at: Array, drive: Drive, h: float) -> Array:
+    """Ripple of a current behind its drive: as late as the current, and little of it left by a lag.
+
+    A lag T much longer than a sample h leaves h² / (12 T²) of the square of a step in its middle.
+    """
+    source = np.floor(at - drive.delay / h + _SAME).astype(np.intp)
+    through = 1.0 / np.sqrt(1.0 + 12.0 * (drive.time_constant / h) ** 2)
+    return np.where(source < 0, 0.0, through * ripple[np.maximum(source, 0)])
 
 
 def one_sample(eq: Equations, u: Array, h: float) -> Schedule:

@@ -160,7 +160,8 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     volts = {name: unit for name, unit in system.sensor_units.items() if unit == "V"}
     return Record(sample_time=record.sample_time, inputs=record.inputs, outputs=readings,
                   input_names=record.input_names, output_names=system.sensor_names or system.lump_names, units=volts,
-                  start_time=record.start_time, averaged=record.averaged, name=f"simulation of {system.name}")
+                  start_time=record.start_time, averaged=record.averaged, ripple=record.ripple,
+                  name=f"simulation of {system.name}")
 
 
 def trajectory(system: System, record: Record, *, initial: Initial = None, tolerance: float = 1e-4,
@@ -223,7 +224,8 @@ def trajectory(system: System, record: Record, *, initial: Initial = None, toler
 def _equations(system: System, record: Record) -> Equations:
     """Equations of a system for the readings of a record."""
     eq = equations(system)
-    if not record_of(record).averaged:
+    eq = replace(eq, ripple=tuple(name for name in system.modules if name in record_of(record).ripple))
+    if not record.averaged:
         return eq
     if volts := [name for name, unit in system.sensor_units.items() if unit == "V"]:
         raise InputError(f"the record holds means, and {', '.join(map(repr, volts))} is a voltage",
@@ -259,7 +261,7 @@ def is_small(eq: Equations) -> bool:
 def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tolerance: float,
                  names: list[str]) -> Trajectory:
     h, n = record.sample_time, len(eq.system.lumps)
-    plan = schedule(eq, u, h, record.start_time)
+    plan = schedule(eq, u, h, record.start_time, record.ripple)
     by = Integrator(eq, plan.lengths, tolerance)
     layout, at = by.layout, plan.samples
     path = by.run(start_state(eq, record, initial, plan), plan)

@@ -52,7 +52,16 @@ def lumps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
 
 
 def test_every_kind_of_heat_is_tried(every: rt.System) -> None:
-    assert {type(term) for term in rt.thermal.Equations(every).terms} == set(_march._KINDS)
+    assert {type(term) for term in rt.thermal.Equations(every, ripple=("tem",)).terms} == set(_march._KINDS)
+
+
+def test_a_ripple_heats_as_numpy_says(every: rt.System, drive: Any, lumps: Any) -> None:
+    record = drive(80, system=every, sample_time=0.25)
+    with_ripple = record.changed(ripple={"tem": np.linspace(0.0, 1.0, len(record))})
+    (here, counts), (theirs, _) = lumps(every, with_ripple, 1e-6, True), lumps(every, with_ripple, 1e-9, False)
+    assert sum(counts) > 60
+    np.testing.assert_allclose(here, theirs, rtol=0.0, atol=1e-6)
+    assert np.abs(here - lumps(every, record, 1e-6, True)[0]).max() > 0.01
 
 
 @pytest.mark.parametrize("sample_time", [0.25, 0.5])

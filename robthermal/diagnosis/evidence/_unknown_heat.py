@@ -179,7 +179,7 @@ def _driven(one: RecordData, knots: Array, heat: Array) -> DataSet:
     record = Record(sample_time=one.record.sample_time, inputs=np.column_stack([one.record.inputs, q]),
                     outputs=one.record.outputs, input_names=[*one.record.input_names, _PROBE],
                     output_names=one.record.output_names, start_time=one.record.start_time,
-                    averaged=one.record.averaged)
+                    averaged=one.record.averaged, ripple=one.record.ripple)
     return replace(one, record=record)
 
 

@@ -30,6 +30,8 @@ _ROUNDS = 3  # of filter and noise levels
 _PART = 1500  # samples of a long record that are fitted first
 _LONG = 3  # times as many: a long record
 _CLEAR = 10.0  # of BIC
+_LOOK = 2  # evaluations of a start from rest before it is looked at
+_BEYOND_DOUBT = 2.0  # times its price: from more a start from rest does not come back
 _FAR = 3.0  # times the decrease that chance promises: from less the whole record converges as soon
 
 
@@ -157,16 +159,27 @@ def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], l
              ) -> tuple[Structure, Descent]:
     """With settled lags at the start of the records, unless these ask for more beyond doubt.
 
-    On a step from rest a lag and a start in motion look much the same, and most experiments begin at rest.
+    On a step from rest a lag and a start in motion look much the same, and most experiments begin at rest. Where the
+    linearization after a first step says that settled lags cost far more than that, they are not fitted to the end.
+    Nothing is decided before a fit from rest has converged: far from its optimum everything else leaves more.
     """
     rest = structure.at_rest()
     price = (structure.n_own - rest.n_own) * (math.log(structure.n_readings) + _CLEAR)
     if not price:
         return structure, found
-    other = minimized(rest, rest.carried(structure, found.at.v, structure.quantities(found.at.v)), whiteners, limit)
-    if float(other.at.z @ other.at.z) < float(found.at.z @ found.at.z) + price:
+    other = minimized(rest, rest.carried(structure, found.at.v, structure.quantities(found.at.v)), whiteners,
+                      min(limit, _LOOK))
+    least = float(other.at.z @ other.at.z) - decrease(other.at, rest.bounds)
+    if least > float(found.at.z @ found.at.z) + _BEYOND_DOUBT * price:
+        return structure, found
+    if limit > _LOOK and not other.converged:
+        other = minimized(rest, other.at.v, whiteners, limit - _LOOK)
+    if float(other.at.z @ other.at.z) > float(found.at.z @ found.at.z) + price:
+        return structure, found
+    if other.converged:
         return rest, other
-    return structure, found
+    moving = structure.carried(rest, other.at.v, rest.quantities(other.at.v))
+    return structure, min(found, minimized(structure, moving, whiteners, 1), key=lambda one: float(one.at.z @ one.at.z))
 
 
 def coarsened(fit: Refit) -> Refit:

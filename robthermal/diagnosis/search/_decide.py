@@ -123,9 +123,8 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
         winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.twins)
     else:
         own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
-        winner = Entry(winner.candidate, own, next(e.delta_bic for e in entries
-                                                   if e.fit.structure is winner.fit.structure), winner.p_value,
-                       winner.twins)
+        gain = next(e.delta_bic for e in entries if e.candidate.key == winner.candidate.key)
+        winner = Entry(winner.candidate, own, gain, winner.p_value, winner.twins)
     return Accepted(before, best=winner, contenders=others)
 
 

@@ -25,6 +25,7 @@ _LOUD = (
     "split",
     "filled",
     "resampled",
+    "clock",
     "counted",
     "duplicates",
     "left_out",
@@ -61,6 +62,7 @@ def make_records(
                 column = values.column(c)
                 column[part.rows] = filtered(column[part.rows], samples)
             notes = [filter_note(median_filter, samples)]
+    ripples = [_ripple(part, values) for part in parts]  # before the values give their place to samples
     made = [(_sampled(part, values.inputs, driven), _sampled(part, values.outputs, read)) for part in parts]
     for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
         _freeze(matrix)
@@ -89,8 +91,9 @@ def make_records(
             name=report.file if len(parts) == 1 else f"{report.file} part {k + 1}",
             notes=said + notes,
             imported=report,
+            ripple=ripple,
         )
-        for k, (part, (U, Y)) in enumerate(zip(parts, made, strict=True))
+        for k, (part, (U, Y), ripple) in enumerate(zip(parts, made, ripples, strict=True))
     )
     return tuple(as_means(record, averaged) if averaged else record for record in records)
 
@@ -135,9 +138,18 @@ def _sampled(part: Part, matrix: Array, channels: Sequence[Channel]) -> Array:
             continue
         reading = channel.role not in ("input", "current") and not (channel.role == "voltage" and whole)
         values = rows[:, k].copy()
-        for span, sampled in (part.linear if reading else part.held)(values):
+        for span, sampled in (part.interpolated if reading else part.held)(values):
             out[span, k] = sampled
     return out
+
+
+def _ripple(part: Part, values: Values) -> dict[str, Array]:
+    """What the currents are off their means within samples (rms), where they are means."""
+    found = {}
+    for channel in values.of("current") if part.means and not part.exact else ():
+        column = values.column(channel)[part.rows]
+        found[channel.name] = np.concatenate([some for _, some in part.ripple(column)])
+    return found
 
 
 def _freeze(matrix: Array) -> None:

@@ -80,6 +80,8 @@ class ImportOptions(_Table):
         Parts shorter than this are left out [samples].
     jitter : float
         Largest deviation of a step from the median, as a fraction of it, that is resampled [-].
+    clock : {"stamps", "rows"}, optional
+        Which is right where stamps jitter: they are, or the rows are even. Default: what the readings follow.
     duplicates : {"refuse", "first", "last", "mean"}
         Rows with one time stamp and different values.
     restarts : {"refuse", "split"}
@@ -108,6 +110,7 @@ class ImportOptions(_Table):
     fill_up_to: Annotated[int, Field(ge=1)] = 3
     shortest: Annotated[int, Field(ge=2)] = 2
     jitter: Fraction = 0.25
+    clock: Literal["stamps", "rows"] | None = None
     duplicates: Literal["refuse", "first", "last", "mean"] = "refuse"
     restarts: Literal["refuse", "split"] = "refuse"
     averaged: Averaged | None = None

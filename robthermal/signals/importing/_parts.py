@@ -18,6 +18,7 @@ Named = Sequence[tuple[str, Array]]  # headers and their columns
 _GAP = 1.5  # of the median step
 _NEGLIGIBLE = 1e-3  # of a step: stamps this close to the grid are on it
 _EPS = 1e-6
+_ROUNDING = 1e-9  # of a mean square
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,8 @@ class Part:
         On the grid.
     exact : bool
         Whether the rows are the grid.
+    means : bool
+        Whether the stamps are known to be right, so that held signals act by their means over the samples.
     """
 
     rows: slice
@@ -43,6 +46,7 @@ class Part:
     sample_time: float
     samples: int
     exact: bool
+    means: bool = False
 
     @property
     def n_rows(self) -> int:
@@ -54,21 +58,62 @@ class Part:
         """Time of the first sample [s]."""
         return float(self.stamps[0])
 
-    def linear(self, values: Array) -> Iterator[tuple[slice, Array]]:
-        """Readings of these rows on the grid, linear between rows; missing ones in between are interpolated."""
+    def interpolated(self, values: Array) -> Iterator[tuple[slice, Array]]:
+        """Readings of these rows on the grid; missing ones in between are interpolated."""
         there = np.isfinite(values)
         x, y = (self.stamps, values) if there.all() else (self.stamps[there], values[there])
         for part in spans(self.samples):
-            yield part, np.interp(self._grid(part), x, y)
+            yield part, (_bent if self.means else np.interp)(self._grid(part), x, y)
 
     def held(self, values: Array) -> Iterator[tuple[slice, Array]]:
-        """A held signal on the grid: the row in force; a row up to half a step late counts as on time."""
+        """A held signal on the grid: its mean, or the row in force; a row up to half a step late counts as on time."""
         for part in spans(self.samples):
+            if self.means:
+                yield part, self._mean(values, self._grid(part))
+                continue
             place = np.searchsorted(self.stamps, self._grid(part) + 0.5 * self.sample_time, side="right") - 1
             yield part, values[np.clip(place, 0, len(values) - 1)]
 
+    def ripple(self, values: Array) -> Iterator[tuple[slice, Array]]:
+        """Rms of what a held signal is off its mean over the samples; nothing where the row in force stands."""
+        for part in spans(self.samples if self.means else 0):
+            grid = self._grid(part)
+            mean = self._mean(values, grid)
+            off = self._mean(values**2, grid) - mean**2
+            yield part, np.sqrt(np.where(off > _ROUNDING * mean**2, off, 0.0))
+
+    def _mean(self, values: Array, grid: Array) -> Array:
+        """Mean of a held signal over the samples: exactly its value where that does not change."""
+        end = grid + self.sample_time
+        first = np.maximum(np.searchsorted(self.stamps, grid, side="right") - 1, 0)
+        last = np.searchsorted(self.stamps, end, side="left") - 1
+        until = np.append(self.stamps[1:], np.inf)
+        mean = values[first]
+        for later in range(1, int((last - first).max(initial=0)) + 1):
+            row = np.minimum(first + later, last)
+            share = (np.minimum(until[row], end) - self.stamps[row]) / self.sample_time
+            mean = mean + np.where(first + later <= last, share * (values[row] - values[first]), 0.0)
+        return mean
+
     def _grid(self, part: slice) -> Array:
         return self.start + self.sample_time * np.arange(part.start, part.stop, dtype=np.float64)
+
+
+def _bent(at: Array, x: Array, y: Array) -> Array:
+    """Between two rows the parabola of the smaller of both their bends; linear where these are of opposite signs.
+
+    A reading with a lag bends for several rows, one without has a corner at a row where its heat jumps: there it is
+    straight on one side, and stays so (Harten and Osher 1987, the limiter of essentially non-oscillatory schemes).
+    """
+    first, last = np.searchsorted(x, at[[0, -1]]) + (-3, 3)
+    x, y = x[max(first, 0) : last], y[max(first, 0) : last]
+    bend = np.zeros(len(x))
+    bend[1:-1] = np.diff(np.diff(y) / np.diff(x)) / (x[2:] - x[:-2])
+    left = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    a, b = bend[left], bend[left + 1]
+    smaller = np.where(a * b > 0.0, np.sign(a) * np.minimum(np.abs(a), np.abs(b)), 0.0)
+    inside = np.where((at >= x[0]) & (at <= x[-1]), smaller, 0.0)
+    return np.asarray(np.interp(at, x, y) + inside * (at - x[left]) * (at - x[left + 1]))
 
 
 def parts_of(
@@ -321,9 +366,10 @@ def say_resampled(table: Table, parts: Sequence[Part], columns: dict[str, Array]
     for name, column in columns.items():
         bend = max(_bend(part.stamps, column[part.rows]) for part in moved)
         bounds.append(f"{name} {h * h / 8.0 * bend:.2g}")
+    how = ("readings and ambients by parabolas, inputs and currents by their means" if moved[0].means else
+           "readings and ambients linear, inputs and currents held")
     text = (
-        f"time steps deviate by up to {100 * worst:.3g} %; resampled to a uniform grid of {h:.10g} s (readings and "
-        "ambients linear, inputs and currents held)"
+        f"time steps deviate by up to {100 * worst:.3g} %; resampled to a uniform grid of {h:.10g} s ({how})"
         + (f"; error bound h²/8·max|T″| [K]: {', '.join(bounds[:12])}" if bounds else "")
     )
     table.actions.append(Action("resampled", sum(part.n_rows for part in moved), text, lines=[table.lines[row]]))

@@ -12,6 +12,7 @@ from ...errors import InputError
 from .._plausible import check_temperature, limit_notes
 from ._cells import NumberReader, from_thermistor, mapped_actions, refuse_codes, refuse_faults, take_codes, to_si
 from ._columns import Channel, SystemLike
+from ._jitter import settled
 from ._options import Declared
 from ._parts import Part, parts_of, say_resampled
 from ._samples import runs, single
@@ -161,5 +162,7 @@ def find_parts(table: Table, clock: Clock, values: Values, choice: Declared) -> 
     driven = [named[c] for c in values.of("input", "current")]
     read = [named[c] for c in values.of("ambient", "sensor", "voltage", "output")]
     parts = parts_of(table, stamps, pieces, driven, read, choice.record)
+    if not choice.record.averaged:
+        parts = settled(table, parts, [values.column(c) for c in values.of("sensor", "output")], choice.record.clock)
     say_resampled(table, parts, {c.name: values.column(c) for c in values.of("ambient", "sensor")})
     return parts
