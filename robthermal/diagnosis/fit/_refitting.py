@@ -161,7 +161,7 @@ def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], l
 
     On a step from rest a lag and a start in motion look much the same, and most experiments begin at rest. Where the
     linearization after a first step says that settled lags cost far more than that, they are not fitted to the end.
-    Nothing is decided before a fit from rest has converged: far from its optimum everything else leaves more.
+    Nothing is settled by a fit in motion that has not converged: far from its optimum the rest of the misfit decides.
     """
     rest = structure.at_rest()
     price = (structure.n_own - rest.n_own) * (math.log(structure.n_readings) + _CLEAR)
@@ -172,11 +172,12 @@ def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], l
     least = float(other.at.z @ other.at.z) - decrease(other.at, rest.bounds)
     if least > float(found.at.z @ found.at.z) + _BEYOND_DOUBT * price:
         return structure, found
-    if limit > _LOOK and not other.converged:
-        other = minimized(rest, other.at.v, whiteners, limit - _LOOK)
+    sure = found.converged or limit >= LIMIT
+    if not other.converged and (sure or limit > _LOOK):
+        other = minimized(rest, other.at.v, whiteners, LIMIT if sure else limit - _LOOK)
     if float(other.at.z @ other.at.z) > float(found.at.z @ found.at.z) + price:
         return structure, found
-    if other.converged:
+    if sure:
         return rest, other
     moving = structure.carried(rest, other.at.v, rest.quantities(other.at.v))
     return structure, min(found, minimized(structure, moving, whiteners, 1), key=lambda one: float(one.at.z @ one.at.z))
