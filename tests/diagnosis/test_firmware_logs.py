@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.jobs.diagnose._long_enough import long_enough
 
 SYSTEM = """
 [system]
@@ -67,6 +68,22 @@ def test_saturation_between_interpolated_rows_is_said() -> None:
     duty, read = bed()
     floor = rt.diagnosis.noise_floor(rt.thermal.parse_system(SYSTEM), logged((duty, np.minimum(read, 50.0)), 1e-4))
     assert any("largest reading, 50 °C" in one for one in floor.remarks)
+
+
+def in_parts(n_first: int) -> tuple[rt.Record, ...]:
+    """A file of which one row is missing: of the two parts the first has so many samples."""
+    duty, read = bed()
+    kept = np.arange(N) != n_first
+    with pytest.warns(UserWarning, match="a new part begins"):
+        return rt.read_records({"time": np.arange(N)[kept], "T_bed": read[kept], "duty": duty[kept]},
+                               rt.thermal.parse_system(SYSTEM))
+
+
+def test_a_part_that_is_too_short_does_not_refuse_the_file() -> None:
+    parts = in_parts(31)
+    with pytest.warns(UserWarning, match=r"part 1 has 31 samples, fewer than the 50 that a diagnosis needs: left out"):
+        assert long_enough(parts) == [parts[1]]
+    assert long_enough(parts[:1]) == [parts[0]]  # nothing longer of this file: refused as before
 
 
 HOT_END = """

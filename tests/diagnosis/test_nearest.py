@@ -50,6 +50,24 @@ def test_the_reason_is_a_test_that_fails_with_its_number(unexplained: Diagnosis)
     assert f"takes {100 * taken:.0f} % off what is left without it, less than the 30 %" in unexplained.nearest
 
 
+def test_a_share_just_below_its_limit_is_not_said_to_be_the_limit() -> None:
+    one = Evidence(share=0.3, reproducible=1.0, stability=Stability(6, 0.1), needed=0.2999)
+    assert one.short_of.startswith("takes 29.9 % off") and "less than the 30 %" in one.short_of
+    often = Evidence(share=0.5, reproducible=0.9496, stability=Stability(6, 0.1), needed=0.5)
+    assert "in 94.9 % of draws" in often.short_of
+
+
+def test_two_errors_that_differ_look_different(unexplained: Diagnosis) -> None:
+    judged = Judged(state=SearchState(nominal=unexplained.nominal, names=None, scores=unexplained.scores,
+                                      fit=unexplained.fit, current=unexplained.scores,
+                                      short=ShortList(unexplained.fit, (), {}), complete=True,
+                                      rounds=unexplained.rounds),
+                    adequacy=unexplained.adequacy, hold_out=None, verdict="unexplained", outcome=unexplained.outcome,
+                    why="of something")
+    gap = {"train": replace(unexplained.gap["train"], before=0.01544, after=0.01508)}
+    assert "falls from 0.0154 to 0.0151 K" in nearest(judged, gap)
+
+
 def test_without_validation_it_speaks_of_the_training_records(
         plant: rt.System, records: tuple[rt.Record, rt.Record]) -> None:
     found = rt.diagnose(plant, records[0], effects=["sensor_gain"])

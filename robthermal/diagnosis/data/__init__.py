@@ -8,10 +8,11 @@ from ._measured import as_measured as as_measured
 from ._measured import records_of as records_of
 from ._measured import responses_of as responses_of
 from ._measured import without_outliers as without_outliers
+from ._noise_estimate import SHORTEST as SHORTEST
 from ._noise_estimate import NoiseEstimate as NoiseEstimate
 from ._noise_estimate import noise_floor as noise_floor
 from ._record_data import RecordData as RecordData
 from ._remarks import refuse_constant as refuse_constant
 
-__all__ = ["Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
+__all__ = ["SHORTEST", "Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
            "noise_floor", "records_of", "refuse_constant", "responses_of", "without_outliers"]

@@ -19,9 +19,10 @@ from ._measured import as_measured, records_of, responses_of
 from ._remarks import quiet, remarks
 
 Array = NDArray[np.float64]
-_SHORTEST = 50  # samples
+SHORTEST = 50  # samples
 _LONGER = ("Measure longer, or sample faster. Where missing values have cut a file into parts, "
-           'gaps = "fill" under [record] of the system file bridges short ones.')
+           'gaps = "fill" under [record] of the system file bridges short gaps, and shortest = 50 leaves out short '
+           "parts.")
 _DIFFERENCE = np.array([1.0, -3.0, 3.0, -1.0])  # kills parabolas: what is left of a slow signal is its noise
 
 
@@ -161,9 +162,9 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
 
 def _refuse_short(data: Sequence[Data]) -> None:
     for one in data:
-        if len(one.record) < _SHORTEST:
+        if len(one.record) < SHORTEST:
             raise InputError(f"the record {one.label!r} has {len(one.record)} samples", where="argument records",
-                             expected=f"at least {_SHORTEST}", remedy=_LONGER)
+                             expected=f"at least {SHORTEST}", remedy=_LONGER)
 
 
 def _refuse_invisible(system: System, rough: Mapping[str, float]) -> None:

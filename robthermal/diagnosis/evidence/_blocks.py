@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..._digits import downwards
 from ..fit import Refit
 
 Array = NDArray[np.float64]
@@ -70,10 +71,10 @@ class Evidence:
     def short_of(self) -> str:
         """The first of these tests that fails, with the number and the limit; empty if none does."""
         if not self.needed >= NEEDED:
-            return (f"takes {100.0 * max(self.needed, 0.0):.0f} % off what is left without it, less than the "
+            return (f"takes {_below(self.needed, NEEDED)} off what is left without it, less than the "
                     f"{100.0 * NEEDED:.0f} % of an effect that is needed")
         if not self.reproducible >= SURE:
-            return (f"lessens the error in {100.0 * self.reproducible:.0f} % of draws of parts of the records, less "
+            return (f"lessens the error in {_below(self.reproducible, SURE)} of draws of parts of the records, less "
                     f"than {100.0 * SURE:.0f} %")
         if self.stability.segments < 2:
             return "shows its size in a single part of the records"
@@ -146,6 +147,12 @@ def wandering(fit: Refit, column: int) -> tuple[float, int]:
     """
     moved, weight = _segments(fit, column)
     return (_deviations(moved, weight) / max(weight.size - 1, 1) if weight.size else 0.0), weight.size
+
+
+def _below(share: float, limit: float) -> str:
+    """A share that is below its limit, in per cent: never rounded up to it."""
+    text = f"{100.0 * max(share, 0.0):.0f}"
+    return f"{text if float(text) < 100.0 * limit else downwards(100.0 * share, 3)} %"
 
 
 def _segments(fit: Refit, column: int) -> tuple[Array, Array]:

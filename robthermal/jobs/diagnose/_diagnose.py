@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...identify import FrequencyResponse
 from ...signals import Record
 from ...thermal import System
+from ._long_enough import long_enough
 from ._welch import welch
 
 Array = NDArray[np.float64]
@@ -158,6 +159,7 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     >>> found.holds, found.diagnosis.effects[0].label, found.residuals[0].kind
     (False, 'sensor_lag(T)', 'train')
     """
+    train, validation, reference = map(long_enough, (train, validation, reference))
     try:
         found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
                          operating_point=operating_point or None, session_gain=session_gain,
