@@ -13,9 +13,11 @@ from ..fit import Refit
 from ..path import LinearizedRecord, heat_splines
 from ._adequacy import side_by_side
 from ._hold_out import Gap, expected_squares
+from ._line import Line, single_period
 
 Array = NDArray[np.float64]
 _HELD = 0.8  # of the power, in the band
+_LOCATED = 0.1  # of the remainder, that a free heat into a lump must remove for it to sit there
 _SMALL = 1e-3  # relative singular value of a heat that no reading shows
 
 
@@ -53,6 +55,8 @@ class Remainder:
         Part of its power in that band [-].
     heat : float
         Rms of the free heat into the first of these lumps [W].
+    line : Line, optional
+        A single period that holds most of what is left at a thermometer.
     """
 
     gaps: dict[str, Left]
@@ -62,16 +66,24 @@ class Remainder:
     high: float
     share: float
     heat: float
+    line: Line | None = None
+
+    @property
+    def located(self) -> bool:
+        """Whether a free heat into one of the lumps would remove enough of it to say that it sits there."""
+        return self.where[0][1] >= _LOCATED
 
     def __str__(self) -> str:
-        """One sentence: how much, at which sensor and lump, in which band."""
+        """How much, at which sensor and lump, in which band, and whether a single period."""
         seen = "validation" if "validation" in self.gaps else "train"
         sensor = max(self.sensors, key=lambda name: self.sensors[name])
         kind = "validation records" if seen == "validation" else "training records"
         lump, share = self.where[0]
-        return (f"{self.gaps[seen].rms:.2g} K of the error on the {kind} is not explained, mostly at {sensor} between "
-                f"{self.low:.2g} and {self.high:.2g} Hz; a free heat of {self.heat:.2g} W rms into {lump} would remove "
-                f"{100 * share:.0f} % of it.")
+        removed = (f"a free heat of {self.heat:.2g} W rms into {lump} would remove {100 * share:.0f} % of it"
+                   if self.located else f"no slow heat into a lump would remove more than {100 * share:.2g} % of it")
+        said = (f"{self.gaps[seen].rms:.2g} K of the error on the {kind} is not explained, mostly at {sensor} between "
+                f"{self.low:.2g} and {self.high:.2g} Hz; {removed}.")
+        return said if self.line is None else f"{said} {self.line}"
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``diagnosis.json``.
@@ -82,7 +94,8 @@ class Remainder:
         """
         return {**{name: vars(left) for name, left in self.gaps.items()}, "sensors": self.sensors,
                 "where": [{"lump": lump, "share": share} for lump, share in self.where],
-                "band": {"low": self.low, "high": self.high, "share": self.share}, "heat": self.heat}
+                "band": {"low": self.low, "high": self.high, "share": self.share}, "heat": self.heat,
+                "line": None if self.line is None else vars(self.line)}
 
 
 def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:
@@ -99,7 +112,8 @@ def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:
     if not squares:
         return None
     where, heat = _places(fit)
-    return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat)
+    return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat,
+                     single_period(fit))
 
 
 def left(gap: Gap) -> Left:

@@ -27,6 +27,8 @@ class Resolving:
         Periods of that input that show the remainder: the band that holds most of its power [s].
     others : tuple of str
         Lumps that explain the remainder as well.
+    located : bool
+        Whether a free heat into that lump removes enough to ask for it to be split.
 
     Examples
     --------
@@ -42,15 +44,16 @@ class Resolving:
     shortest: float
     longest: float
     others: tuple[str, ...] = ()
+    located: bool = True
 
     def __str__(self) -> str:
-        said = [f"{self.lump} split in two"]
-        if self.sensor:
+        said = [f"{self.lump} split in two"] if self.located else []
+        if self.sensor and self.located:
             said.append(f"a sensor at {self.sensor}" + (", which explains it as well" if self.sensor in self.others else
                                                        ""))
         if self.input:
             said.append(f"{self.input} alone, with periods of {_round(self.shortest)} to {_round(self.longest)} s")
-        return f"What would resolve it: {'; '.join(said)}."
+        return f"What would resolve it: {'; '.join(said)}." if said else ""
 
     def to_dict(self) -> dict[str, Any]:
         """As in ``diagnosis.json``.
@@ -79,12 +82,12 @@ def resolving(rest: Remainder, system: System) -> Resolving:
     read = {sensor.lump for sensor in system.thermometers.values()}
     unread = [name for name in (lump, *alike) if name not in read]
     return Resolving(lump, unread[0] if unread else "", _nearest_input(system, lump), 1.0 / rest.high, 1.0 / rest.low,
-                     alike)
+                     alike, rest.located)
 
 
 def _nearest_input(system: System, lump: str) -> str:
     """Heater or module with the least thermal resistance to a lump; empty if none reaches it."""
-    drives: dict[str, tuple[str, ...]] = {name: (one.lump,) for name, one in system.inputs.items()}
+    drives: dict[str, tuple[str, ...]] = {name: (one.lump,) for name, one in system.inputs.items() if one.gain}
     drives |= {name: (one.hot, one.cold) for name, one in system.modules.items()}
     nearest = system.nearest_lumps(dict.fromkeys(place for places in drives.values() for place in places)).get(lump)
     return next((name for name, places in drives.items() if nearest in places), "")

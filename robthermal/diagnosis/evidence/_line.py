@@ -1,0 +1,78 @@
+"""A single period in what is left, faster than those of periodic heats that are tried: something that cycles unseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fit import Refit
+from ..path import LinearizedRecord
+
+Array = NDArray[np.float64]
+_FIRST = 30  # cycles in a record: slower ones are tried as periodic heats
+_LOBE = 2  # bins on each side that a sine fills behind a Hann window
+_MOST = 0.5  # of the power of what is left at a thermometer
+_DRIVEN = 0.02  # of the power of an input: it cycles as often
+
+
+@dataclass(frozen=True)
+class Line:
+    """A single period that holds most of what is left at a thermometer.
+
+    Parameters
+    ----------
+    sensor : str
+        Thermometer with most of it.
+    period : float
+        Period [s].
+    share : float
+        Part of the power of the residual at that thermometer [-].
+    """
+
+    sensor: str
+    period: float
+    share: float
+
+    def __str__(self) -> str:
+        return (f"{100 * self.share:.0f} % of what is left at {self.sensor} has a single period, {self.period:.3g} s, "
+                "which no recorded input has: look for what switches or swings so often (a chiller, a thermostat, a "
+                "pump), and record it.")
+
+
+def single_period(fit: Refit) -> Line | None:
+    """The period that holds most of what is left at one thermometer, in the longest record; None if there is none.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit whose residuals are examined.
+    """
+    path = max(fit.records, key=lambda one: len(one.residual))
+    found = [line for name, r in zip(path.one.sensors, path.residual.T, strict=True)
+             if name in fit.system.thermometers and (line := _of_sensor(path, name, r)) is not None]
+    return max(found, key=lambda line: line.share, default=None)
+
+
+def _of_sensor(path: LinearizedRecord, name: str, r: Array) -> Line | None:
+    power = _spectrum(r)
+    if power.size < 2 * _FIRST or not power.any():
+        return None
+    peak = _FIRST + int(np.argmax(power[_FIRST:power.size - _LOBE]))
+    own = slice(peak - _LOBE, peak + _LOBE + 1)
+    share = float(power[own].sum() / power.sum())
+    if share < _MOST or any(_share(u, own) > _DRIVEN for u in path.one.record.inputs.T):
+        return None
+    bins = np.arange(power.size)[own]
+    return Line(name, len(r) * path.h / float(power[own] @ bins / power[own].sum()), share)
+
+
+def _share(u: Array, own: slice) -> float:
+    """Part of the power of an input at these frequencies; nothing of one that stands still."""
+    power = _spectrum(u)
+    return float(power[own].sum() / power.sum()) if np.ptp(u) > 0.0 else 0.0
+
+
+def _spectrum(x: Array) -> Array:
+    return np.asarray(np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2, np.float64)
