@@ -15,7 +15,7 @@ from ._outcomes import DiagnosisCode
 from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched, unsteady
 from .data import DataSet, Measured, as_measured, noise_floor, records_of, refuse_constant, without_outliers
 from .evidence import Gap, adequacy, expected_rms, left
-from .fit import Refit, SessionGain, exact
+from .fit import Refit, SessionGain, exact, too_warm
 from .search import SearchState, ShortList
 
 _NOISE_ONLY = 1.5  # whitened variance
@@ -80,16 +80,24 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     """
     later = as_measured(system, records, "records")
     _refuse_same(as_measured(system, reference, "reference"), later)
-    progress("fitting the reference records, and measuring how they differ")
-    healthy = reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
-                           noise=noise, session_gain=session_gain)
-    progress("comparing the new records with them")
     refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
-    new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
-    progress("trying every change of a parameter, and every effect of the catalog")
-    found = searched(new, healthy, names)
-    return _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+
+    def compared(warmest: bool) -> tuple[Judged, Compared]:
+        progress("fitting the reference records, and measuring how they differ")
+        healthy = reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
+                               noise=noise, session_gain=session_gain, warmest=warmest)
+        progress("comparing the new records with them")
+        new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
+        progress("trying every change of a parameter, and every effect of the catalog")
+        found = searched(new, healthy, names)
+        return _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+
+    answer = compared(warmest=False)
+    if not too_warm(answer[0].state.fit):
+        return answer
+    progress("once more, with rooms no warmer than beside a machine that is only heated")
+    return compared(warmest=True)
 
 
 def _compared(healthy: Reference, new: Refit) -> Compared:

@@ -78,7 +78,7 @@ class Reference:
 
 def reference_of(system: System, records: Measured | Sequence[Measured], new: Sequence[Measured], *,
                  parameters: Choice = None, noise: Mapping[str, float] | float | None = None,
-                 session_gain: SessionGain = False) -> Reference:
+                 session_gain: SessionGain = False, warmest: bool = False) -> Reference:
     """Fit the reference records, and measure how they differ.
 
     Parameters
@@ -91,6 +91,8 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
         Of the day in question; only which ambients they hold is looked at.
     parameters, noise, session_gain
         As in `rt.diagnose`.
+    warmest : bool
+        Whether unknown ambients are no warmer than a machine that is only heated allows.
     """
     floor = noise_floor(system, records, noise=noise)
     data = without_outliers(system, as_measured(system, records, "reference"), floor.noise)
@@ -104,8 +106,10 @@ def reference_of(system: System, records: Measured | Sequence[Measured], new: Se
     starts = [one.initial(system, "free") for one in data]
     listed = _lasting(ranges)
     structure = structure_of(system, _with_others(listed, system), data, starts, sessions)
+    structure = replace(structure, only_heated=warmest)
     try:
-        fit = fitted(structure, structure.start(structure.ranges.start, []), floor, NoiseScaling(1.0, {}))
+        start = np.clip(structure.start(structure.ranges.start, []), *structure.bounds)
+        fit = fitted(structure, start, floor, NoiseScaling(1.0, {}))
     except Diverged as error:
         raise InputError(f"the nominal model runs away: {error}", where="argument system",
                          remedy="Correct it first; nothing can be diagnosed on a model that leaves all data.") from None
@@ -134,10 +138,11 @@ def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEsti
     structure = Held(base=nominal.base.with_parameters(ranges.assigned(values)), ranges=ranges, data=tuple(data),
                      starts=tuple(one.initial(nominal.base, "free") for one in data), tolerance=nominal.tolerance,
                      sessions=_with_scatter(nominal.sessions, ranges, scatter) if len(data) > 1 else nominal.sessions,
-                     center=ranges.coordinates(values), root=root_of(scatter.next_one))
+                     center=ranges.coordinates(values), root=root_of(scatter.next_one),
+                     only_heated=nominal.only_heated)
     wider = float(np.sqrt(scatter.inflation))
     levels = NoiseScaling(wider, dict.fromkeys(floor.noise, wider))
-    v = structure.start(values, [])
+    v = np.clip(structure.start(values, []), *structure.bounds)
     for _ in range(_FILTERS):
         paths, whiteners = filters(structure, v, floor, levels)
         fitted_once = extended(Refit(structure, v, floor, levels, paths, whiteners, np.zeros(0), fit.outcome),

@@ -13,6 +13,8 @@ from ._noise_estimate import NoiseEstimate as NoiseEstimate
 from ._noise_estimate import noise_floor as noise_floor
 from ._record_data import RecordData as RecordData
 from ._remarks import refuse_constant as refuse_constant
+from ._warmest_room import warmest_rooms as warmest_rooms
 
 __all__ = ["SHORTEST", "Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
-           "noise_floor", "records_of", "refuse_constant", "responses_of", "without_outliers"]
+           "noise_floor", "records_of", "refuse_constant", "responses_of", "warmest_rooms",
+           "without_outliers"]

@@ -8,10 +8,13 @@ warmed up.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...fitting import Data
 from ...thermal import System
+from ._dataset import DataSet
 
 SLACK = 1.0
 _COOLEST = 5.0  # per cent of the readings: noise makes single ones colder
@@ -37,10 +40,27 @@ def warmest_room(system: System, one: Data) -> float:
     return min(cool) + SLACK if cool else np.inf
 
 
+def warmest_rooms(system: System, data: Sequence[DataSet]) -> list[float]:
+    """Upper bounds of the ambient's temperature [K] for every data set: one room for all parts of a file.
+
+    A part that begins while the machine is hot says nothing of the room; the part before it does.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system of the data.
+    data : sequence of DataSet
+        Records and frequency responses; parts of a file share the report of its import.
+    """
+    own = [one.warmest_room(system) for one in data]
+    files = [id(one.record.imported or one) if isinstance(one, Data) else id(one) for one in data]
+    return [min(most for most, other in zip(own, files, strict=True) if other == file) for file in files]
+
+
 def _only_heated(system: System, one: Data) -> bool:
     """Whether no heat into a lump was negative in the record."""
     if system.modules or any(lump.heat < 0 or lump.periodic or lump.condensation for lump in system.lumps.values()):
         return False
     inputs = dict(zip(one.record.input_names, np.asarray(one.record.inputs).T, strict=True))
     return all(part.gain > 0 and name in inputs and float(np.min(inputs[name])) >= 0.0
-               for name, part in system.inputs.items())
+               for name, part in system.inputs.items() if part.gain)  # without one it heats nothing: a fan, a force

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...thermal import System
-from ..data import DataSet, RecordData
+from ...thermal import FitRange, System
+from ..data import DataSet, RecordData, warmest_rooms
 from ..effects import Candidate
 from ..path import LATE_MEANS
 
@@ -69,8 +69,9 @@ class Sessions:
         """
         if not g.size:
             return system
-        return system.with_parameters({name: system.parameter(name) + sigma * float(value) for name, sigma, value
-                                       in zip(self.numbers, self.sigma, g, strict=True) if name != LATE_MEANS})
+        values = {name: system.parameter(name) + sigma * float(value) for name, sigma, value
+                  in zip(self.numbers, self.sigma, g, strict=True) if name != LATE_MEANS}
+        return _in_range(system, values).with_parameters(values)
 
     def late(self, g: Array) -> float:
         """How many steps the means of one session are late [-].
@@ -91,11 +92,12 @@ class Sessions:
         system : System
             Common to all sessions.
         data : sequence of DataSet
-            Records, of which each allows no room warmer than its own readings.
+            Records, of which each allows no room warmer than the readings of its file.
         """
         rooms = {f"ambients.{name}.temperature": room.temperature for name, room in system.ambients.items()}
-        return np.array([(one.warmest_room(system) - rooms[number]) / sigma if number in rooms else np.inf
-                         for one in data if one.n_sessions
+        warmest = warmest_rooms(system, data)
+        return np.array([(most - rooms[number]) / sigma if number in rooms else np.inf
+                         for one, most in zip(data, warmest, strict=True) if one.n_sessions
                          for number, sigma in zip(self.numbers, self.sigma, strict=True)])
 
     def hides(self, candidate: Candidate) -> str:
@@ -103,6 +105,20 @@ class Sessions:
         if candidate.effect.name == "input_gain" and candidate.where[0] in self.inputs:
             return "every session has a gain of its own for this input"
         return ""
+
+
+def _in_range(system: System, values: Mapping[str, float]) -> System:
+    """The system with ranges of its fit table that hold these values: what scatters from day to day may leave them.
+
+    An effect is tried by building the system with it, and a system with a number out of its range is refused.
+    """
+    beyond = {name: _widened(system.fit[name], value) for name, value in values.items() if name in system.fit
+              and not system.fit[name].lower <= value <= system.fit[name].upper}
+    return system.model_copy(update={"fit": {**system.fit, **beyond}}) if beyond else system
+
+
+def _widened(bounds: FitRange, value: float) -> FitRange:
+    return bounds.model_copy(update={"lower": min(bounds.lower, value), "upper": max(bounds.upper, value)})
 
 
 def sessions_of(system: System, session_gain: SessionGain) -> Sessions:

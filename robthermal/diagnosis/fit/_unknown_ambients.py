@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...thermal import System
-from ..data import RecordData, records_of
+from ..data import RecordData, records_of, warmest_rooms
 from ._refit import Refit
 from ._sessions import Sessions
 
@@ -78,13 +78,15 @@ def found_ambients(fit: Refit) -> tuple[FoundAmbient, ...]:
     sized = ([g for one, g in zip(structure.data, structure.gains(v), strict=True) if one.n_sessions]
              for v in (fit.v, std))
     found = []
-    for one, values, deviations in zip(records_of(structure.data), *sized, strict=True):
+    records = records_of(structure.data)
+    warmest = warmest_rooms(structure.base, records)
+    for one, most, values, deviations in zip(records, warmest, *sized, strict=True):
         for number, sigma, value, deviation in zip(sessions.numbers, sessions.sigma, values, deviations, strict=True):
             name = of.get(number)
             if name is not None and name not in one.record.input_names:
                 declared = structure.base.ambients[name].temperature
                 found.append(FoundAmbient(name, one.label, declared + sigma * float(value), sigma * float(deviation),
-                                          declared, one.warmest_room(structure.base)))
+                                          declared, most))
     return tuple(found)
 
 

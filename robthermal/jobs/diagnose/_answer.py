@@ -24,7 +24,7 @@ def answer_sentence(found: Diagnosis) -> str:
         return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])
     if found.verdict == "consistent":
         if found.reference:
-            return nothing_changed(found)
+            return " ".join([nothing_changed(found), *found.caveats])
         text = "The model explains the records: its error is no larger than the noise of the sensors allows."
         return " ".join([text, *found.noise_floor.remarks[:1], *found.caveats])
     remarks = found.noise_floor.remarks[:1]
