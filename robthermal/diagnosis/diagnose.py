@@ -212,16 +212,13 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said = [judged.means] if judged.means else []
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
-    if judged.plain is not None:
-        listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)
-                  for name in (one.key, *others)]
-        said += within_the_body(nominal.system, listed)
     if verdict in ("named", "named_with_remainder", "ambiguous"):
         said += periods_undecided(state.rounds, verdict != "named")
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
+    listed = [name for one, others in zip(found.effects, found.alternatives, strict=True) for name in (one.key, *others)]
     return (*said, *may_be_the_room(nominal, state.fit.structure.effects),
-            *doubts(nominal.system, judged.plain is not None))
+            *(within_the_body(nominal.system, listed) if judged.plain is not None else ()), *doubts(nominal.system, judged.plain is not None))
 
 
 def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:
