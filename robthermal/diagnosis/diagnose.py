@@ -216,9 +216,12 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
         said += periods_undecided(state.rounds, verdict != "named")
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
-    listed = [name for one, others in zip(found.effects, found.alternatives, strict=True) for name in (one.key, *others)]
-    return (*said, *may_be_the_room(nominal, state.fit.structure.effects),
-            *(within_the_body(nominal.system, listed) if judged.plain is not None else ()), *doubts(nominal.system, judged.plain is not None))
+    if judged.plain is None:
+        return (*said, *may_be_the_room(nominal, state.fit.structure.effects))
+    listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)
+              for name in (one.key, *others)]
+    return (*said, *may_be_the_room(nominal, state.fit.structure.effects), *within_the_body(nominal.system, listed),
+            *doubts(nominal.system, remainder=True))
 
 
 def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:
