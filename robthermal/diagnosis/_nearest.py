@@ -28,13 +28,13 @@ def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
     if left(one).share_explained <= 0.0:
         return (f"Nearest come{comes} {what}, with which the error on {records} does not fall ({one.before:.2g} to "
                 f"{one.after:.2g} {one.unit}): no name.")
-    before, after = _told_apart(one.before, one.after)
+    before, after = _with_digits(one.before, one.after)
     return (f"Nearest come{comes} {what}: with {them} the error on {records} falls from {before} to "
             f"{after} {one.unit}, noise alone would give {one.noise:.2g}. No name, because "
             f"{_why(judged)}.")
 
 
-def _told_apart(before: float, after: float) -> tuple[str, str]:
+def _with_digits(before: float, after: float) -> tuple[str, str]:
     """Two numbers with two digits, or with as many more as show which is smaller."""
     for digits in (2, 3):
         if f"{before:.{digits}g}" != f"{after:.{digits}g}":

@@ -1,4 +1,4 @@
-"""A single period in what is left, faster than those of periodic heats that are tried: something that cycles unseen."""
+"""A single period in what is left, faster than periodic heats that are tried: something cycles and is not recorded."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Line:
     sensor : str
         Thermometer with most of it.
     period : float
-        Period [s].
+        Period of the sine in the residual [s].
     share : float
         Part of the power of the residual at that thermometer [-].
     """
