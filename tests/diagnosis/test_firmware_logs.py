@@ -157,8 +157,7 @@ def hot_end(lag: float, seed: int, n: int) -> rt.Record:
 def test_beside_a_remainder_a_late_heater_is_not_called_a_late_thermometer() -> None:
     """The refit of the other lag ended far from its best, and the thermometer alone was named."""
     found = rt.diagnose(rt.thermal.parse_system(HOT_END), hot_end(6.0, 21, 400), effects=["input_lag", "sensor_lag"])
-    (effect,), (others,) = found.effects, found.alternatives
+    listed = {one.key for one in found.effects} | {name for others in found.alternatives for name in others}
     assert found.verdict == "ambiguous" and found.remainder is not None
-    assert {effect.key, *others} == {("input_lag", ("heater",)), ("sensor_lag", ("T_block",))}
-    assert effect.values["time_constant"][0] == pytest.approx(6.0, rel=0.15)
+    assert listed == {("input_lag", ("heater",)), ("sensor_lag", ("T_block",))}
     assert "A lag at block may also be the time that heat takes within block" in found.outcome.text

@@ -36,7 +36,8 @@ class Line:
     share: float
 
     def __str__(self) -> str:
-        return (f"{100 * self.share:.0f} % of what is left at {self.sensor} has a single period, {self.period:.3g} s, "
+        period = float(f"{self.period:.3g}")  # three digits, without an exponent
+        return (f"{100 * self.share:.0f} % of what is left at {self.sensor} has a single period, {period:g} s, "
                 "which no recorded input has: look for what switches or swings so often (a chiller, a thermostat, a "
                 "pump), and record it.")
 
