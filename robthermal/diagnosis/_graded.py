@@ -12,30 +12,27 @@ from dataclasses import replace
 from ..errors import Diverged, InputError
 from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge, no_names
 from ._outcomes import DiagnosisCode
+from ._rivals import CLOSED_SQUARE, predicting, predicts, with_rivals
 from ._searching import coarsely_searched, validated
-from .evidence import NEEDED, SURE, Evidence, Gap, Stability, expected_rms, left, reproducible, score, stability
+from .evidence import NEEDED, Evidence, Gap, Stability, expected_rms, left, reproducible, stability
 from .fit import Refit, coarsened, exact
 from .search import (
-    ALIKE,
     Accepted,
     Entry,
     SearchState,
     ShortList,
     one_place,
-    refit_short_list,
     revise,
     revised,
-    with_neighbors,
-    with_other_end,
     without,
 )
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
 _NOISE = 2.0  # whitened variance that a finer network must leave, to be all that is missing
-_CLOSED_SQUARE = 1.0 - (1.0 - 0.3) ** 2  # of the excess mean square of the validation records: 30 % of its rms
 
 
-def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple[Evidence, ...]:
+def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validation: Validation | None = None
+                ) -> tuple[Evidence, ...]:
     """Evidence for every effect of a fit.
 
     Parameters
@@ -44,6 +41,8 @@ def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple
         In the order of the effects of the fit.
     fit, nominal : Refit
         With all of them; without any.
+    validation : Validation, optional
+        Data that no fit has seen: an effect may be needed there that the training records hide.
     """
     if not rounds:
         return ()
@@ -56,11 +55,23 @@ def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit) -> tuple
         less = without(fit, place, nominal, round_.before)
         plain = bare if len(rounds) == 1 else without(whole, place, bare)
         before = max((whole if plain is None else plain).rms ** 2 - noise, 0.0)
+        needed = 1.0 - excess[-1] / before if before > 0 else 0.0
+        if needed < NEEDED and plain is not None and validation is not None:
+            needed = max(needed, _needed_held_out(whole, plain, validation))
         out.append(Evidence(
             share=(excess[place] - excess[place + 1]) / excess[0] if excess[0] > 0 else 0.0,
             reproducible=0.0 if less is None else reproducible(fit, less),
-            stability=_stability(fit, place), needed=1.0 - excess[-1] / before if before > 0 else 0.0))
+            stability=_stability(fit, place), needed=needed))
     return tuple(out)
+
+
+def _needed_held_out(whole: Refit, less: Refit, validation: Validation) -> float:
+    """Part of the excess mean square of the validation data left without an effect that it removes; 0 without data."""
+    try:
+        held = validation.predicted(less, whole)
+    except (Diverged, InputError):
+        return 0.0
+    return 0.0 if held is None else left(held.gap).share_explained
 
 
 def lasting_beyond_steps(judged: Judged) -> Judged:
@@ -126,15 +137,16 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             finer = state.nominal
         progress("testing over blocks, segments and validation data what may be named")
         tried = len(state.rounds)
-        state, found = _lasting(state, finer)
+        state, found = _lasting(state, finer, validation)
         if 0 < len(found) < tried and finer.structure.n_coarse:  # what is dropped may have made up for a wrong place
-            state, found = _lasting(chosen_again(state, finer), finer)
+            state, found = _lasting(chosen_again(state, finer), finer, validation)
         elif len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
-            state, found = _lasting(revise(replace(state, misfit_left=False)), finer)
+            state, found = _lasting(revise(replace(state, misfit_left=False)), finer, validation)
         if not found:
             return _nothing_lasts(judged, finer)
-        state = _with_rivals(validated(replace(state, misfit_left=False), validation, progress), finer, validation)
-        return _graded(judged, state, finer, validation)
+        state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
+        state = _predicting(validated(state, validation, progress), finer, validation, progress)
+        return _graded(judged, with_rivals(state, finer, validation), finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
 
@@ -156,19 +168,19 @@ def chosen_again(state: SearchState, nominal: Refit) -> SearchState:
     return replace(state, rounds=rounds, fit=fit, misfit_left=False)
 
 
-def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evidence, ...]]:
+def _lasting(state: SearchState, finer: Refit, validation: Validation) -> tuple[SearchState, tuple[Evidence, ...]]:
     """The effects that hold over blocks and segments and are needed, the least needed one dropped first.
 
     What the records cannot tell from it is asked first: a rival that holds and is needed takes its place.
     """
     rounds, fit = state.rounds, state.fit
-    found = evidence_of(rounds, fit, finer)
+    found = evidence_of(rounds, fit, finer, validation)
     while not all(one.lasting for one in found):
         worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
-        instead = in_its_place(rounds, worst, finer)
+        instead = in_its_place(rounds, worst, finer, validation)
         if instead is not None:
             rounds, fit = instead
-            found = evidence_of(rounds, fit, finer)
+            found = evidence_of(rounds, fit, finer, validation)
             continue
         less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
         if less is None:
@@ -178,11 +190,12 @@ def _lasting(state: SearchState, finer: Refit) -> tuple[SearchState, tuple[Evide
             fit = coarsened(fit)
         if rounds:
             rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
-        found = evidence_of(rounds, fit, finer)
+        found = evidence_of(rounds, fit, finer, validation)
     return replace(state, nominal=finer, rounds=rounds, fit=fit), found
 
 
-def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit) -> tuple[tuple[Accepted, ...], Refit] | None:
+def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit, validation: Validation | None = None
+                 ) -> tuple[tuple[Accepted, ...], Refit] | None:
     """The effects with a rival in the place of one that does not last; None if none of its rivals lasts.
 
     Beside unknowns of a finer network an effect may have the smallest sum of squares and remove nothing where the
@@ -196,9 +209,11 @@ def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit) -> tupl
         Of the effect that does not last.
     finer : Refit
         Without any effect.
+    validation : Validation, optional
+        Data that no fit has seen.
     """
     tried = filter(None, (_instead(rounds, place, entry) for entry in rounds[place].contenders))
-    lasting = [(new, at) for new, at in tried if evidence_of(new, new[at].best.fit, finer)[at].lasting]
+    lasting = [(new, at) for new, at in tried if evidence_of(new, new[at].best.fit, finer, validation)[at].lasting]
     if not lasting:
         return None
     (chosen, at), *others = lasting
@@ -219,39 +234,17 @@ def _instead(rounds: tuple[Accepted, ...], place: int, rival: Entry) -> tuple[tu
     return tuple(out), at
 
 
-def _with_rivals(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
-    """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
-
-    ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
-    was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there. A rival with
-    which the validation data keep their gap could not be named itself, and is none.
-    """
-    if finer.structure.n_coarse:
-        return replace(state, rounds=tuple(with_other_end(with_neighbors(one)) for one in state.rounds))
-    rounds = []
-    for place, round_ in enumerate(state.rounds):
-        less = without(state.fit, place, finer, round_.before)
-        known = {round_.best.candidate.key, *(entry.candidate.key for entry in round_.contenders)}
-        entries = () if less is None else refit_short_list(less, score(less, state.names)).entries
-        rivals = (entry for entry in entries if entry.candidate.key not in known
-                  and (reproducible(state.fit, entry.fit) < SURE or _nearly(state.fit, entry.fit, less))
-                  and _predicts(entry.fit, finer, validation))
-        rounds.append(replace(round_, contenders=(*round_.contenders, *rivals)))
-    return replace(state, rounds=tuple(rounds))
-
-
-def _predicts(fit: Refit, nominal: Refit, validation: Validation) -> bool:
-    """Whether a fit closes enough of the gap of the validation data, if there are any."""
-    try:
-        held = validation.predicted(exact(nominal), fit)
-    except (Diverged, InputError):  # a model that runs away predicts nothing
-        return False
-    return held is None or left(held.gap).share_explained >= _CLOSED_SQUARE
-
-
-def _nearly(fit: Refit, rival: Refit, less: Refit | None) -> bool:
-    """Whether a rival does nearly all that the effect does: the model error decides between them, not the records."""
-    return less is not None and less.rss - rival.rss > ALIKE * (less.rss - fit.rss)
+def _predicting(state: SearchState, finer: Refit, validation: Validation, progress: Progress) -> SearchState:
+    """The state with a rival in the place of an effect with which the validation data keep their gap, the rest anew."""
+    instead = predicting(state, finer, validation)
+    if instead is None:
+        return state
+    progress("choosing the others again beside a rival with which the validation data are predicted")
+    for tried in (chosen_again(instead, finer), instead):
+        kept, found = _lasting(tried, finer, validation)
+        if found and predicts(kept.fit, finer, validation):
+            return kept
+    return state
 
 
 def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Validation) -> Judged:
@@ -271,15 +264,15 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
     gaps = [Gap(nominal.rms, plain.rms, expected_rms(plain))] + ([] if held is None else [held.gap])
     if not _closes(gaps):
         return replace(judged, why=_beside(state, f"take {_shares(gaps)} off the excess mean square, less than the "
-                                           f"{100.0 * _SHARE:.0f} % asked for on training records or the "
-                                           f"{100.0 * _CLOSED_SQUARE:.0f} % on validation records"))
+                                           f"{100.0 * CLOSED_SQUARE:.0f} % asked for on validation records or, without "
+                                           f"any, the {100.0 * _SHARE:.0f} % on training records"))
     if not independent_of_step(fit):
         return replace(judged, why=_beside(state, "move when the integration is refined"))
     ambiguous = not all(one_place(round_, nominal.structure.base) for round_ in state.rounds)
     verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
     code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
     return Judged(state=kept, adequacy=down.adequacy, hold_out=held, verdict=verdict, outcome=code.outcome(),
-                  plain=plain, evidence=evidence_of(state.rounds, fit, finer))
+                  plain=plain, evidence=evidence_of(state.rounds, fit, finer, validation))
 
 
 def _beside(state: SearchState, what: str) -> str:
@@ -294,10 +287,12 @@ def _shares(gaps: Sequence[Gap]) -> str:
 
 
 def _closes(gaps: Sequence[Gap]) -> bool:
-    """Whether most of the excess is gone on the training records, and enough of it on the validation records."""
-    if left(gaps[0]).share_explained < _SHARE:
-        return False
-    return all(left(gap).share_explained >= _CLOSED_SQUARE for gap in gaps[1:])
+    """Whether most of the excess is gone on the validation records, or without any on the training records.
+
+    Training records may hide what is missing behind a remainder that another effect leaves: then some of it is enough.
+    """
+    train, *held_out = (left(gap).share_explained for gap in gaps)
+    return train > 0.0 and all(share >= CLOSED_SQUARE for share in held_out) if held_out else train >= _SHARE
 
 
 def _nothing_lasts(judged: Judged, finer: Refit) -> Judged:

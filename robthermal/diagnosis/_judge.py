@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import Outcome
 from ._outcomes import DiagnosisCode
 from .data import Measured
-from .evidence import Adequacy, Evidence, HoldOut, adequacy, hold_out
+from .evidence import Adequacy, Evidence, Gap, HoldOut, adequacy, hold_out
 from .fit import Refit, Whitened
 from .search import Accepted, SearchState, ShortList, implausible_names, ruled_out, with_wider_noise
 
@@ -19,6 +19,7 @@ Verdict = Literal["named", "named_with_remainder", "ambiguous", "consistent", "u
 Name = tuple[str, tuple[str, ...]]
 Progress = Callable[[str], None]
 _LARGE = 1.5  # whitened variance
+_VISIBLE = 0.2  # of the mean square of noise: an error beyond it that effects have to lessen
 _FAR = 5.0  # whitened variance that no noise within the limits explains
 
 
@@ -180,6 +181,9 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
         faults.append(f"A large misfit stays ({how}).")
     if held is not None and not held.outcome.ok:
         faults.append(held.outcome.text)
+    if state.rounds and held is not None and _worse(held.gap) and not any(map(_of_its_time, state.rounds)):
+        faults.append(f"With these effects the error on the validation records does not fall ({held.gap.before:.3g} to "
+                      f"{held.gap.after:.3g} {held.gap.unit}).")
     if state.rounds:
         faults += no_names(state)
         if not independent_of_step(state.fit):
@@ -187,6 +191,17 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
         if not state.fit.outcome.ok:
             faults.append(state.fit.outcome.text)
     return faults
+
+
+def _of_its_time(round_: Accepted) -> bool:
+    """Whether an effect has a time of the training records in it: a swing, a step; it says little of other records."""
+    effect = round_.best.candidate.effect
+    return bool(effect.paired) or any(quantity.name == "time" for quantity in effect.quantities)
+
+
+def _worse(gap: Gap) -> bool:
+    """Whether an error beyond noise is no smaller with the effects: weights that trust random heat do not see it."""
+    return gap.before**2 > (1.0 + _VISIBLE) * gap.noise**2 and gap.after >= gap.before
 
 
 def _verdict(state: SearchState, faults: Sequence[str]) -> tuple[Verdict, Outcome]:

@@ -15,6 +15,7 @@ from .search import (
     begin,
     beside,
     compare,
+    exchange,
     refit_candidates,
     revise,
     shortlist,
@@ -46,7 +47,7 @@ def searched(nominal: Refit, names: tuple[str, ...] | None, validation: Validati
     state = revise(state)
     if len(state.rounds) > 1 and not state.misfit_left:
         progress("selecting all effects at once, to compare")
-    return validated(compare(state), validation, progress)
+    return exchanged(validated(compare(state), validation, progress), validation)
 
 
 def coarsely_searched(finer: Refit, exact: SearchState, progress: Progress) -> SearchState:
@@ -81,6 +82,21 @@ def validated(state: SearchState, validation: Validation, progress: Progress) ->
         return state
     progress("testing on the validation data whether any effect is contradicted")
     return validate(state, validation_data(state.fit, validation.data, validation.operating_point))
+
+
+def exchanged(state: SearchState, validation: Validation) -> SearchState:
+    """List what effects may be together that none may be alone.
+
+    Parameters
+    ----------
+    state : SearchState
+        Complete state of the search.
+    validation : Validation
+        Data that no fit has seen.
+    """
+    if not state.rounds or validation.data is None:
+        return exchange(state)
+    return exchange(state, validation_data(state.fit, validation.data, validation.operating_point))
 
 
 def accepted_effects(state: SearchState, progress: Progress, known: Accepted | None = None) -> SearchState:

@@ -137,7 +137,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                     session_gain=session_gain)
     refuse_constant(nominal.system, [path.one for path in nominal.records])
     judged = _judged(nominal, names, checked, progress)
-    if too_warm(nominal) and (judged.plain is not None or judged.verdict == "unexplained"):
+    if too_warm(nominal) and _asks_for_a_warm_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")
         judged = _judged(only_heated(nominal), names, checked, progress)
     judged = asked_of_means(judged, lambda others: refit(system, others, floor, parameters=parameters,
@@ -160,6 +160,16 @@ def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validatio
     """Search, verdict, and where something is left beyond the noise the graded verdict."""
     judged = lasting_beyond_steps(judge(searched(nominal, names, validation, progress), validation, progress))
     return graded(reconsider_noise(judged, validation), validation, progress)
+
+
+def _asks_for_a_warm_room(judged: Judged) -> bool:
+    """Whether an answer does not explain the records down to the noise, or only with a room too warm for the machine.
+
+    Where the room comes out cool enough beside the effects named, holding it below the readings would change nothing.
+    """
+    if judged.verdict == "unexplained":
+        return True
+    return judged.plain is not None and too_warm(judged.plain)
 
 
 def concluded(judged: Judged) -> Diagnosis:

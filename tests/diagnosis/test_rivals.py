@@ -14,8 +14,9 @@ from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.diagnosis import Entry
-from robthermal.diagnosis._graded import _predicts, chosen_again, in_its_place
+from robthermal.diagnosis._graded import chosen_again, in_its_place
 from robthermal.diagnosis._judge import Validation
+from robthermal.diagnosis._rivals import predicts
 from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift
@@ -153,7 +154,7 @@ def test_of_an_effect_that_does_not_last_only_rivals_that_do_take_the_place(monk
     """The path has two names, from x1 and from x2; which of them lasts is told here, that of the lag does not."""
     good, bad = Evidence(0.9, 1.0, Stability(6, 0.1), 0.9), Evidence(0.0, 1.0, Stability(6, 0.1), 0.0)
 
-    def told(rounds, fit, nominal):
+    def told(rounds, fit, nominal, validation=None):
         return tuple(good if set(lasting.split()) & set(one.best.candidate.where) else bad for one in rounds)
 
     one = found(16)
@@ -221,9 +222,9 @@ def test_a_rival_that_leaves_the_gap_of_the_validation_data_is_none():
                  for name in ("missing_link", "sensor_lag"))
     seen, unseen = Validation(None), Validation(measured(6, seed=2))
     assert lag.rss < nominal.rss
-    assert _predicts(path, nominal, unseen)
-    assert not _predicts(lag, nominal, unseen) and not _predicts(nominal, nominal, unseen)
-    assert _predicts(lag, nominal, seen)  # nothing held out, nothing against it
+    assert predicts(path, nominal, unseen)
+    assert not predicts(lag, nominal, unseen) and not predicts(nominal, nominal, unseen)
+    assert predicts(lag, nominal, seen)  # nothing held out, nothing against it
 
 
 def test_a_name_beside_a_remainder_on_a_machine_with_modules_says_that_it_is_doubtful():

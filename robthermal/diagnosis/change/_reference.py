@@ -26,6 +26,7 @@ from ..fit import (
     Refit,
     SessionGain,
     Sessions,
+    Structure,
     extended,
     filters,
     fitted,
@@ -135,11 +136,12 @@ def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEsti
     nominal = fit.structure
     values = np.clip(nominal.ranges.values(scatter.center), nominal.ranges.lower, nominal.ranges.upper)
     ranges = replace(nominal.ranges, start=values, sigma=np.full(values.size, np.inf))
-    structure = Held(base=nominal.base.with_parameters(ranges.assigned(values)), ranges=ranges, data=tuple(data),
-                     starts=tuple(one.initial(nominal.base, "free") for one in data), tolerance=nominal.tolerance,
-                     sessions=_with_scatter(nominal.sessions, ranges, scatter) if len(data) > 1 else nominal.sessions,
-                     center=ranges.coordinates(values), root=root_of(scatter.next_one),
-                     only_heated=nominal.only_heated)
+    structure: Structure = Held(
+        base=nominal.base.with_parameters(ranges.assigned(values)), ranges=ranges, data=tuple(data),
+        starts=tuple(one.initial(nominal.base, "free") for one in data), tolerance=nominal.tolerance,
+        sessions=_with_scatter(nominal.sessions, ranges, scatter) if len(data) > 1 else nominal.sessions,
+        center=ranges.coordinates(values), root=root_of(scatter.next_one),
+        only_heated=nominal.only_heated)
     wider = float(np.sqrt(scatter.inflation))
     levels = NoiseScaling(wider, dict.fromkeys(floor.noise, wider))
     v = np.clip(structure.start(values, []), *structure.bounds)
@@ -147,7 +149,7 @@ def held(fit: Refit, scatter: Scatter, data: Sequence[DataSet], floor: NoiseEsti
         paths, whiteners = filters(structure, v, floor, levels)
         fitted_once = extended(Refit(structure, v, floor, levels, paths, whiteners, np.zeros(0), fit.outcome),
                                structure, v)
-        v = fitted_once.v
+        structure, v = fitted_once.structure, fitted_once.v  # lags may have been settled at the start: fewer unknowns
     return relinearized(fitted_once)
 
 

@@ -31,6 +31,7 @@ from ._short_list import refit_short_list as refit_short_list
 from ._stages import accept as accept
 from ._stages import begin as begin
 from ._stages import compare as compare
+from ._stages import exchange as exchange
 from ._stages import refit_candidates as refit_candidates
 from ._stages import revise as revise
 from ._stages import shortlist as shortlist
@@ -40,7 +41,7 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
-           "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods", "quantities_of",
-           "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise", "revised",
-           "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
+           "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods",
+           "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise",
+           "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
            "with_wider_noise", "without", "without_contradicted"]

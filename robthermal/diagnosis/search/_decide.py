@@ -71,9 +71,12 @@ class Accepted(Decision):
         Others whose BIC is within 10 of the best: the records cannot exclude them.
     ruled_out : tuple of Entry
         Those among them that the validation records exclude.
+    beaten : tuple of Entry
+        Others whose BIC is within 60 of the best: excluded beside the other effects as they are.
     """
 
     best: Entry = field(kw_only=True)
+    beaten: tuple[Entry, ...] = ()
 
 
 def decide(short: ShortList) -> Decision:
@@ -119,13 +122,14 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
     again = sorted(refiltered(before, renewed, near), key=lambda entry: -entry.delta_bic)
     winner = again[0]
     others = tuple(entry for entry in again[1:] if _as_good(entry, winner))
+    beaten = tuple(entry for entry in again[1:] if entry not in others)
     if winner.fit.structure is best.fit.structure:
         winner = Entry(winner.candidate, renewed, best.delta_bic, winner.p_value, winner.twins)
     else:
         own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
         gain = next(e.delta_bic for e in entries if e.candidate.key == winner.candidate.key)
         winner = Entry(winner.candidate, own, gain, winner.p_value, winner.twins)
-    return Accepted(before, best=winner, contenders=others)
+    return Accepted(before, best=winner, contenders=others, beaten=beaten)
 
 
 def _as_good(entry: Entry, winner: Entry) -> bool:

@@ -10,6 +10,7 @@ from ..evidence import Scores, explains, promised, promising, score
 from ..fit import Refit, coarsened
 from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
+from ._exchange import with_exchanged
 from ._joint_check import checked_jointly
 from ._resolve_alternatives import resolve_alternatives
 from ._revise import needed, revised
@@ -134,6 +135,21 @@ def validate(state: SearchState, data: Sequence[DataSet]) -> SearchState:
             break
         rounds, fit = revised(fewer, state.nominal, state.names) if fewer else (fewer, less)
     return replace(state, rounds=rounds, fit=fit)
+
+
+def exchange(state: SearchState, data: Sequence[DataSet] = ()) -> SearchState:
+    """List what only effects exchanged together can be: sets that explain all records as well.
+
+    Parameters
+    ----------
+    state : SearchState
+        State from `compare` or `validate`.
+    data : sequence of DataSet
+        Validation data, from `validation_data`, if there are any; nothing is fitted to them.
+    """
+    if not state.rounds or state.misfit_left:
+        return state
+    return replace(state, rounds=with_exchanged(state.rounds, state.fit, data))
 
 
 def _too_little(fit: Refit, scores: Scores) -> bool:

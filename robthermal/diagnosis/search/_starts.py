@@ -27,6 +27,7 @@ _MOVES = 0.1  # share of it that a start from nothing must reach not to be calle
 _MANY = 12  # evaluations along a curved valley
 BEHIND = 60.0  # ΔBIC by which a candidate may lie below the best, and still get there
 _SHARE = 0.3  # of the best ΔBIC, less that much
+_FACTOR = 1.0  # of a logarithm: a linearization says nothing of a parameter that changes by more than a factor e
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +152,18 @@ def _further_iterations(fit: Refit, tried: list[Refit], least: float, stands: fl
 
 
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
-    """Optimum of the linearized problem for a size within its bounds, and its sum of squares."""
+    """Optimum of the linearized problem for a size within its bounds, and its sum of squares.
+
+    No parameter starts farther than a factor e from where it was: a conductance of which the linearization asks a
+    millionth would start at its bound, where hardly anything depends on it.
+    """
     size = _believable(candidate, size, _smallest(candidate.trials(fit.paths[0])))
     target = fit.z - size * fit.whiten([path.columns([candidate]) for path in fit.paths])[:, 0]
     shift = np.linalg.lstsq(*turned(fit.J, target), rcond=1e-9)[0]
     left = target - fit.J @ shift
+    ranges = fit.structure.ranges
+    far = np.where(ranges.logarithmic, _FACTOR, np.inf)
+    shift[:far.size] = np.clip(shift[:far.size], -far, far)
     return np.clip(fit.v + shift, *fit.structure.bounds), size, float(left @ left)
 
 
