@@ -34,7 +34,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         return replace(state, rounds=tuple(with_other_end(with_neighbors(one)) for one in state.rounds))
     rounds = []
     for place, round_ in enumerate(state.rounds):
-        known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) != len(state.rounds)
+        known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)
                  or predicts(entry.fit, finer, validation)]
         rivals = (entry for entry in _rivals(state, place, finer) if predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*known, *rivals)))
