@@ -34,16 +34,22 @@ def without_contradicted(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refi
         lesser = [nominal if len(rounds) == 1 else without(fit, place, nominal, round_.before)
                   for place, round_ in enumerate(rounds)]
         tried = [fit, *(fit if less is None else less for less in lesser)]
-        with_all, *others = negative_log_predictive_density(tried, fit, data)
-        gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
-        against = [i for i in sorted(range(len(gains)), key=lambda i: -gains[i]) if gains[i] > BIC_GAP]
-        worst = next((i for i in against if np.isinf(with_all) or not _needed(fit, lesser[i], data)), None)
+        worst = _worst(fit, lesser, negative_log_predictive_density(tried, fit, data), data)
         less = None if worst is None else lesser[worst]
         if worst is None or less is None:
             return rounds, fit
         rounds = rounds[:worst] + rounds[worst + 1:]
         fit = fitted(less.structure, less.v, less.floor, less.levels) if rounds else nominal
     return rounds, fit
+
+
+def _worst(fit: Refit, lesser: Sequence[Refit | None], densities: Sequence[float], data: Sequence[DataSet]
+           ) -> int | None:
+    """Place of the effect that the validation records contradict most and the free run does not need; else None."""
+    with_all, *others = densities
+    gains = [with_all - other if other < with_all else 0.0 for other in others]  # not inf - inf
+    against = [i for i in sorted(range(len(gains)), key=lambda i: -gains[i]) if gains[i] > BIC_GAP]
+    return next((i for i in against if np.isinf(with_all) or not _needed(fit, lesser[i], data)), None)
 
 
 def _needed(fit: Refit, less: Refit | None, data: Sequence[DataSet]) -> bool:
