@@ -160,4 +160,5 @@ def test_beside_a_remainder_a_late_heater_is_not_called_a_late_thermometer() -> 
     listed = {one.key for one in found.effects} | {name for others in found.alternatives for name in others}
     assert found.verdict == "ambiguous" and found.remainder is not None
     assert listed == {("input_lag", ("heater",)), ("sensor_lag", ("T_block",))}
+    assert len(found.effects) == 1  # no accepted effect is its own alternative
     assert "A lag at block may also be the time that heat takes within block" in found.outcome.text

@@ -6,6 +6,7 @@ lump's inside does to it, and the refit of the other lag, which starts where the
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
 
 from ...errors import Diverged, InputError
@@ -13,25 +14,27 @@ from ...thermal import System
 from ..effects import Candidate, candidates
 from ..fit import Refit, extended
 from ._decide import Accepted
-from ._short_list import Entry, delta_bic
+from ._short_list import Entry, Key, delta_bic
 
 _LAGS = ("input_lag", "sensor_lag")
 _TIME = "time_constant"
 _ALIKE = 0.98  # of the sum of squares that the accepted lag removes: the inside of a lump is worth less than the rest
 
 
-def with_other_end(round_: Accepted) -> Accepted:
+def with_other_end(round_: Accepted, named: Set[Key]) -> Accepted:
     """List beside a lag that of the other end of its lump, refitted from the same time, if it does nearly as much.
 
     Parameters
     ----------
     round_ : Accepted
         Effect accepted beside a network that may be too coarse.
+    named : set of tuple
+        Keys of all effects that are accepted: none of them is a rival.
     """
     best, before = round_.best, round_.before
     if best.candidate.effect.name not in _LAGS:
         return round_
-    known = {entry.candidate.key for entry in round_.contenders}
+    known = named | {entry.candidate.key for entry in round_.contenders}
     others = [one for one in before.testable(candidates(before.structure.base, _LAGS))
               if one.key not in known and _ends_of_a_lump(before.structure.base, one, best.candidate)]
     try:
