@@ -32,7 +32,8 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
     """
     if finer.structure.n_coarse:
         named = {one.best.candidate.key for one in state.rounds}
-        return replace(state, rounds=tuple(with_other_end(with_neighbors(one), named) for one in state.rounds))
+        return replace(state, rounds=tuple(with_other_end(with_neighbors(one), named, state.names)
+                                           for one in state.rounds))
     rounds = []
     for place, round_ in enumerate(state.rounds):
         known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)

@@ -137,6 +137,8 @@ def test_the_lag_of_the_only_heater_may_be_that_of_all_thermometers() -> None:
     late = Accepted(nominal, best=Entry(fit.structure.effects[0], fit, 100.0, 0.0))
     (found,) = with_exchanged((late,), fit, ())
     assert {entry.candidate.key for entry in found.contenders} == {("sensor_lag", ("T1",)), ("sensor_lag", ("T2",))}
+    (asked,) = with_exchanged((late,), fit, (), ("input_lag",))
+    assert asked.contenders == ()  # a user who excludes lags of sensors is told of none
     both = rt.diagnosis.refit(board(path=True), measured(stairs(4), 4))
     fit = together(both, ("input_lag", "Q1"))
     (other,) = with_exchanged((Accepted(both, best=Entry(fit.structure.effects[0], fit, 100.0, 0.0)),), fit, ())

@@ -86,7 +86,7 @@ class Remainder:
         return said if self.line is None else f"{said} {self.line}"
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``diagnosis.json``.
+        """As in ``diagnosis.json``; "line" is there where a single period was found.
 
         Returns
         -------
@@ -95,7 +95,7 @@ class Remainder:
         return {**{name: vars(left) for name, left in self.gaps.items()}, "sensors": self.sensors,
                 "where": [{"lump": lump, "share": share} for lump, share in self.where],
                 "band": {"low": self.low, "high": self.high, "share": self.share}, "heat": self.heat,
-                "line": None if self.line is None else vars(self.line)}
+                **({} if self.line is None else {"line": vars(self.line)})}
 
 
 def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:

@@ -26,7 +26,8 @@ _TRIED = 2  # rivals of either effect
 _LATE_HEATER, _LATE_SENSOR = "input_lag", "sensor_lag"
 
 
-def with_exchanged(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet]) -> tuple[Accepted, ...]:
+def with_exchanged(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[DataSet],
+                   names: Sequence[str] | None = None) -> tuple[Accepted, ...]:
     """List beside every effect what takes its place in a set that is as good, with another effect exchanged as well.
 
     Parameters
@@ -37,6 +38,8 @@ def with_exchanged(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
         Fit with these effects.
     data : sequence of DataSet
         Validation data, which no fit has seen; none are needed.
+    names : sequence of str, optional
+        Effects that may be named; default the whole catalog.
     """
     out = list(rounds)
     for pair in combinations(range(len(rounds)), 2):
@@ -46,7 +49,7 @@ def with_exchanged(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
             for place, entry in zip(pair, both, strict=True):
                 out[place] = _with(out[place], entry)
     for place, round_ in enumerate(rounds):
-        if round_.best.candidate.effect.name == _LATE_HEATER:
+        if round_.best.candidate.effect.name == _LATE_HEATER and (names is None or _LATE_SENSOR in names):
             for entry in _late_sensors(round_.best, place, fit, data):
                 out[place] = _with(out[place], entry)
     return tuple(out)

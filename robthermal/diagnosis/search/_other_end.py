@@ -6,7 +6,7 @@ lump's inside does to it, and the refit of the other lag, which starts where the
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 from ...errors import Diverged, InputError
@@ -21,7 +21,7 @@ _TIME = "time_constant"
 _ALIKE = 0.98  # of the sum of squares that the accepted lag removes: the inside of a lump is worth less than the rest
 
 
-def with_other_end(round_: Accepted, named: Set[Key]) -> Accepted:
+def with_other_end(round_: Accepted, named: Set[Key], names: Sequence[str] | None) -> Accepted:
     """List beside a lag that of the other end of its lump, refitted from the same time, if it does nearly as much.
 
     Parameters
@@ -30,12 +30,15 @@ def with_other_end(round_: Accepted, named: Set[Key]) -> Accepted:
         Effect accepted beside a network that may be too coarse.
     named : set of tuple
         Keys of all effects that are accepted: none of them is a rival.
+    names : sequence of str or None
+        Effects that may be named; None for the whole catalog.
     """
     best, before = round_.best, round_.before
     if best.candidate.effect.name not in _LAGS:
         return round_
+    asked = [lag for lag in _LAGS if names is None or lag in names]
     known = named | {entry.candidate.key for entry in round_.contenders}
-    others = [one for one in before.testable(candidates(before.structure.base, _LAGS))
+    others = [one for one in before.testable(candidates(before.structure.base, asked))
               if one.key not in known and _ends_of_a_lump(before.structure.base, one, best.candidate)]
     try:
         own = _refitted(best, best.candidate, before) if others else before

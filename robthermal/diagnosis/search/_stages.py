@@ -149,7 +149,7 @@ def exchange(state: SearchState, data: Sequence[DataSet] = ()) -> SearchState:
     """
     if not state.rounds or state.misfit_left:
         return state
-    return replace(state, rounds=with_exchanged(state.rounds, state.fit, data))
+    return replace(state, rounds=with_exchanged(state.rounds, state.fit, data, state.names))
 
 
 def _too_little(fit: Refit, scores: Scores) -> bool:
