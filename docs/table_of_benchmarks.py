@@ -28,6 +28,12 @@ are replaced by "…" there and given in the column. What was measured with anot
 last change of the script, is marked *old*. {count}
 """
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
+_UNSURE = " A name without family and model is of earlier runs, and may stand for the same processor as one with them."
+
+
+def _no_model(name: str) -> bool:
+    """Whether a name was written before family and model were part of it."""
+    return "(family" not in name
 
 
 def text(kept: dict[str, dict[str, Any]], version: str, sources: dict[str, str]) -> str:
@@ -37,7 +43,7 @@ def text(kept: dict[str, dict[str, Any]], version: str, sources: dict[str, str])
     """
     names = sorted(kept)
     count = (f"Measured by us so far: one processor, {names[0]}." if len(names) == 1
-             else f"Measured so far: {len(names)} processors.")
+             else f"Measured so far: {len(names)} processors." + (_UNSURE if any(map(_no_model, names)) else ""))
     page = [HEAD.format(count=count)]
     for script in sorted({script for of in kept.values() for script in of}):
         found = {name: kept[name][script] for name in names if script in kept[name]}

@@ -26,7 +26,7 @@ from ._records import Spectrum
 SOURCE = Path(__file__).with_name("_moments.c")
 _MOST_SIZE, _MOST_COLUMNS = 5, 24  # as in the source
 LANES = (8, 4, 2)  # windows at a time: with AVX-512, with AVX2, on ARM
-_BINS = 21800  # of a chunk: long enough for other threads, and for what a call costs
+_BINS = 9700  # of a chunk: long enough for what a call costs, short enough for two threads to end together
 
 
 Solver = Callable[[Any], int]  # of a pointer to a problem; 0 where it is solved
