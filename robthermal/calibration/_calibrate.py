@@ -50,6 +50,7 @@ from ._refusals import (
     refuse_same_response,
     refuse_unknown_noise,
 )
+from ._remarks import remarks_of
 from ._response_comparison import comparison_of
 from ._response_model import ResponseProblem
 from ._score import score_of
@@ -264,7 +265,7 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         responses=tuple(comparison_of(system, part.one) for part in joint.responses),
         validation_responses=tuple(comparison_of(system, one) for one in compared),
         iterations=solution.iterations,
-        outcome=CalibrationCode.CONVERGED.outcome(),
+        outcome=CalibrationCode.CONVERGED.outcome(), remarks=tuple(remarks_of(joint, v)),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 

@@ -51,6 +51,9 @@ class Estimates:
         Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
+    remarks : tuple of str
+        What was taken for granted about the records, a sentence or three each: an ambient that they do not hold, when
+        their means were taken.
     """
 
     system: System
@@ -69,6 +72,7 @@ class Estimates:
     covariance_scale: float
     iterations: int
     outcome: Outcome
+    remarks: tuple[str, ...] = ()
 
     @property
     def std(self) -> dict[str, float]:
@@ -197,6 +201,7 @@ class Estimates:
                 name: list(ends) for name, ends in self.ranges().items()},
             "iterations": self.iterations,
             "outcome": vars(self.outcome),
+            "remarks": list(self.remarks),
         }
 
 

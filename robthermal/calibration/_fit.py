@@ -54,6 +54,9 @@ class Fit(Estimates):
         Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
+    remarks : tuple of str
+        What was taken for granted about the records, a sentence or three each: an ambient that they do not hold, when
+        their means were taken.
     noise : dict
         Standard deviation every sensor was weighted with [K or V].
     data, validation_data : tuple of Record
@@ -142,7 +145,8 @@ class Fit(Estimates):
         for kind, scores in (("fitted", self.train), ("validation", self.validation)):
             rows += [(f"RMSE, {kind} {one.record}", ", ".join(f"{name} {e:.3g} {units.get(name, 'K')}"
                                                               for name, e in one.rmse.items())) for one in scores]
-        return short_table("Calibration: parameter, value ± standard deviation", rows, str(self.outcome))
+        return short_table("Calibration: parameter, value ± standard deviation", rows,
+                           " ".join([*self.remarks, str(self.outcome)]))
 
     def __str__(self) -> str:
         lines, units = self._lines(), self.system.sensor_units
@@ -152,7 +156,7 @@ class Fit(Estimates):
                 lines.append(f"{kind} {one.record}: " + ", ".join(said))
         for kind, found in (("fitted", self.responses), ("validation", self.validation_responses)):
             lines += [f"{kind} response {one}" for one in found]
-        return "\n".join([*lines, str(self.outcome)])
+        return "\n".join([*lines, *self.remarks, str(self.outcome)])
 
 
 def _score(score: Score) -> dict[str, Any]:

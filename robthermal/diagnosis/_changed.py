@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +14,20 @@ from ..fitting import Choice
 from ..thermal import System
 from ._judge import Judged, Progress, Validation, Verdict, alternatives
 from ._outcomes import DiagnosisCode
-from .change import NAME, SIZE, Excess, Reference, Search, excess_of, held, pinned, reference_of, searched, unsteady
+from .change import (
+    NAME,
+    SIZE,
+    Excess,
+    Reference,
+    Search,
+    excess_of,
+    held,
+    pinned,
+    reference_of,
+    searched,
+    unsteady,
+    visible_changes,
+)
 from .data import DataSet, Measured, as_measured, noise_floor, records_of, refuse_constant, without_outliers
 from .evidence import Gap, adequacy, expected_rms, left
 from .fit import Refit, SessionGain, exact, too_warm
@@ -40,6 +55,10 @@ class Compared:
         Standard deviation of every parameter of the fit from record to record, relative to it [-].
     deviation : dict
         How far every parameter of the new records is from the mean of the reference records, relative to it [-].
+    visible : dict
+        Where nothing has changed: the smallest relative decrease ("lower") and increase ("higher") of every parameter
+        of the fit, and of the gain of every heater and module, that the new records would have shown with a chance of
+        0.9 [-]; infinite where not even a large one.
 
     Examples
     --------
@@ -55,6 +74,19 @@ class Compared:
     remainder: float
     scatter: dict[str, float]
     deviation: dict[str, float]
+    visible: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds under "reference"; null for a change that is not seen at all.
+
+        Returns
+        -------
+        dict
+        """
+        visible = {name: {way: size if math.isfinite(size) else None for way, size in sizes.items()}
+                   for name, sizes in self.visible.items()}
+        return {**vars(self), "visible": visible} if visible else {
+            key: value for key, value in vars(self).items() if key != "visible"}
 
 
 def changed(system: System, records: Measured | Sequence[Measured], reference: Measured | Sequence[Measured], *,
@@ -91,7 +123,11 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
         new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
         progress("trying every change of a parameter, and every effect of the catalog")
         found = searched(new, healthy, names)
-        return _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+        judged, said = _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+        if judged.verdict != "consistent":
+            return judged, said
+        seen = visible_changes(new, healthy, found)
+        return judged, replace(said, visible={one.name: {"lower": one.lower, "higher": one.higher} for one in seen})
 
     answer = compared(warmest=False)
     if not too_warm(answer[0].state.fit):
@@ -150,7 +186,8 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
              ) -> tuple[Verdict, Outcome]:
     reasons = " ".join(excess.reasons)
     if not found.rounds and not reasons:
-        text = "Nothing has changed: the new records are within the scatter of the reference records."
+        text = ("Nothing has changed that the new records would show: they are within the scatter of the reference "
+                "records.")
         return "consistent", DiagnosisCode.CONSISTENT.outcome(text)
     if not found.rounds or (reasons and removed < _MOST) or not _closes(gaps[1:]):
         helped = "; ".join(map(str, found.rounds))

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
-from ._changed import changed
+from ._changed import Compared, changed
 from ._doubts import (
     ambients_in_words,
     doubts,
@@ -28,6 +28,7 @@ from ._means import asked_of_means
 from ._nearest import nearest
 from ._refine import refine as refined
 from ._searching import searched
+from ._visible_words import visible_in_words
 from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor, refuse_constant
 from .diagnosis import Diagnosis, Found
@@ -129,7 +130,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                              remedy="Leave it out: a record brings its own inputs.")
         judged, compared = changed(system, records, reference, validation=checked, parameters=parameters, names=names,
                                    noise=noise, session_gain=session_gain, progress=progress)
-        return replace(concluded(judged), reference=compared)
+        return _with_reference(concluded(judged), compared)
     progress("reading the noise off the records")
     floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
     progress("refitting the nominal system")
@@ -206,6 +207,13 @@ def concluded(judged: Judged) -> Diagnosis:
         ambients=found_ambients(fit), means=judged.means)
     caveats = _caveats(judged, diagnosis)
     return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=_text(diagnosis, caveats)))
+
+
+def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
+    """With what the reference records say, and how large a change would have been seen."""
+    visible = visible_in_words(compared.visible)
+    return replace(found, reference=compared, caveats=(*found.caveats, *visible),
+                   outcome=replace(found.outcome, text=" ".join([found.outcome.text, *visible])))
 
 
 def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:

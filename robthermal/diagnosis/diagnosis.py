@@ -214,7 +214,7 @@ class Diagnosis:
             "resolving": None if self.resolving is None else self.resolving.to_dict(),
             "ambients": list(map(_with_unit, self.ambients)),
             "outcome": vars(self.outcome),
-            **({} if self.reference is None else {"reference": vars(self.reference)}),
+            **({} if self.reference is None else {"reference": self.reference.to_dict()}),
             **({} if self.refinement is None else {"refinement": self.refinement.to_dict()}),
             **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
         }

@@ -253,3 +253,47 @@ def test_bad_input(rig: rt.System, old: list[rt.Record], what: str, message: str
         more["reference"] = rt.identify.lpm(record(92, room=False, **SIZES))
     with pytest.raises(rt.InputError, match=message):
         rt.diagnose(rig, new, **more)
+
+
+@pytest.fixture(scope="module")
+def unchanged(rig: rt.System, old: list[rt.Record]) -> rt.diagnosis.Diagnosis:
+    return rt.diagnose(rig, record(22, **SIZES), reference=old, effects=FEW)
+
+
+def test_how_large_a_change_would_have_been_seen_is_said(rig: rt.System, unchanged: rt.diagnosis.Diagnosis) -> None:
+    assert unchanged.verdict == "consistent" and unchanged.reference is not None
+    visible = unchanged.reference.visible
+    assert list(visible) == [*rig.fit, "inputs.heater.gain"]
+    assert all(0.05 < size < 0.8 for sizes in visible.values() for size in sizes.values())
+    assert unchanged.to_dict()["reference"]["visible"] == visible
+    least = max(visible, key=lambda name: max(visible[name].values()))
+    assert rt.thermal.parameter_in_words(least) in unchanged.caveats[-1].partition(";")[0]
+    assert unchanged.outcome.text.endswith(unchanged.caveats[-1]) and "may not be visible" in unchanged.caveats[-1]
+
+
+def test_a_change_that_is_said_to_be_visible_is_seen(rig: rt.System, unchanged: rt.diagnosis.Diagnosis,
+                                                     old: list[rt.Record]) -> None:
+    """Changed by what is stated, the same day is called changed most of the time, and never at a third of it."""
+    assert unchanged.reference is not None
+    seen = {1.0: 0, 1 / 3: 0}
+    for name, factor in ((CONTACT, "contact"), ("links.plate-sink.conductance", "middle"),
+                         ("inputs.heater.gain", "power")):
+        for part in seen:
+            day = Day({factor: 1.0 - part * unchanged.reference.visible[name]["lower"]})
+            found = rt.diagnose(rig, record(22, day, **SIZES), reference=old, effects=FEW)
+            seen[part] += found.verdict != "consistent"
+    assert seen[1.0] >= 2 and seen[1 / 3] == 0
+
+
+def test_a_heater_too_weak_to_be_seen_is_said(rig: rt.System) -> None:
+    """Half a watt beside a path that no file has: it may fail altogether, and nobody would know."""
+    lossy = [record(seed, Day(loss=0.15), **SIZES) for seed in (81, 82, 83, 84)]
+    text = SYSTEM.replace("[sensors.T_block]", '[inputs.spare]\nlump = "plate"\n\n[sensors.T_block]')
+    on = np.repeat(np.tile([0.0, 0.5], 15), 20)[:SIZES["length"]]
+    days = [rt.Record(sample_time=one.sample_time, inputs=np.column_stack([one.inputs, on]), outputs=one.outputs,
+                      input_names=[*one.input_names, "spare"], output_names=one.output_names) for one in lossy]
+    found = rt.diagnose(rt.thermal.parse_system(text), days[3], reference=days[:3], effects=["input_gain"])
+    assert found.verdict == "consistent" and found.reference is not None
+    assert found.to_dict()["reference"]["visible"]["inputs.spare.gain"] == {"lower": None, "higher": pytest.approx(
+        found.reference.visible["inputs.spare.gain"]["higher"])}
+    assert any("the gain of spare could be 90 % lower" in text.lower() for text in found.caveats)

@@ -76,7 +76,8 @@ def test_a_named_effect_is_adopted(tmp_path: Path) -> None:
     project.write_text(f"{PROJECT}[diagnose]\nadopt = true\n")
     report, after = go(project, tmp_path / "out")
     assert statuses(report) == ["skipped", "cached", "done", "done", "skipped", "skipped"]
-    assert {one.code: one.level for one in report.reasons} == {"diagnosis_named": "remark"}
+    assert {one.code: one.level for one in report.reasons} == {"diagnosis_named": "remark",
+                                                                    "ambient_not_recorded": "remark"}
     assert report.verdict == "PASS WITH REMARKS" and after["diagnose"] == {
         "verdict": "named", "adopted": True, "effects": ["sensor_lag(T)"]}
     row = after["calibrate"]["parameters"]["sensors.T.time_constant"]  # type: ignore[index]

@@ -74,7 +74,7 @@ def test_the_stated_tolerance_counts(gate: str, verdict: str, level: str, tmp_pa
 def test_a_model_that_predicts_passes_with_what_a_reader_has_to_know(tmp_path: Path) -> None:
     result = bar(tmp_path)
     assert result.verdict == "PASS WITH REMARKS" and codes(result, "fail") == set()
-    assert codes(result, "remark") == {"not_diagnosed"}
+    assert codes(result, "remark") == {"not_diagnosed", "ambient_not_recorded"}
 
 
 def test_remarks_about_the_data(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_remarks_about_the_data(tmp_path: Path) -> None:
         "[19.0, 21.0]", "[0.0, 21.0]") + 'parameters = "none"\n'
     result = bar(tmp_path, project=project, system=SYSTEM.replace("noise = 0.02\n", ""))
     assert codes(result, "remark") == {"no_validation", "not_diagnosed", "simulated_data", "no_noise_stated",
-                                       "outside_data", "nominal_only"}
+                                       "outside_data", "nominal_only", "ambient_not_recorded"}
     (row,) = result.misfits
     assert row.noise == pytest.approx(NOISE, rel=0.1), "from second differences"
     constant = bar(tmp_path, project=project.replace('["train.csv"]', '["still.csv"]')) if _still(tmp_path) else result

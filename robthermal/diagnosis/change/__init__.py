@@ -15,7 +15,10 @@ from ._scatter import random_effects as random_effects
 from ._search import Search as Search
 from ._search import searched as searched
 from ._steady import unsteady as unsteady
+from ._visible import Visible as Visible
+from ._visible import visible_changes as visible_changes
 from ._yardstick import effective_number as effective_number
 
-__all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "effective_number", "excess_of", "held",
-           "parameter_changes", "pinned", "random_effects", "reference_of", "relative", "searched", "unsteady"]
+__all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "Visible", "effective_number", "excess_of",
+           "held", "parameter_changes", "pinned", "random_effects", "reference_of", "relative", "searched", "unsteady",
+           "visible_changes"]

@@ -90,10 +90,21 @@ def _tested(fit: Refit, ranges: Ranges, names: Sequence[str] | None) -> list[Can
 
 def _all_refitted(fit: Refit, scores: Scores, reference: Reference) -> list[_Tried]:
     """Candidates worth a refit: changes of parameters, and what the catalog adds to them."""
+    return [one for part, alpha in families(scores) for one in _refitted(fit, part, reference, alpha)]
+
+
+def families(scores: Scores) -> Iterator[tuple[Scores, float]]:
+    """Changes of parameters, then what the catalog adds to them, each with its family-wise chance of a false alarm.
+
+    Parameters
+    ----------
+    scores : Scores
+        Of all candidates.
+    """
     own = np.array([candidate.effect.name == NAME for candidate in scores.candidates], bool)
     parameters, catalog = _part(scores, own), _part(scores, ~own)
-    return [*_refitted(fit, parameters, reference, _ALPHA_PARAMETERS),
-            *_refitted(fit, _without_repeats(catalog, parameters), reference, _ALPHA_CATALOG)]
+    yield parameters, _ALPHA_PARAMETERS
+    yield _without_repeats(catalog, parameters), _ALPHA_CATALOG
 
 
 def _one(fit: Refit, tried: Sequence[_Tried], reference: Reference) -> Accepted | None:

@@ -26,6 +26,35 @@ def squares(fit: Refit, scores: Scores, i: int) -> float:
     return statistic * power / (max(fit.degrees_of_freedom - 1, 1) + statistic)
 
 
+def length_of(fit: Refit, scores: Scores, i: int) -> float:
+    """Length of the signature of candidate i per unit of its size; 0 for one without a signature.
+
+    Parameters
+    ----------
+    fit : Refit
+        That was scored.
+    scores : Scores
+        Scores on that fit.
+    i : int
+        Place in `candidates`.
+    """
+    if not np.any(scores.signatures[:, i]):
+        return 0.0
+    left = float(fit.rest @ fit.rest) - squares(fit, scores, i)
+    return math.sqrt(left / max(fit.degrees_of_freedom - 1, 1)) / float(scores.std[i])
+
+
+def freedom_of(n_reference: int) -> float:
+    """Degrees of freedom of the scatter that so many reference records tell.
+
+    Parameters
+    ----------
+    n_reference : int
+        Number of reference records.
+    """
+    return COUNTS + n_reference - 1
+
+
 def inflation(candidate: Candidate, each: Sequence[Refit], n_new: int) -> float:
     """By how much the squares of a candidate exceed those of white noise and scatter on the reference records.
 
@@ -45,7 +74,7 @@ def inflation(candidate: Candidate, each: Sequence[Refit], n_new: int) -> float:
             own = squares(fit, scores, 0)
             total += own + max(own - 1.0, 0.0) * max(n_new / fit.n_readings - 1.0, 0.0)
     n = len(each)
-    return max(1.0, (COUNTS + (n + 1) / n * total) / (COUNTS + n - 1))
+    return max(1.0, (COUNTS + (n + 1) / n * total) / freedom_of(n))
 
 
 def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> float:
@@ -62,7 +91,7 @@ def chance(decrease: float, dimension: int, kappa: float, n_reference: int) -> f
     n_reference : int
         Number of reference records.
     """
-    return float(f_sf(max(decrease, 0.0) / dimension / kappa, dimension, COUNTS + n_reference - 1))
+    return float(f_sf(max(decrease, 0.0) / dimension / kappa, dimension, freedom_of(n_reference)))
 
 
 def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float:
@@ -81,7 +110,7 @@ def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float
     seen = signatures[:, np.linalg.norm(signatures, axis=0) > 0.0]
     if seen.shape[1] < 2:
         return 1.0
-    freedom = COUNTS + n_reference - 1
+    freedom = freedom_of(n_reference)
     values, vectors = np.linalg.eigh(seen.T @ seen)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     g = np.random.default_rng(_SEED).standard_normal((_DRAWS, seen.shape[1])) @ root.T
@@ -91,7 +120,7 @@ def effective_number(signatures: NDArray[np.float64], n_reference: int) -> float
 
 def within_scatter(difference: float, kappa: float, n_reference: int) -> bool:
     """Whether two candidates differ by no more than the scatter may make."""
-    return bool(difference < max(_LEAST, kappa * f_isf(_TIED, 1, COUNTS + n_reference - 1)))
+    return bool(difference < max(_LEAST, kappa * f_isf(_TIED, 1, freedom_of(n_reference))))
 
 
 def with_held_shape(candidate: Candidate) -> Candidate:

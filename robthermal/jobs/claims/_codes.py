@@ -51,6 +51,9 @@ class GateCode(Enum):
     SIMULATED_DATA = ("The records are simulated: they say nothing about a machine.", "Replace them by measurements.")
     CONSTANT_INPUT = ("An input never changes in the records: nothing can be learnt about what it does.",
                       "Change it during a measurement.")
+    AMBIENT_NOT_RECORDED = ("A record does not hold an ambient: it was taken to be constant, as the system file says, "
+                            "and what it really was may have moved the parameters.",
+                            "Record its temperature as a column; or put ambients.NAME.temperature into [fit].")
     RESAMPLED = ("The samples of a record were not on a uniform grid: the readings were interpolated.",
                  "Let the logger sample evenly; the import report has the bound of the error.")
     NO_NOISE_STATED = ("The noise of a sensor is not stated; it was estimated from the readings.",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -35,7 +37,20 @@ def change_section(found: Diagnosis, compared: Compared) -> Section:
                              "Dots: the new records.")
     return Section("Reference and new records", text, figures=(figure,), anchor="reference",
                    tables=(Table(pd.DataFrame(rows), "Parameters of the fit, relative to the mean of the reference "
-                                 "records.", digits=3),))
+                                 "records.", digits=3), *_visible(compared)))
+
+
+def _visible(compared: Compared) -> Iterator[Table]:
+    """How large a change would have been seen, where none was."""
+    rows = [{"parameter": name, "visible if lower by [%]": _percent(size["lower"]),
+             "visible if higher by [%]": _percent(size["higher"])} for name, size in compared.visible.items()]
+    if rows:
+        yield Table(pd.DataFrame(rows), "Changes that the new records would have shown with a probability of about "
+                    "0.9; smaller ones may not be visible.", digits=2)
+
+
+def _percent(size: float) -> str:
+    return f"{math.ceil(100 * size)}" if math.isfinite(size) else "not visible"
 
 
 def _drawn(compared: Compared) -> Any:

@@ -44,6 +44,6 @@ def nothing_changed(found: Diagnosis) -> str:
     compared, gap = found.reference, found.gap["train"]
     assert compared is not None
     records = f"{compared.records} reference record{'s' * (compared.records > 1)}"
-    return (f"Nothing has changed: the new records are within the scatter of {records}. The model fitted to the "
-            f"reference is off by {gap.before:.2g} {gap.unit} on the new records, and by {compared.rms:.2g} {gap.unit} "
-            "on the reference records.")
+    return (f"Nothing has changed that the new records would show: they are within the scatter of {records}. The model "
+            f"fitted to the reference is off by {gap.before:.2g} {gap.unit} on the new records, and by "
+            f"{compared.rms:.2g} {gap.unit} on the reference records.")

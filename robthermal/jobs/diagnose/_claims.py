@@ -24,7 +24,8 @@ _CHANGED = {
     "named_with_remainder": "One change explains what is outside the scatter of the reference records: {names}. What "
                             "is left beyond the noise is stated, and has no name.",
     "ambiguous": "Changes explain the new records, but other ones do as well: {names}.",
-    "consistent": "The new records are within the scatter of the reference records: nothing has changed.",
+    "consistent": "The new records are within the scatter of the reference records: nothing has changed that they "
+                  "would show.",
     "unexplained": "Something has changed, and neither a parameter nor a known effect explains it.",
 }
 _HOW_CHANGED = ("A change is accepted where healthy records exceed it with a chance below 0.03 for all parameters "

@@ -76,6 +76,9 @@ _WORDS = {  # page of docs/explanations: word to meaning
         "p": "Probability that noise alone gives as large a value of the test.",
         "F of an extra heat": "F statistic of a free heat into that lump: where the misfit sits.",
         "scatter of healthy records": "How much a number differs between healthy days.",
+        "visible if lower by": "Smallest decrease of a number that new records would have shown with a probability of "
+                               "about 0.9; a smaller one may be there.",
+        "visible if higher by": "The same for an increase.",
         "split": "Lump that is split in two.",
         "remainder before": "What the model leaves of the readings beyond the noise, before a lump is split in two.",
         "remainder after": "The same after a lump is split.",

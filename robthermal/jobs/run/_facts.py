@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..._celsius import ZERO_CELSIUS
 from ...calibration import Estimates
 from ...diagnosis import Diagnosis
 from ...signals import Record
@@ -36,6 +37,8 @@ class DataFacts:
         Measured sensors whose noise is not stated.
     resampled : tuple of str
         Files whose samples were not on a uniform grid.
+    unrecorded : tuple of str
+        Ambients that some record does not hold, and that are not calibrated, with what they were taken to be.
     stopped : str
         What happened where the calibration ended before it converged; empty otherwise.
     """
@@ -47,6 +50,7 @@ class DataFacts:
     silent: tuple[str, ...] = ()
     resampled: tuple[str, ...] = ()
     constant: tuple[str, ...] = ()
+    unrecorded: tuple[str, ...] = ()
     stopped: str = ""
 
     def currents(self, system: System) -> dict[str, tuple[float, float]]:
@@ -110,7 +114,16 @@ def data_facts(system: System, comparisons: Sequence[Comparison], misfits: Seque
         (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None,
         tuple(name for name in sensors if name in system.sensors and not system.sensors[name].noise),
         tuple(dict.fromkeys(file for file, what in actions if what == "resampled")), _constant(comparisons),
+        _unrecorded(system, records, fit),
         "" if converged(fit) else str(fit.outcome) if fit else "")
+
+
+def _unrecorded(system: System, records: Sequence[Record], fit: Estimates | None) -> tuple[str, ...]:
+    """Ambients that some record does not hold and that are not calibrated, with what they were taken to be."""
+    fitted = [] if fit is None else [one for name in fit.parameters for one in name.split(" = ")]
+    return tuple(f"{name}, taken to be {ambient.temperature - ZERO_CELSIUS:.4g} °C" for name, ambient
+                 in system.ambients.items() if f"ambients.{name}.temperature" not in fitted
+                 and any(name not in record.input_names for record in records))
 
 
 def _constant(comparisons: Sequence[Comparison]) -> tuple[str, ...]:

@@ -110,6 +110,9 @@ def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Rea
     for name in facts.constant:
         yield remark(GateCode.CONSTANT_INPUT, "calibrate", name, f"{name} never changes in the records that were "
                      "fitted: nothing can be learnt about what it does.")
+    for said in facts.unrecorded:
+        yield remark(GateCode.AMBIENT_NOT_RECORDED, "calibrate", said.partition(",")[0], "A record does not hold the "
+                     f"temperature of {said} all the time.")
     for file in facts.resampled:
         yield remark(GateCode.RESAMPLED, "calibrate", file, f"The samples of {file} were not on a uniform grid.")
     if facts.silent:

@@ -150,6 +150,8 @@ def parameter_section(fit: Estimates, ranges: Mapping[str, tuple[float, float]] 
         text = f"{fit.outcome} The numbers below are where the optimizer stopped: they are no estimates."
     if fit.undetermined:
         text += "\n\nNot determined by these data: " + "; ".join(map(str, fit.undetermined)) + "."
+    if fit.remarks:
+        text += "\n\n" + " ".join(fit.remarks)
     frame["standard deviation"] = [float(f"{value:.3g}") for value in frame["standard deviation"]]
     frame.insert(0, "quantity", [parameter_label(name) for name in frame.index])
     table = Table(frame.reset_index(names="parameter"), "Calibrated parameters, each with its name in the files.",

@@ -1,0 +1,75 @@
+"""What a calibration takes for granted about its records, and how much of the parameters hangs on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Floats
+from .._celsius import ZERO_CELSIUS
+from ..thermal import parameter_in_words, trajectory
+from ._joint import JointProblem
+
+_SAMPLES = 10  # of a mean, for the example
+_LITTLE = 5e-4  # relative change of a parameter that is not worth a word
+
+
+def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
+    """What was taken for granted, what follows for the parameters, and what to do, a sentence or three each.
+
+    Parameters
+    ----------
+    joint : JointProblem
+        Problem as weighed last.
+    v : ndarray
+        Unknowns of its solution.
+    """
+    problem, ranges = joint.records, joint.ranges
+    system, records = problem.system, [one.record for one in problem.data]
+    for name in system.ambients:
+        number = f"ambients.{name}.temperature"
+        lacking = [one.name or "record" for one in records if name not in one.input_names]
+        if not lacking or number in ranges.flat:
+            continue
+        who = "No record holds" if len(lacking) == len(records) else f"{_listed(lacking)} does not hold"
+        changes = [np.asarray(trajectory(at, one.record, sensitivities=[number]).sensitivity[:, one.columns, 0])
+                   * (name not in one.record.input_names)
+                   for at, one in zip(problem.systems(v), problem.data, strict=True)]
+        moved = _most_moved(joint, v, changes)
+        yield (f"{who} the temperature of {name}: it was taken to be "
+               f"{system.ambients[name].temperature - ZERO_CELSIUS:.4g} °C all the time, as the system says."
+               + (f" With 1 K more {moved}." if moved else "") + " Record it as a column; or let it be estimated, "
+               f'one value for all records: "{number}" under [fit].')
+    if any(one.averaged for one in records):
+        changes = [np.gradient(trajectory(at, one.record).readings[:, one.columns], axis=0)
+                   * (0.5 / _SAMPLES * one.record.averaged)
+                   for at, one in zip(problem.systems(v), problem.data, strict=True)]
+        moved = _most_moved(joint, v, changes)
+        yield ("The records hold means, which are late or early by up to half a sample of the logger; that is not "
+               "estimated here." + (f" If they are late and of {_SAMPLES} samples each, {moved} than it is." if moved
+                                    else "") + " `robthermal diagnose` estimates it beside the parameters.")
+
+
+def _most_moved(joint: JointProblem, v: Floats, changes: Sequence[NDArray[Any]]) -> str:
+    """What the parameter that moves farthest does where the modelled readings change by so much, to first order."""
+    ranges, J = joint.ranges, joint.jacobian(v)
+    rows = np.zeros(len(J))
+    weighed = [weigh(change).ravel() for weigh, change in zip(joint.records.weigh, changes, strict=True)]
+    rows[:sum(map(len, weighed))] = np.concatenate(weighed)
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0] = 1.0
+    moved = (np.linalg.lstsq(J / scale, rows, rcond=1e-9)[0] / scale)[:len(ranges.names)]
+    relative = np.where(ranges.logarithmic, np.expm1(moved), 0.0)
+    most = int(np.argmax(np.abs(relative)))
+    if abs(relative[most]) < _LITTLE:
+        return ""
+    name = " and ".join(map(parameter_in_words, ranges.members[most]))
+    size = min(abs(relative[most]), 1.0)
+    return f"{name} comes out {100 * size:.2g} % {'higher' if relative[most] > 0 else 'lower'}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
