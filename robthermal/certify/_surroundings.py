@@ -24,7 +24,7 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Returns
     -------
     dict
-        {lump: (lower, upper)} [W]; heaters on one lump add up.
+        {lump: (lower, upper)} [W]; heaters on one lump add up, and an input of gain 0 is none.
 
     Raises
     ------
@@ -44,6 +44,9 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     """
     heat: dict[str, Interval] = {}
     for name, heater in system.inputs.items():
+        gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
+        if not any(gains):  # the speed of a fan, a force: no heat, whatever its limits
+            continue
         if heater.limits is None:
             raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
                              remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
@@ -51,7 +54,6 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
             if key.startswith(f"inputs.{name}.") and key.removeprefix(f"inputs.{name}.") not in _HARMLESS:
                 raise InputError(f"a range of {key} cannot be covered: limits do not tell what it does to the heat",
                                  where=f"argument parameters[{key!r}]", remedy="Pass heat={lump: (lower, upper)}.")
-        gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
         ends = sorted(gain * limit for gain in gains for limit in heater.limits)
         low, high = heat.get(heater.lump, (0.0, 0.0))
         heat[heater.lump] = (low + ends[0], high + ends[-1])

@@ -43,9 +43,15 @@ def _with_digits(before: float, after: float) -> tuple[str, str]:
 
 
 def _why(judged: Judged) -> str:
-    """The first test that fails: of the effects themselves, or beside a finer network."""
+    """Why each of the effects is no name: the first of its own tests that fails, or what was wrong beside others."""
     state = judged.state
     found = evidence_of(state.rounds, state.fit, state.nominal)
-    short = [f"{round_.best.candidate.label} {one.short_of}" for round_, one in zip(state.rounds, found, strict=True)
-             if not one.lasting]
-    return next(iter(short), judged.why)
+    labels = [round_.best.candidate.label for round_ in state.rounds]
+    short = [f"{label} {one.short_of}" for label, one in zip(labels, found, strict=True) if not one.lasting]
+    holding = [label for label, one in zip(labels, found, strict=True) if one.lasting]
+    if not short or not holding:
+        return "; ".join(short) or judged.why
+    if judged.why.startswith(tuple(holding)):
+        return "; ".join([*short, judged.why])
+    hold = "holds" if len(holding) == 1 else "hold"
+    return "; ".join([*short, f"{' and '.join(holding)} {hold} over parts of the records, but {judged.why}"])

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from .._rhythm import in_rhythm
 from ..errors import InputError
 from ._checks import Array, positive_number
 from ._record import Record
@@ -25,7 +26,8 @@ def find_glitches(record: Record) -> dict[str, NDArray[np.intp]]:
 
     A reading counts when it differs from the median of the five samples around it by more than 8 noise standard
     deviations (from the median absolute deviation), by more than 4 quantization steps, and by more than 6 times the
-    spread of its neighbors: a real swing moves them too. Voltages (unit "V") jump with their current and are left out.
+    spread of its neighbors: a real swing moves them too. Excursions of one size at even distances are no glitches
+    either: a thermostat or a pulsed heater makes them. Voltages (unit "V") jump with their current and are left out.
 
     Parameters
     ----------
@@ -102,7 +104,14 @@ def glitch_rows(column: Array) -> NDArray[np.intp]:
     for start, stop in _pieces(len(column)):
         # A fast but real swing bends its neighbors too; a glitch leaves them where they were.
         found.append(start + np.flatnonzero(_around(_excess, column, start, stop, 3) > least))
-    return np.concatenate(found)
+    rows = np.concatenate(found)
+    return rows[~in_rhythm(rows, _sizes(column, rows))]  # what comes again and again is a thermostat, say
+
+
+def _sizes(column: Array, rows: NDArray[np.intp]) -> Array:
+    """How far some rows are from the median of their neighbors."""
+    around = np.clip(rows[:, None] + np.arange(_NEIGHBORS) - _NEIGHBORS // 2, 0, len(column) - 1)
+    return np.asarray(column[rows] - np.median(column[around], axis=1))
 
 
 def _residual(column: Array) -> Array:

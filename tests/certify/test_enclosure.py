@@ -1,6 +1,7 @@
 """Boxes that are never left: found for networks whose losses bend, and proven."""
 
 import numpy as np
+import pytest
 
 import robthermal as rt
 
@@ -35,3 +36,15 @@ def test_boxes_of_networks_with_bent_losses_are_proven() -> None:
             steady = rt.thermal.steady_state(system, {"m": current, "room": 300.0}, heat=heated)
             state = steady.equilibria[0].temperatures
             assert all(low <= state[name] <= high for name, (low, high) in found.temperature.items())
+
+
+def test_an_input_that_heats_nothing_needs_no_limits() -> None:
+    """The speed of a fan, recorded beside a heater: gain 0, no limits."""
+    system = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 50.0}},
+                       links=[{"between": ("bar", "room"), "conductance": 0.5}],
+                       inputs={"fan": {"lump": "bar", "gain": 0.0}, "foil": {"lump": "bar", "limits": (0.0, 10.0)}})
+    assert rt.certify.heater_heat(system) == {"bar": (0.0, 10.0)}
+    found = rt.certify.runaway_free(system, current={}, ambient={"room": (290.0, 300.0)})
+    assert found.invariance.holds and found.temperature["bar"][1] >= 300.0 + 10.0 / 0.5  # steady state by hand
+    with pytest.raises(rt.InputError, match="heater 'fan' has no limits"):
+        rt.certify.heater_heat(system, {"inputs.fan.gain": (0.0, 1.0)})

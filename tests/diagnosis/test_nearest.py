@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,3 +116,41 @@ def test_the_first_sentence_of_the_report_says_it_in_words(unexplained: Diagnosi
     (Evidence(0.9, 1.0, Stability(6, float("nan")), 0.9), "differs by nan %")])
 def test_every_test_of_an_effect_has_its_words(found: Evidence, words: str) -> None:
     assert (words in found.short_of) and found.lasting is (found.short_of == "") and found.lasting is (words == "")
+
+
+@pytest.mark.parametrize(("lasting", "why", "words"), [
+    ((False, False), "of all", "a takes 12 % off{}; b takes 12 % off{}."),
+    ((True, False), "more is left", "b takes 12 % off{}; a holds over parts of the records, but more is left."),
+    ((False, True), "b take too little", "a takes 12 % off{}; b take too little."),
+    ((True, True), "of all", "of all.")])
+def test_every_effect_has_a_reason(unexplained: Diagnosis, monkeypatch: pytest.MonkeyPatch, why: str, words: str,
+                                   lasting: tuple[bool, bool]) -> None:
+    def round_(label: str) -> SimpleNamespace:
+        return SimpleNamespace(best=SimpleNamespace(candidate=SimpleNamespace(label=label)))
+
+    monkeypatch.setattr("robthermal.diagnosis._nearest.evidence_of", lambda *fits: [
+        Evidence(0.9, 1.0, Stability(6, 0.1), 0.9 if one else 0.12) for one in lasting])
+    judged = SimpleNamespace(why=why, state=SimpleNamespace(rounds=(round_("a"), round_("b")), fit=None, nominal=None))
+    said = nearest(judged, unexplained.gap)  # type: ignore[arg-type]
+    rest = " what is left without it, less than the 30 % of an effect that is needed"
+    assert said.partition("No name, because ")[2] == words.format(*[rest] * words.count("{}"))
+
+
+@pytest.mark.exhaustive
+def test_each_of_two_effects_has_its_own_reason(plant: rt.System, rate: Callable, integrated: Callable,
+                                                recorded: Callable, inputs_of: Callable) -> None:
+    """A draught that starts after 1500 s, and heat that nothing describes: a second step is added and fails."""
+    def law(t: float, T: np.ndarray, u: np.ndarray) -> np.ndarray:
+        gusts = 0.5 * np.sign(np.sin(t / 37.0) + np.sin(t / 91.0 + 1.0) + 0.3 * np.sin(t / 13.0)) * (u[0] > 4.0)
+        return rate(T, u, np.array([-0.186 * (t > 1500.0) * (T[0] - u[1]), gusts]))
+
+    days = []
+    for seed in (5, 6):
+        u = inputs_of(600, seed)
+        days.append(recorded(integrated(law, np.full(2, 298.15), u), u, ["heater", "room"], ["Tp", "Tb"], seed))
+    found = rt.diagnose(plant, days[0], validation=days[1], effects=["conductance_step", "hidden_mass", "sensor_offset",
+                                                                     "missing_link"])
+    first, second = (one.label for one in found.provisional)
+    assert found.verdict == "unexplained" and first == "conductance_step(plate-room)"  # the draught, first
+    reason = found.nearest.partition("No name, because ")[2]
+    assert reason.startswith(f"{second} takes ") and f"; {first} holds over parts of the records, but " in reason

@@ -1,8 +1,9 @@
 """Isolated outliers among the readings: found on the record, and left out of every fit.
 
 A spike of a thousand standard deviations would decide any sum of squares. It is told from physics by its neighbors:
-heat cannot make a reading leave and come back within three samples, and where the model itself bends as fast, nothing
-is called a spike.
+heat seldom makes a reading leave and come back within three samples; where it does so in a rhythm (a thermostat, a
+pulsed heater), or where the model itself bends as fast, nothing is called a spike, nor a jump of a few steps of the
+converter.
 """
 
 from __future__ import annotations
@@ -15,14 +16,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ..._residual import residual
+from ..._rhythm import in_rhythm
 from ...errors import Diverged, InputError
-from ...fitting import Data
+from ...fitting import Data, quantum
 from ...thermal import System, trajectory
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _WIDTH = 7  # samples: up to three outliers side by side
 _FAR = 8.0  # standard deviations
+_STEPS = 4.0  # of the converter, which a sound reading may jump
 _STEEP = 2.5  # times the spread of the middle three: a bend of the residual
 _CURVED = 0.5  # times the largest second difference of the model nearby: where inputs switch, the model may be late
 _PASSES = 5
@@ -63,7 +66,8 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     except Diverged:  # the refit will say so
         return one
     r, missing = residual(one.readings, model), np.zeros(one.readings.shape, bool)
-    allowed: Array = _FAR * noise + _CURVED * _curvature(model)
+    steps = np.array([_STEPS * quantum(y) for y in one.readings.T])
+    allowed: Array = np.maximum(_FAR * noise, steps) + _CURVED * _curvature(model)
     time = np.arange(len(r))
     for _ in range(_PASSES):
         new = outliers(r, allowed) & ~missing
@@ -73,6 +77,11 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
         for i in np.flatnonzero(missing.any(axis=0)):
             good = ~missing[:, i]
             r[:, i] = np.interp(time, time[good], r[good, i])
+    own = residual(one.readings, model)
+    for i in np.flatnonzero(missing.any(axis=0)):
+        rows = np.flatnonzero(missing[:, i])
+        kept = rows[in_rhythm(rows, own[rows, i] - r[rows, i])]
+        missing[kept, i], r[kept, i] = False, own[kept, i]
     if not missing.any():
         return one
     readings = model + r
