@@ -10,68 +10,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
+from ._explained_away import predicting_alone, saying_so
 from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge, no_names
+from ._lasting import evidence_of, lasting
 from ._outcomes import DiagnosisCode
 from ._rivals import CLOSED_SQUARE, predicting, predicts, with_rivals
 from ._searching import coarsely_searched, validated
-from .evidence import NEEDED, Evidence, Gap, Stability, expected_rms, left, reproducible, stability
+from .evidence import NEEDED, Gap, expected_rms, left
 from .fit import Refit, coarsened, exact
-from .search import (
-    Accepted,
-    Entry,
-    SearchState,
-    ShortList,
-    one_place,
-    revise,
-    revised,
-    without,
-)
+from .search import SearchState, ShortList, one_place, revise, revised
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
 _NOISE = 2.0  # whitened variance that a finer network must leave, to be all that is missing
-
-
-def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validation: Validation | None = None
-                ) -> tuple[Evidence, ...]:
-    """Evidence for every effect of a fit.
-
-    Parameters
-    ----------
-    rounds : sequence of Accepted
-        In the order of the effects of the fit.
-    fit, nominal : Refit
-        With all of them; without any.
-    validation : Validation, optional
-        Data that no fit has seen: an effect may be needed there that the training records hide.
-    """
-    if not rounds:
-        return ()
-    whole, bare = exact(fit), exact(nominal)
-    noise = expected_rms(whole) ** 2
-    excess = [max(bare.rms**2 - noise, 0.0)]
-    excess += [max(one.rms**2 - noise, 0.0) for one in _prefixes(whole, bare)]
-    out = []
-    for place, round_ in enumerate(rounds):
-        less = without(fit, place, nominal, round_.before)
-        plain = bare if len(rounds) == 1 else without(whole, place, bare)
-        before = max((whole if plain is None else plain).rms ** 2 - noise, 0.0)
-        needed = 1.0 - excess[-1] / before if before > 0 else 0.0
-        if needed < NEEDED and plain is not None and validation is not None:
-            needed = max(needed, _needed_held_out(whole, plain, validation))
-        out.append(Evidence(
-            share=(excess[place] - excess[place + 1]) / excess[0] if excess[0] > 0 else 0.0,
-            reproducible=0.0 if less is None else reproducible(fit, less),
-            stability=_stability(fit, place), needed=needed))
-    return tuple(out)
-
-
-def _needed_held_out(whole: Refit, less: Refit, validation: Validation) -> float:
-    """Part of the excess mean square of the validation data left without an effect that it removes; 0 without data."""
-    try:
-        held = validation.predicted(less, whole)
-    except (Diverged, InputError):
-        return 0.0
-    return 0.0 if held is None else left(held.gap).share_explained
 
 
 def lasting_beyond_steps(judged: Judged) -> Judged:
@@ -94,23 +44,6 @@ def lasting_beyond_steps(judged: Judged) -> Judged:
             f"error of rounding, because the steps of {', '.join(rounded)} are larger than the noise.")
     return replace(judged, verdict="unexplained", outcome=DiagnosisCode.UNEXPLAINED.outcome(
         text, remedy="Read finer, or let the noise reach the converter and average."))
-
-
-def _stability(fit: Refit, place: int) -> Stability:
-    """Of the size of an effect, relative to it."""
-    structure = fit.structure
-    at = structure.column_of(place)
-    found, size = stability(fit, at), structure.effects[place].effect.size
-    scale = 1.0 if size.lower > 0 else abs(fit.v[at])  # a logarithm's spread is relative
-    return Stability(found.segments, found.spread / scale if scale > 0 else float("inf"))
-
-
-def _prefixes(whole: Refit, bare: Refit) -> list[Refit]:
-    """Fits with the first effect, the first two, and so on."""
-    out = [whole]
-    for place in range(len(whole.structure.effects) - 1, 0, -1):
-        out.append(without(out[-1], place, bare) or out[-1])
-    return out[::-1]
 
 
 def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged:
@@ -137,12 +70,15 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             finer = state.nominal
         progress("testing over blocks, segments and validation data what may be named")
         tried = len(state.rounds)
-        state, found = _lasting(state, finer, validation)
+        state, found = lasting(state, finer, validation)
         if 0 < len(found) < tried and finer.structure.n_coarse:  # what is dropped may have made up for a wrong place
-            state, found = _lasting(chosen_again(state, finer), finer, validation)
+            state, found = lasting(chosen_again(state, finer), finer, validation)
         elif len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
-            state, found = _lasting(revise(replace(state, misfit_left=False)), finer, validation)
+            state, found = lasting(revise(replace(state, misfit_left=False)), finer, validation)
         if not found:
+            alone = predicting_alone(judged.state, finer, validation)
+            if alone is not None:
+                return saying_so(_graded(judged, alone, judged.state.nominal, validation))
             return _nothing_lasts(judged, finer)
         state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
         state = _predicting(validated(state, validation, progress), finer, validation, progress)
@@ -168,72 +104,6 @@ def chosen_again(state: SearchState, nominal: Refit) -> SearchState:
     return replace(state, rounds=rounds, fit=fit, misfit_left=False)
 
 
-def _lasting(state: SearchState, finer: Refit, validation: Validation) -> tuple[SearchState, tuple[Evidence, ...]]:
-    """The effects that hold over blocks and segments and are needed, the least needed one dropped first.
-
-    What the records cannot tell from it is asked first: a rival that holds and is needed takes its place.
-    """
-    rounds, fit = state.rounds, state.fit
-    found = evidence_of(rounds, fit, finer, validation)
-    while not all(one.lasting for one in found):
-        worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
-        instead = in_its_place(rounds, worst, finer, validation)
-        if instead is not None:
-            rounds, fit = instead
-            found = evidence_of(rounds, fit, finer, validation)
-            continue
-        less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
-        if less is None:
-            return replace(state, rounds=(), fit=finer), ()
-        rounds, fit = rounds[:worst] + rounds[worst + 1:], less
-        if rounds and fit.structure.coarse:
-            fit = coarsened(fit)
-        if rounds:
-            rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
-        found = evidence_of(rounds, fit, finer, validation)
-    return replace(state, nominal=finer, rounds=rounds, fit=fit), found
-
-
-def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit, validation: Validation | None = None
-                 ) -> tuple[tuple[Accepted, ...], Refit] | None:
-    """The effects with a rival in the place of one that does not last; None if none of its rivals lasts.
-
-    Beside unknowns of a finer network an effect may have the smallest sum of squares and remove nothing where the
-    network is as it is: it could not be named itself, and so it is no rival of one that could.
-
-    Parameters
-    ----------
-    rounds : tuple of Accepted
-        In the order of the effects of the fit.
-    place : int
-        Of the effect that does not last.
-    finer : Refit
-        Without any effect.
-    validation : Validation, optional
-        Data that no fit has seen.
-    """
-    tried = filter(None, (_instead(rounds, place, entry) for entry in rounds[place].contenders))
-    lasting = [(new, at) for new, at in tried if evidence_of(new, new[at].best.fit, finer, validation)[at].lasting]
-    if not lasting:
-        return None
-    (chosen, at), *others = lasting
-    own = replace(chosen[at], contenders=tuple(new[i].best for new, i in others))
-    return (*chosen[:at], own, *chosen[at + 1:]), own.best.fit
-
-
-def _instead(rounds: tuple[Accepted, ...], place: int, rival: Entry) -> tuple[tuple[Accepted, ...], int] | None:
-    """The effects with a rival in one place, and where it stands; None if it was not fitted beside the others."""
-    others = [round_.best.candidate.key for i, round_ in enumerate(rounds) if i != place]
-    keys = [candidate.key for candidate in rival.fit.structure.effects]
-    if [key for key in keys if key != rival.candidate.key] != others:
-        return None
-    fit = coarsened(rival.fit) if rival.fit.structure.coarse else rival.fit
-    at, out = keys.index(rival.candidate.key), [*rounds[:place], *rounds[place + 1:]]
-    out.insert(at, replace(rounds[place], best=replace(rival, fit=fit), contenders=()))
-    out[-1] = replace(out[-1], best=replace(out[-1].best, fit=fit))
-    return tuple(out), at
-
-
 def _predicting(state: SearchState, finer: Refit, validation: Validation, progress: Progress) -> SearchState:
     """The state with a rival in the place of an effect with which the validation data keep their gap, the rest anew."""
     instead = predicting(state, finer, validation)
@@ -241,7 +111,7 @@ def _predicting(state: SearchState, finer: Refit, validation: Validation, progre
         return state
     progress("choosing the others again beside a rival with which the validation data are predicted")
     for tried in (chosen_again(instead, finer), instead):
-        kept, found = _lasting(tried, finer, validation)
+        kept, found = lasting(tried, finer, validation)
         if found and predicts(kept.fit, finer, validation):
             return kept
     return state

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ._graded import evidence_of
 from ._judge import Judged
+from ._lasting import evidence_of
 from .evidence import Gap, left
 
 

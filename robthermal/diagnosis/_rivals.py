@@ -31,9 +31,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         Data that no fit has seen.
     """
     if finer.structure.n_coarse:
-        named = {one.best.candidate.key for one in state.rounds}
-        return replace(state, rounds=tuple(with_other_end(with_neighbors(one), named, state.names)
-                                           for one in state.rounds))
+        return at_neighboring_lumps(state)
     rounds = []
     for place, round_ in enumerate(state.rounds):
         known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)
@@ -41,6 +39,19 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         rivals = (entry for entry in _rivals(state, place, finer) if predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*known, *rivals)))
     return replace(state, rounds=tuple(rounds))
+
+
+def at_neighboring_lumps(state: SearchState) -> SearchState:
+    """List beside every effect the same one at neighboring lumps, and the lag of a lump's other end.
+
+    Parameters
+    ----------
+    state : SearchState
+        With the effects that may be named.
+    """
+    named = {one.best.candidate.key for one in state.rounds}
+    return replace(state, rounds=tuple(with_other_end(with_neighbors(one), named, state.names)
+                                       for one in state.rounds))
 
 
 def predicting(state: SearchState, finer: Refit, validation: Validation) -> SearchState | None:

@@ -22,8 +22,9 @@ from ._doubts import (
     place_undecided,
     within_the_body,
 )
-from ._graded import evidence_of, graded, lasting_beyond_steps
+from ._graded import graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
+from ._lasting import evidence_of
 from ._means import asked_of_means
 from ._nearest import nearest
 from ._refine import refine as refined

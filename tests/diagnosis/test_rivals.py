@@ -14,8 +14,9 @@ from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.diagnosis import Entry
-from robthermal.diagnosis._graded import chosen_again, in_its_place
+from robthermal.diagnosis._graded import chosen_again
 from robthermal.diagnosis._judge import Validation
+from robthermal.diagnosis._lasting import in_its_place
 from robthermal.diagnosis._rivals import predicts
 from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate
@@ -160,8 +161,8 @@ def test_of_an_effect_that_does_not_last_only_rivals_that_do_take_the_place(monk
     one = found(16)
     entries = tuple(sorted((one.best, *one.contenders), key=lambda entry: sorted(entry.candidate.where)))
     wrong = replace(one, best=replace(one.best, candidate=other_effect(one).candidate), contenders=entries)
-    monkeypatch.setattr("robthermal.diagnosis._graded.evidence_of", told)
-    monkeypatch.setattr("robthermal.diagnosis._graded.coarsened", lambda fit: fit)
+    monkeypatch.setattr("robthermal.diagnosis._lasting.evidence_of", told)
+    monkeypatch.setattr("robthermal.diagnosis._lasting.coarsened", lambda fit: fit)
     answer = in_its_place((wrong,), 0, one.before)
     if best is None:
         assert answer is None

@@ -1,0 +1,77 @@
+"""Effects that a finer network explains away in training: named only where they alone predict the validation data.
+
+The truth is a stack of 160 cells and more around a module with legs of its own, from the suite of foreign truth.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import robthermal as rt
+from robthermal.diagnosis._explained_away import predicting_alone
+from robthermal.diagnosis._judge import Validation
+from robthermal.diagnosis.fit import Refit, coarsened
+from robthermal.diagnosis.search import begin
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
+from foreign.cases import Case, Made, made  # noqa: E402 - beside the benchmarks
+
+EFFECTS = ("missing_ambient_link", "hidden_mass")
+
+
+@cache
+def stack(group: str, effect: str, seed: int) -> Made:
+    return made(Case("stack", group, effect, seed))
+
+
+@cache
+def nominal(group: str, effect: str, seed: int) -> Refit:
+    one = stack(group, effect, seed)
+    return rt.diagnosis.refit(one.system, one.train)
+
+
+@cache
+def finer(group: str, effect: str, seed: int) -> Refit:
+    return coarsened(nominal(group, effect, seed))
+
+
+LOST = ("hidden", "missing_ambient_link", 13)  # from the spreader to the room
+
+
+def diagnosed(one: Made, **given) -> rt.diagnosis.Diagnosis:
+    return rt.diagnose(one.system, one.train, effects=EFFECTS, **given)
+
+
+@pytest.mark.exhaustive
+def test_a_path_that_alone_predicts_is_named_although_a_finer_network_fits_the_training_records():
+    one = stack(*LOST)
+    assert nominal(*LOST).variance > 20.0 and finer(*LOST).variance < 1.1  # nothing to be seen beside a finer network
+    found = diagnosed(one, validation=one.unseen)
+    assert found.verdict == "named_with_remainder"
+    (name,), (others,) = found.effects, found.alternatives
+    assert {name.where, *(where for _, where in others)} == {("cold", "room"), ("spreader", "room")}
+    assert found.gap["validation"].after < 0.1 * found.gap["validation"].before
+    assert "fails on the validation records" in found.outcome.text
+
+
+@pytest.mark.exhaustive
+def test_without_validation_data_nothing_refutes_the_finer_network():
+    assert diagnosed(stack(*LOST)).verdict == "unexplained"
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("seed", [26, 27])
+def test_what_lumps_do_not_hold_alone_closes_too_little(seed):
+    """Nothing is hidden: a mass at the hot face lasts over blocks and segments and closes four fifths of the gap."""
+    one = stack("nothing", "nothing", seed)
+    assert diagnosed(one, validation=one.unseen).verdict == "unexplained"
+
+
+def test_nothing_found_or_nothing_to_predict_is_no_name():
+    fit, one = nominal(*LOST), stack(*LOST)
+    assert predicting_alone(begin(fit, EFFECTS), fit, Validation(one.unseen)) is None
+    assert predicting_alone(begin(fit, EFFECTS), fit, Validation(None)) is None
