@@ -24,6 +24,7 @@ from .search import (
 
 _FEW = 5  # evaluations with other filters, from the optimum with its own
 _NOISE_ONLY = 1.2  # whitened variance up to which a fit leaves noise, its level renewed
+_RAISED = 1.1  # factor on a declared level from which it may hold what a finer network would change
 
 
 def searched(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> SearchState:
@@ -145,5 +146,5 @@ def _only_coarse(state: SearchState) -> bool:
 
 
 def _noise_only(fit: Refit) -> bool:
-    """Whether a fit leaves noise of the declared level: where more is left, the level has been raised to its limit."""
-    return fit.variance < _NOISE_ONLY and not fit.levels.exhausted
+    """Whether a fit leaves noise of the declared level: where more is left, a level has been raised."""
+    return fit.variance < _NOISE_ONLY and max([fit.levels.disturbance, *fit.levels.noise.values()]) < _RAISED
