@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from ._judge import Progress, Validation
 from .evidence import promised, validation_data
 from .fit import Refit, coarsened, extended
@@ -130,7 +132,7 @@ def accepted_effects(state: SearchState, progress: Progress, known: Accepted | N
 def _only_coarse(state: SearchState) -> bool:
     """Whether what is left beside the effects accepted is what a finer network would change: no more effects then.
 
-    It is not where one more effect promises to explain it with fewer unknowns, by BIC.
+    It is not where one more effect promises to explain it with fewer unknowns, by their evidence.
     """
     fit = state.fit
     if fit.structure.coarse or not fit.records or _noise_only(fit):
@@ -141,8 +143,20 @@ def _only_coarse(state: SearchState) -> bool:
         return False
     least = fit.rss if state.complete else min(promised(fit, state.current, i) for i in state.current.order)
     alike = extended(fit, finer.structure, finer.v, _FEW)
-    n = fit.n_readings
-    return n * math.log(least / alike.rss) > finer.structure.n_coarse * math.log(n)
+    gain = fit.n_readings * math.log(least / alike.rss)
+    return gain > 0.0 and gain > _price(alike)
+
+
+def _price(finer: Refit) -> float:
+    """Twice the logarithm of what the unknowns of a finer network cost in evidence (Laplace), which BIC approximates.
+
+    BIC counts log n for each; they have priors, and what records say of some of them is little.
+    """
+    structure = finer.structure
+    a = structure.n_common - structure.n_coarse
+    own = np.arange(a, structure.n_common)
+    R = np.linalg.qr(np.concatenate([np.delete(finer.J, own, axis=1), finer.J[:, own]], axis=1)).R
+    return 2.0 * float(np.sum(np.log(np.abs(np.diag(R)[-own.size:]))))
 
 
 def _noise_only(fit: Refit) -> bool:
