@@ -127,15 +127,39 @@ def test_diagnose_is_the_stages_in_a_row(plant: rt.System, convected: tuple[rt.R
 def test_one_more_effect_is_tried_where_it_needs_fewer_unknowns_than_a_finer_network(
         monkeypatch: pytest.MonkeyPatch, promise: float, random_heat: float, sensor: float, stops: bool) -> None:
     # 1000 readings: 14 unknowns of a finer network cost as much as a sum of squares that is larger by a factor 1.102.
-    def fit(rss: float, columns: int, levels: NoiseScaling) -> SimpleNamespace:
-        structure = SimpleNamespace(coarse=(0,) * bool(columns), n_coarse=columns)
-        return SimpleNamespace(rss=rss, variance=rss / 1000.0, n_readings=1000, records=(0,), levels=levels,
-                               structure=structure, v=np.zeros(1))
-
-    exact = fit(2000.0, 0, NoiseScaling(1.4, {"T": 1.4}))
-    finer = fit(1000.0, 14, NoiseScaling(random_heat, {"T": sensor}))
+    exact = told(2000.0, 0, NoiseScaling(1.4, {"T": 1.4}))
+    finer = told(1000.0, 14, NoiseScaling(random_heat, {"T": sensor}))
+    assert _searching._price(finer) == pytest.approx(1000.0 * np.log(1.102), rel=5e-3)  # type: ignore[arg-type]
     monkeypatch.setattr(_searching, "coarsened", lambda one: finer)
     monkeypatch.setattr(_searching, "extended", lambda one, structure, v, limit: finer)
     monkeypatch.setattr(_searching, "promised", lambda one, scores, i: promise)
     state = SimpleNamespace(fit=exact, complete=False, current=SimpleNamespace(order=[0]))
     assert _searching._only_coarse(state) is stops  # type: ignore[arg-type]
+
+
+def told(rss: float, columns: int, levels: NoiseScaling) -> SimpleNamespace:
+    """A fit to 1000 readings; of every unknown of a finer network they say as much as 999 times its prior."""
+    structure = SimpleNamespace(coarse=(0,) * bool(columns), n_coarse=columns, n_common=columns)
+    J = np.concatenate([np.sqrt(999.0) * np.eye(columns), np.eye(columns)])
+    return SimpleNamespace(rss=rss, variance=rss / 1000.0, n_readings=1000, records=(0,), levels=levels, J=J,
+                           structure=structure, v=np.zeros(1))
+
+
+@pytest.mark.parametrize(("level", "stops"), [(1.0, False), (1.05, False), (1.2, True)])
+def test_a_raised_level_of_noise_may_hold_what_a_finer_network_would_change(
+        monkeypatch: pytest.MonkeyPatch, level: float, stops: bool) -> None:
+    exact, finer = told(1100.0, 0, NoiseScaling(1.0, {"T": level})), told(900.0, 14, NoiseScaling(1.0, {"T": 1.0}))
+    monkeypatch.setattr(_searching, "coarsened", lambda one: finer)
+    monkeypatch.setattr(_searching, "extended", lambda one, structure, v, limit: finer)
+    state = SimpleNamespace(fit=exact, complete=True, current=None)
+    assert _searching._only_coarse(state) is stops  # type: ignore[arg-type]
+
+
+def test_the_price_of_unknowns_is_the_determinant_of_what_the_others_cannot_explain() -> None:
+    rng = np.random.default_rng(4)
+    rest, own = rng.standard_normal((40, 3)), 2.0 * rng.standard_normal((40, 5))
+    J = np.concatenate([np.concatenate([rest, own], axis=1), np.eye(8)[3:]])  # priors of the last five
+    fit = SimpleNamespace(J=J, structure=SimpleNamespace(n_common=8, n_coarse=5))
+    P = np.eye(40) - rest @ np.linalg.pinv(rest)
+    sign, log = np.linalg.slogdet(np.eye(5) + own.T @ P @ own)
+    assert sign == 1 and _searching._price(fit) == pytest.approx(log, rel=1e-12)  # type: ignore[arg-type]
