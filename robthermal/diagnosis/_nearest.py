@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from ._judge import Judged
 from ._lasting import evidence_of
 from .evidence import Gap, left
+
+_LABEL = re.compile(r"\w+\(")  # of an effect at its place
 
 
 def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
@@ -49,9 +52,10 @@ def _why(judged: Judged) -> str:
     labels = [round_.best.candidate.label for round_ in state.rounds]
     short = [f"{label} {one.short_of}" for label, one in zip(labels, found, strict=True) if not one.lasting]
     holding = [label for label, one in zip(labels, found, strict=True) if one.lasting]
-    if not short or not holding:
-        return "; ".join(short) or judged.why
-    if judged.why.startswith(tuple(holding)):
-        return "; ".join([*short, judged.why])
+    why = judged.why
+    if _LABEL.match(why) and not why.startswith(tuple(labels)):  # of what the graded search has found instead
+        why = f"{'it is' if len(labels) == 1 else 'they are'} not what lasts: {why}"
+    if not short or not holding or why.startswith(tuple(holding)):
+        return "; ".join([*short, *([why] if holding else [])])
     hold = "holds" if len(holding) == 1 else "hold"
-    return "; ".join([*short, f"{' and '.join(holding)} {hold} over parts of the records, but {judged.why}"])
+    return "; ".join([*short, f"{' and '.join(holding)} {hold} over parts of the records, but {why}"])

@@ -27,8 +27,9 @@ def subtitle(system: System, title: str = "") -> str:
     title : str, optional
         Title above it.
     """
-    counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": len(system.inputs),
-              "sensor": len(system.sensors)}
+    heaters = sum(one.gain != 0.0 for one in system.inputs.values())
+    counts = {"lump": len(system.lumps), "module": len(system.modules), "heater": heaters,
+              "recorded column": len(system.inputs) - heaters, "sensor": len(system.sensors)}
     parts = ", ".join(f"{n} {what}{'s' * (n > 1)}" for what, n in counts.items() if n)
     return parts if system.name in title else f"{system.name}: {parts}"
 

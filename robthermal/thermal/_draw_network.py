@@ -74,7 +74,7 @@ def _nodes(system: System) -> list[_Node]:
         if sensor.lump:
             below[sensor.lump].append((name, "o", COLORS[k % len(COLORS)]))
     for name, heater in system.inputs.items():
-        below[heater.lump].append((name, "^", "black"))
+        below[heater.lump].append((name, "^" if heater.gain else "D", "black"))
     return [_Node(name, name in system.ambients, ((name, "", ""), *below[name])) for name in below]
 
 
@@ -109,16 +109,18 @@ def _module(ax: Any, name: str, cold: Array, hot: Array, size: Array) -> None:
 def _legend(ax: Any, system: System) -> None:
     """What the marks mean; only those that occur."""
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     def mark(label: str, **style: Any) -> Any:
         return Line2D([], [], label=label, color=style.pop("color", "black"), **style)
 
-    square = {"linestyle": "", "marker": "s", "markersize": 8, "markerfacecolor": "white"}
-    marks = [(True, mark("lump", **square)),
-             (bool(system.ambients), mark("ambient", color="#666666", **(square | {"marker": "o"}))),
+    heats = [bool(heater.gain) for heater in system.inputs.values()]
+    marks = [(True, Patch(facecolor="white", edgecolor="black", label="lump")),
+             (bool(system.ambients), Patch(facecolor="white", edgecolor="#666666", linestyle="--", label="ambient")),
              (bool(system.links), mark("heat path", color="#888888")),
              (bool(system.modules), mark("module: positive current pumps heat this way", linewidth=2.6, marker=">")),
              (any(sensor.lump for sensor in system.sensors.values()), mark("sensor", linestyle="", marker="o")),
-             (bool(system.inputs), mark("heater", linestyle="", marker="^"))]
+             (any(heats), mark("heater", linestyle="", marker="^")),
+             (not all(heats), mark("recorded column that heats nothing", linestyle="", marker="D"))]
     ax.legend(handles=[handle for there, handle in marks if there], loc="upper left", bbox_to_anchor=(0.0, -0.02),
               ncols=3, fontsize=7.5, frameon=False, borderaxespad=0.0, columnspacing=1.2)

@@ -122,7 +122,8 @@ def test_every_test_of_an_effect_has_its_words(found: Evidence, words: str) -> N
     ((False, False), "of all", "a takes 12 % off{}; b takes 12 % off{}."),
     ((True, False), "more is left", "b takes 12 % off{}; a holds over parts of the records, but more is left."),
     ((False, True), "b take too little", "a takes 12 % off{}; b take too little."),
-    ((True, True), "of all", "of all.")])
+    ((True, True), "of all", "of all."),
+    ((True, True), "c(x) takes 9 % off", "they are not what lasts: c(x) takes 9 % off.")])
 def test_every_effect_has_a_reason(unexplained: Diagnosis, monkeypatch: pytest.MonkeyPatch, why: str, words: str,
                                    lasting: tuple[bool, bool]) -> None:
     def round_(label: str) -> SimpleNamespace:

@@ -101,6 +101,8 @@ def test_what_is_ambiguous_is_not_adopted(tmp_path: Path) -> None:
     report, summary = go(project, tmp_path / "out")
     assert report.verdict == "FAIL" and summary["diagnose"]["adopted"] is False  # type: ignore[index]
     assert {"diagnosis_ambiguous", "validation_misfit"} <= {one.code for one in report.reasons if one.level == "fail"}
+    (misfit, *_) = [one for one in report.reasons if one.code == "validation_misfit"]
+    assert misfit.remedy.startswith("See what the diagnosis says") and "robthermal diagnose" not in misfit.remedy
     assert "lumps.bar.heat" not in summary["certify"]["parameters"]  # type: ignore[index]
 
 

@@ -139,3 +139,51 @@ def test_a_real_system_is_enough(write: Write) -> None:
     record = rt.read_record(write("time,heater,T,room\n0,1,25.1,20\n1,1,25.2,20\n"), system)
     assert (record.input_names, record.output_names) == (("heater", "room"), ("T",))
     np.testing.assert_array_equal(record["T"], [298.25, 298.35])
+
+
+FLOW = """[system]
+temperature_unit = "degC"
+[ambients.room]
+temperature = 20.0
+[lumps.plate]
+capacity = 100.0
+[[links]]
+between = ["plate", "room"]
+conductance = 1.0
+[inputs.flow]
+lump = "plate"
+gain = 0.0
+[sensors.T]
+lump = "plate"
+"""
+FLOW_ROWS = "time,Flow [l/min],T [°C]\n" + "".join(f"{k},{k % 3},2{k % 4}.5\n" for k in range(30))
+
+
+@pytest.mark.parametrize(("lines", "header", "unit"), [
+    ("", "Flow [l/min]", "l/min"), ('unit = "l/min"\n', "Flow [l/min]", "l/min"), ("", "Flow [V]", "V"),
+    ("", "Flow [%]", "%")])
+def test_a_column_that_heats_nothing_has_any_unit(tmp_path: Path, lines: str, header: str, unit: str) -> None:
+    """The speed of a fan, a flow, a force: an input of gain 0, whose numbers stay as they are."""
+    system = rt.thermal.parse_system(FLOW.replace("gain = 0.0\n", f"gain = 0.0\n{lines}"))
+    path = tmp_path / "run.csv"
+    path.write_text(FLOW_ROWS.replace("Flow [l/min]", header), encoding="utf-8")
+    record = rt.read_record(path, system, columns={"flow": header})
+    assert record["flow"].tolist() == [k % 3 for k in range(30)] and record.units["flow"] == unit
+
+
+@pytest.mark.parametrize(("lines", "words"), [('unit = "rpm"\n', "'l/min' is not known"), ("gain = 0.1\n", (
+    'unit = "l/min" in [inputs.flow]'))])
+def test_a_unit_that_nobody_says_is_refused_with_where_to_say_it(tmp_path: Path, lines: str, words: str) -> None:
+    text = FLOW.replace("gain = 0.0\n", lines if "gain" in lines else f"gain = 0.0\n{lines}")
+    path = tmp_path / "run.csv"
+    path.write_text(FLOW_ROWS, encoding="utf-8")
+    with pytest.raises(rt.InputError) as refused:
+        rt.read_record(path, rt.thermal.parse_system(text), columns={"flow": "Flow [l/min]"})
+    assert words in str(refused.value)
+
+
+def test_a_unit_that_the_system_says_is_enough_for_a_heater(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(FLOW_ROWS, encoding="utf-8")
+    system = rt.thermal.parse_system(FLOW.replace("gain = 0.0\n", 'gain = 3.0\nunit = "l/min"\n'))
+    assert rt.read_record(path, system, columns={"flow": "Flow [l/min]"})["flow"].tolist() == [k % 3 for k in range(30)]

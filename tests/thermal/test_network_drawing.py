@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
+from robthermal.jobs.provenance import subtitle
 from robthermal.thermal import System
 
 
@@ -61,3 +62,27 @@ def test_parts_that_touch_nothing_and_too_many_parts() -> None:
     plt.close(axes.figure)
     with pytest.raises(rt.InputError, match="System.plot: 302 lumps and ambients"):
         chain(301).plot()
+
+
+def cooled() -> System:
+    """A plate with a heater, and the speed of its fan, which is recorded and heats nothing."""
+    return rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"plate": {"capacity": 10.0}},
+                     links=[{"between": ("plate", "room"), "conductance": 1.0}],
+                     inputs={"foil": {"lump": "plate"}, "fan": {"lump": "plate", "gain": 0.0, "unit": "rev/s"}})
+
+
+def test_a_recorded_column_is_drawn_as_no_heater() -> None:
+    ax = cooled().plot()
+    marks = {line.get_marker() for line in ax.lines}
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"^", "D"} <= marks
+    assert names == ["lump", "ambient", "heat path", "heater", "recorded column that heats nothing"]
+    plt.close(ax.figure)
+    assert subtitle(cooled()).endswith("1 lump, 1 heater, 1 recorded column")
+
+
+def test_quantities_have_the_unit_of_the_column_they_act_on() -> None:
+    (driven,) = [one for one in rt.diagnosis.candidates(cooled(), ["driven_conductance"]) if "fan" in one.where]
+    assert driven.effect.size.unit == "1/(rev/s)"
+    offsets = {one.where: one.effect.size.unit for one in rt.diagnosis.candidates(cooled(), ["input_offset"])}
+    assert offsets[("foil",)] == "W"

@@ -140,10 +140,13 @@ def _with_drifts(found: list[Candidate], system: System, unrecorded: Sequence[st
 
 def _with_units(effect: Effect, system: System, where: tuple[str, ...]) -> Effect:
     """With the unit of the column it acts on, where that is known: A of a module, W of a heater with gain 1."""
-    heater = system.inputs.get(where[0]) if where else None
-    unit = "A" if where and where[0] in system.modules else "W" if heater is not None and heater.gain == 1.0 else "unit"
-    if unit == "unit" or not any("unit" in quantity.unit for quantity in effect.quantities):
+    column = next((name for name in where if name in system.modules or name in system.inputs), "")
+    heater = system.inputs.get(column)
+    unit = "A" if column in system.modules else heater and (heater.unit or ("W" if heater.gain == 1.0 else None))
+    if not unit or not any("unit" in quantity.unit for quantity in effect.quantities):
         return effect
-    return replace(effect, quantities=tuple(replace(quantity, unit=quantity.unit.replace("unit", unit))
-                                            for quantity in effect.quantities))
+    inside = f"({unit})" if "/" in unit else unit
+    return replace(effect, quantities=tuple(
+        replace(one, unit=unit if one.unit == "unit" else one.unit.replace("unit", inside))
+        for one in effect.quantities))
 

@@ -43,7 +43,7 @@ class Decision:
             return "no candidate is beyond doubt"
         names = [self.best.candidate.label, *(c.candidate.label for c in self.contenders)]
         names += [c.label for entry in (self.best, *self.contenders) for c in entry.aliases]
-        return f"{' or '.join(names)}, ΔBIC {self.best.delta_bic:.1f}"
+        return f"{' or '.join(dict.fromkeys(names))}, ΔBIC {self.best.delta_bic:.1f}"
 
     def plot(self, ax: Any = None) -> Any:
         """Bars of ΔBIC of best and contenders; returns the matplotlib axes.

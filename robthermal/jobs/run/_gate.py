@@ -18,6 +18,7 @@ from ._misfit import Misfit
 from ._result import Doubted, JobResult
 
 _FAR, _SHARE = 10.0, 0.2  # K, and part of a current, that a claim may reach beyond the records
+_LOOK = "Find what the model lacks with `robthermal diagnose`;"  # of the remedy for a misfit
 _OF_CLAIMS = (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.NOT_ROBUST)  # the cases of the claims say these
 GATES = tuple(code.code for code in GateCode if code not in (*_OF_CLAIMS, GateCode.REPORT_CHANGED))
 
@@ -65,7 +66,7 @@ def data_reasons(facts: DataFacts, diagnosed: DiagnosisFacts | None, label: str)
     if facts.stopped:
         code = GateCode.NOT_CONVERGED
         yield Reason("fail", code.code, "calibrate", "parameters", f"{facts.stopped} {code.meaning}", code.remedy)
-    yield from _misfits(facts.misfits)
+    yield from _misfits(facts.misfits, diagnosed is not None)
     yield from _records(facts, diagnosed is not None, "simulated" in label.lower())
     if diagnosed is not None:
         yield from _diagnosis(diagnosed, any(one.beyond for one in facts.misfits))
@@ -88,16 +89,17 @@ def claim_reasons(certification: Certification, doubted: Sequence[Doubted], fact
     yield from _outside(certification, facts)
 
 
-def _misfits(misfits: Sequence[Misfit]) -> Iterator[Reason]:
+def _misfits(misfits: Sequence[Misfit], diagnosed: bool) -> Iterator[Reason]:
     codes = {"validation": GateCode.VALIDATION_MISFIT, "train": GateCode.TRAINING_MISFIT}
     for one in misfits:
         if one.significant:
             code = codes[one.kind]
+            remedy = code.remedy.replace(_LOOK, "See what the diagnosis says of it;") if diagnosed else code.remedy
             yield Reason("fail" if one.beyond else "remark", code.code, "calibrate", f"{one.record}: {one.sensor}",
                          f"In the {'validation' if one.kind == 'validation' else 'training'} record {one.record} "
                          f"{one.sensor} is {one.rms:.3g} {one.unit} rms off the model at {one.noise:.2g} {one.unit} of "
                          f"noise: {one.excess:.3g} {one.unit} more, tolerance {one.tolerance:.3g} {one.unit}.",
-                         code.remedy if one.beyond else "", one.excess, one.tolerance)
+                         remedy if one.beyond else "", one.excess, one.tolerance)
 
 
 def _records(facts: DataFacts, diagnosed: bool, simulated: bool) -> Iterator[Reason]:

@@ -114,18 +114,8 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
     found = []
     for name, role in roles.items():
         if name in places:
-            found.append(
-                _channel(
-                    table,
-                    name,
-                    role,
-                    places[name],
-                    choice,
-                    system.temperature_unit,
-                    units.get(name),
-                    gains.get(name, 1.0),
-                )
-            )
+            unit, gain = units.get(name), gains.get(name, 1.0)
+            found.append(_channel(table, name, role, places[name], choice, system.temperature_unit, unit, gain))
     return tuple(found)
 
 
@@ -218,9 +208,12 @@ def _channel(
     table: Table, name: str, role: str, place: int, choice: Declared, default: str, own: str | None, gain: float
 ) -> Channel:
     picked = choice.columns.get(name)
-    unit = _unit(table, name, place, picked)
     header, scaling = table.headers[place], _scaling(picked)
     where = f"{table.where}, column {header!r}"
+    text = _written(table, name, place, picked) if role == "input" and (picked is None or picked.unit is None) else None
+    if text is not None and unit_of(text) is None and text == (own or (text if gain == 0.0 else None)):
+        return Channel(name, role, place, None, text, *scaling)  # rpm: the system says so, or it is no heat
+    unit = _unit(table, name, place, picked, role)
     if picked is not None and picked.thermistor is not None:
         return _thermistor(name, role, place, unit, picked.thermistor, scaling, where)
     if role in ("sensor", "ambient"):
@@ -276,6 +269,8 @@ def _input(
     if scaling[2]:
         return Channel(name, "input", place, None, own or "W", *scaling)
     if own is None:
+        if gain == 0.0 and unit is not None:  # no heat: the numbers as they are
+            return Channel(name, "input", place, unit, unit.name, *scaling)
         if unit is None or unit.name == "W":
             return Channel(name, "input", place, unit, "W" if gain == 1.0 or unit else "", *scaling)
         if unit.quantity == "power" and gain == 1.0:
@@ -299,14 +294,18 @@ def _input(
     )
 
 
-def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> Unit | None:
+def _written(table: Table, name: str, place: int, picked: ColumnChoice | None) -> str | None:
+    """Unit that the header or the units row says, as it is written there."""
+    header = table.headers[place]
+    written = None if header == name and picked is None else split_header(header)[1]
+    return table.units[place] if written is None and table.units and table.units[place].strip("- ") else written
+
+
+def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role: str = "") -> Unit | None:
     """Unit of a used column, from its header, the units row or the declaration; two that differ are refused."""
     header = table.headers[place]
     where = f"{table.where}, column {header!r}"
-    written = None if header == name and picked is None else split_header(header)[1]
-    if written is None and table.units and table.units[place].strip("- "):
-        written = table.units[place]
-    known = None
+    written, known = _written(table, name, place, picked), None
     if written is not None:
         known = unit_of(written)
         if known is None and not (picked is not None and picked.unit is not None):
@@ -314,7 +313,8 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None) -> U
                 f"its unit {short(written)} is not known",
                 where=where,
                 expected="a known unit",
-                remedy=f'Write [columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
+                remedy=(f'Write unit = "{written}" in [inputs.{name}]; or ' if role == "input" else "Write ")
+                + f'[columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
                 "W, mW, kW, %, K, mK, degC, degF, ohm.",
             )
     asked = picked.unit if picked is not None and picked.unit is not None else None

@@ -220,7 +220,7 @@ def _segments(
             table.actions.append(Action("filled", lost, text, "", lines, times))
             continue
         why = "" if options.gaps == "split" or same else "; inputs change across it, so that it is not filled"
-        text = f"{lost} samples missing after {times[0]:.10g} s; a new part begins{why}"
+        text = f"{lost} sample{'s' * (lost != 1)} missing after {times[0]:.10g} s; a new part begins{why}"
         table.actions.append(Action("split", lost, text, "", lines, times))
         begins[k + 1] = True
     starts = np.flatnonzero(begins)
