@@ -44,7 +44,7 @@ def test_a_fan_that_stands_still(run: Run, folder: Path) -> None:
     assert rt.read_system(out / "augmented.toml").parameter(FAN) == pytest.approx(0.4, rel=0.1)
     page = (out / "report.html").read_text(encoding="utf-8")
     for words in ("Since the reference records: the conductance of link sink-room is", "% lower",
-                  "the new records falls", "scatter of healthy records",
+                  "the new records falls", "new: new.csv", "Measured − model, new record", "scatter of healthy records",
                   "Before: the model fitted to the reference records", "old3.csv"):
         assert words in page, words
     assert "The model lacks" not in page

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from ..thermal import parameter_in_words
 
-_LISTED = 3  # of the least visible
+_LISTED = 2  # of the least visible
 _NEARLY_ALL, _TWICE = 0.9, 1.0  # relative decrease and increase above which a number says nothing more
 _ALIKE = 1.25  # ratio of increase and decrease up to which one number is said
 

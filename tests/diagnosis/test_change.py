@@ -297,3 +297,17 @@ def test_a_heater_too_weak_to_be_seen_is_said(rig: rt.System) -> None:
     assert found.to_dict()["reference"]["visible"]["inputs.spare.gain"] == {"lower": None, "higher": pytest.approx(
         found.reference.visible["inputs.spare.gain"]["higher"])}
     assert any("the gain of spare could be 90 % lower" in text.lower() for text in found.caveats)
+
+
+def test_a_column_that_heats_nothing_and_a_module_change_by_their_drive() -> None:
+    """A fan that a link follows: its own gain is 0, what may change is what the drive makes of the column."""
+    text = SYSTEM.replace("conductance = 0.8", 'conductance = 0.4\nfollow = { column = "fan", relative = 0.5 }')
+    text = text.replace("[inputs.heater]", '[inputs.fan]\nlump = "sink"\ngain = 0.0\n\n[inputs.heater]')
+    turns = np.repeat(np.tile([1.0, 3.0], 3), 50)
+    days = [rt.Record(sample_time=one.sample_time, inputs=np.column_stack([one.inputs, turns]), outputs=one.outputs,
+                      input_names=[*one.input_names, "fan"], output_names=one.output_names)
+            for one in (record(seed, **SIZES) for seed in (1, 2, 22))]
+    found = rt.diagnose(rt.thermal.parse_system(text), days[2], reference=days[:2], effects=["input_gain"])
+    assert found.verdict == "consistent" and found.reference is not None  # the same misfit on all days
+    names = [name for name in found.reference.visible if "gain" in name]
+    assert sorted(names) == ["inputs.fan.drive.gain", "inputs.heater.gain"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._distributions import f_isf, t_isf
 from ...errors import Diverged
+from ...thermal import System
 from ..effects import Candidate
 from ..fit import Refit, Whitened, orthonormal
 from ._parameter_change import NAME
@@ -68,14 +69,16 @@ def visible_changes(new: Refit, reference: Reference, found: Search) -> tuple[Vi
             needed = seen + math.sqrt(kappa) * float(t_isf(1.0 - _POWER, freedom))  # that which scatter may take off
             own = length_of(new, scores, i)
             lower, higher = (_smallest(new, candidate, needed, own, sign) for sign in (-1.0, 1.0))
-            out.append(Visible(_names(candidate), abs(lower), higher))
+            out.append(Visible(_names(candidate, new.system), abs(lower), higher))
     return tuple(out)
 
 
-def _names(candidate: Candidate) -> tuple[str, ...]:
+def _names(candidate: Candidate, system: System) -> tuple[str, ...]:
+    """The numbers that change: of a heater its gain, of a module or a column that heats nothing that of its drive."""
     if candidate.effect.name == NAME:
         return candidate.where
-    return tuple(f"inputs.{name}.gain" for name in candidate.where)
+    return tuple(f"modules.{name}.drive.gain" if name in system.modules else
+                 f"inputs.{name}.{'gain' if system.inputs[name].gain else 'drive.gain'}" for name in candidate.where)
 
 
 def _smallest(new: Refit, candidate: Candidate, needed: float, own: float, sign: float) -> float:

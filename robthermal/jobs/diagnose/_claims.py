@@ -101,7 +101,8 @@ def _claim(title: str, sentence: str, holds: bool, reason: str, box: str, margin
 
 
 def _records(result: Diagnosed, kind: str) -> str:
-    said = [f"{kind}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind]
+    called = "new" if kind == "train" and result.diagnosis.reference is not None else kind
+    said = [f"{called}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind]
     said += [f"{kind}: {one.name}, {one.frequency.size} bins" for one in result.responses if kind == "train"]
     return "; ".join(said)
 

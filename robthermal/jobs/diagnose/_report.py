@@ -201,9 +201,9 @@ def _evidence(effect: Found) -> dict[str, float]:
 
 def _gap_section(result: Diagnosed) -> Section:
     found = result.diagnosis
-    rows = [{"records": kind, "before": gap.before, "after": gap.after, "noise alone": gap.noise, "unit": gap.unit}
-            for kind, gap in found.gap.items()]
-    rows += [{"records": f"{one.kind}: {one.name}, {name}", "before": rmse([one.before[name]]),
+    rows = [{"records": _called(kind, found), "before": gap.before, "after": gap.after, "noise alone": gap.noise,
+             "unit": gap.unit} for kind, gap in found.gap.items()]
+    rows += [{"records": f"{_called(one.kind, found)}: {one.name}, {name}", "before": rmse([one.before[name]]),
               "after": rmse([one.after[name]]), "noise alone": float("nan"), "unit": one.unit}
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
@@ -224,14 +224,20 @@ def _gap_section(result: Diagnosed) -> Section:
                    anchor="gap")
 
 
+def _called(kind: str, found: Diagnosis) -> str:
+    """Kind of a record: of what is compared with a healthy machine, "new"."""
+    return "new" if kind == "train" and found.reference is not None else kind
+
+
 def _figure(one: Residuals, found: Diagnosis) -> Figure:
+    kind = _called(one.kind, found)
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     drawn = residuals_before_after(one.time, {n: one.before[n] for n in names}, {n: one.after[n] for n in names},
                                    noise=_noise(one, found), order=found.system.sensor_names, unit=one.unit,
-                                   title=f"{one.kind}: {one.name}")
+                                   title=f"{kind}: {one.name}")
     shown = f"the {len(names)} sensors with the largest residual" if len(names) < len(one.before) else "every sensor"
-    return Figure.draw(drawn, alt=f"Residuals of the {one.kind} record over time, without and with the effects.",
-                       caption=f"Measured − model, {one.kind} record, {shown}, on one scale. Grey: twice what noise "
+    return Figure.draw(drawn, alt=f"Residuals of the {kind} record over time, without and with the effects.",
+                       caption=f"Measured − model, {kind} record, {shown}, on one scale. Grey: twice what noise "
                        "alone would give."
                        + (" After: with provisional effects, which are no names." if found.provisional else ""))
 
@@ -243,12 +249,13 @@ def _noise(one: Residuals, found: Diagnosis) -> float:
 
 
 def _spectrum(one: Residuals, found: Diagnosis) -> Figure:
+    kind = _called(one.kind, found)
     names = sorted(one.before, key=lambda name: -rmse([one.before[name]]))[:_DRAWN]
     before, after = ({name: sizes[name] for name in names} for sizes in one.spectra())
-    drawn = spectra_before_after(one.frequency, before, after, unit=f"{one.unit}/√Hz", title=f"{one.kind}: {one.name}",
-                                 order=found.system.sensor_names)
-    return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {one.kind} record, without and with the "
-                       "effects.", caption=f"The same residuals over frequency, {one.kind} record.")
+    drawn = spectra_before_after(one.frequency, before, after, unit=f"{one.unit}/√Hz", order=found.system.sensor_names,
+                                 title=f"{kind}: {one.name}")
+    return Figure.draw(drawn, alt=f"Spectral densities of the residuals of the {kind} record, without "
+                       "and with the effects.", caption=f"The same residuals over frequency, {kind} record.")
 
 
 def _response(one: ResponseResiduals) -> Figure:
