@@ -76,9 +76,9 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         elif len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
             state, found = lasting(revise(replace(state, misfit_left=False)), finer, validation)
         if not found:
-            alone = predicting_alone(judged.state, finer, validation)
+            alone = predicting_alone(judged.state, validation) if finer.structure.n_coarse else None
             if alone is not None:
-                return saying_so(_graded(judged, alone, judged.state.nominal, validation))
+                return saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
             return _nothing_lasts(judged, finer)
         state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
         state = _predicting(validated(state, validation, progress), finer, validation, progress)
@@ -122,7 +122,7 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
     if not state.rounds:
         return replace(judged, why="the validation records contradict what holds over parts of the training records")
     if faults := no_names(state):
-        return replace(judged, why=_beside(state, f"are no names: {' '.join(faults)}"))
+        return replace(judged, why=_beside(state, ("is no name", "are no names"), f": {' '.join(faults)}"))
     fit, nominal = state.fit, judged.state.nominal
     plain, bare = exact(fit), exact(nominal)
     kept = replace(state, nominal=nominal, scores=judged.state.scores, short=ShortList(fit, (), {}), complete=True,
@@ -133,11 +133,12 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
     held = validation.predicted(bare, plain)
     gaps = [Gap(nominal.rms, plain.rms, expected_rms(plain))] + ([] if held is None else [held.gap])
     if not _closes(gaps):
-        return replace(judged, why=_beside(state, f"take {_shares(gaps)} off the excess mean square, less than the "
-                                           f"{100.0 * CLOSED_SQUARE:.0f} % asked for on validation records or, without "
-                                           f"any, the {100.0 * _SHARE:.0f} % on training records"))
+        return replace(judged, why=_beside(
+            state, ("takes", "take"), f" {_shares(gaps)} off the excess mean square, less than the "
+            f"{100.0 * CLOSED_SQUARE:.0f} % asked for on validation records or, without any, the "
+            f"{100.0 * _SHARE:.0f} % on training records"))
     if not independent_of_step(fit):
-        return replace(judged, why=_beside(state, "move when the integration is refined"))
+        return replace(judged, why=_beside(state, ("moves", "move"), " when the integration is refined"))
     ambiguous = not all(one_place(round_, nominal.structure.base) for round_ in state.rounds)
     verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
     code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
@@ -145,11 +146,12 @@ def _graded(judged: Judged, state: SearchState, finer: Refit, validation: Valida
                   plain=plain, evidence=evidence_of(state.rounds, fit, finer, validation))
 
 
-def _beside(state: SearchState, what: str) -> str:
-    """Why the effects that last are no names, with their labels."""
-    labels = " and ".join(round_.best.candidate.label for round_ in state.rounds)
-    where = ", which last beside a network with its lumps split," if state.fit.structure.n_coarse else ""
-    return f"{labels}{where} {what.rstrip('.')}"
+def _beside(state: SearchState, verb: tuple[str, str], what: str) -> str:
+    """Why the effects that last are no names, with their labels; the verb for one of them, and for several."""
+    labels, several = [round_.best.candidate.label for round_ in state.rounds], len(state.rounds) > 1
+    beside = f", which {('lasts', 'last')[several]} beside a network with its lumps split,"
+    where = beside if state.fit.structure.n_coarse else ""
+    return f"{' and '.join(labels)}{where} {verb[several]}{what.rstrip('.')}"
 
 
 def _shares(gaps: Sequence[Gap]) -> str:
