@@ -118,7 +118,7 @@ def show_report(report: Any, out: Path, as_json: bool, remarks: Sequence[Outcome
             said = Text(_word(claim), style="green" if claim.good else "bold red")
             table.add_row(Text(claim.name), said, *[Text(claim.box)] * wide, Text(claim.margin))  # [1/s]: no markup
         console.print(table)
-        say(f"verdict: {report.verdict}", *(f"  {one.level}: {one}" for one in report.reasons))
+        say(f"verdict: {report.verdict}", *(f"  {one.level}: {one}" for one in report.told))
         say(*(f"usable current, {row.direction}{' (parameter ranges)' * (row.parameters == 'ranges')}: {row.range}"
               for row in report.usable))
         say(*(f"{name}: {_listed(value)}" for name, value in more.items()))

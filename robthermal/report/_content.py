@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ._evidence import Evidence
 from ._figure import Figure
-from ._reasons import NO_VERDICT, Reason, Verdict, contradicts, verdict_of
+from ._reasons import NO_VERDICT, Reason, Verdict, contradicts, told, verdict_of
 from ._stages import Stage
 from ._table import Printed, Table
 from ._usable import Parameters, UsableRange
@@ -263,6 +263,11 @@ class Report:
         """Everything that is not as it should be, failures first."""
         found = [*self._of_claims(), *self.gate]
         return sorted(found, key=lambda one: one.level != "fail")
+
+    @property
+    def told(self) -> list[Reason]:
+        """The same for a reader: of three or more of one kind the worst, with what else it is about."""
+        return told(self.reasons)
 
     @property
     def contradicted(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from typing import Literal
 
@@ -12,6 +12,8 @@ from ..errors import InputError
 Level = Literal["fail", "remark"]
 Verdict = Literal["PASS", "PASS WITH REMARKS", "FAIL", "NO VERDICT"]
 NO_VERDICT: Verdict = "NO VERDICT"  # a stage could not be computed: nothing is decided
+_ALIKE, _NAMED = 3, 8  # reasons of one kind from which one stands for all; what is listed of the others
+_OF_CLAIMS = ("not_certified", "not_verified", "not_robust", "not_passed")  # each claim has a reason of its own
 CONTRADICTED = ("validation_misfit", "training_misfit")  # codes that say: the data contradict the model
 
 
@@ -72,6 +74,46 @@ class Reason:
 
     def __str__(self) -> str:
         return f"{self.code}: {self.text}" + (f" {self.remedy}" if self.remedy else "")
+
+
+def told(reasons: Sequence[Reason]) -> list[Reason]:
+    """Reasons as a reader sees them: of three or more of one kind the worst, and what else it is about.
+
+    Parameters
+    ----------
+    reasons : sequence of Reason
+        All reasons, in order.
+
+    Returns
+    -------
+    list of Reason
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> alike = [rt.report.Reason("remark", "undetermined_parameter", "calibrate", name, f"{name} is open.")
+    ...          for name in ("a", "b", "c")]
+    >>> [one.text for one in told(alike)]
+    ['a is open. Likewise: b, c.']
+    """
+    kinds: dict[tuple[str, str], list[Reason]] = {}
+    for one in reasons:
+        kinds.setdefault((one.level, one.code), []).append(one)
+    out: list[Reason] = []
+    for alike in kinds.values():
+        if len(alike) < _ALIKE or alike[0].code in _OF_CLAIMS:
+            out += alike
+            continue
+        worst = max(alike, key=_excess)
+        others = list(dict.fromkeys(one.about for one in alike if one is not worst))
+        named = ", ".join(others[:_NAMED]) + (f" and {len(others) - _NAMED} more" if len(others) > _NAMED else "")
+        out.append(replace(worst, text=f"{worst.text} Likewise: {named}."))
+    return out
+
+
+def _excess(one: Reason) -> float:
+    """What was found, in units of the limit; 0 where nobody says."""
+    return abs(one.value / one.limit) if one.value is not None and one.limit else 0.0
 
 
 def verdict_of(reasons: Sequence[Reason]) -> Verdict:

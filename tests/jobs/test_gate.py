@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 import robthermal as rt
 from robthermal import cli
 from robthermal._digits import inward, outward
+from robthermal.jobs.certify import current_reasons
 from robthermal.jobs.run._misfit import misfit
 
 pytestmark = pytest.mark.usefixtures("sketched")
@@ -285,3 +286,15 @@ def test_every_code_has_a_meaning_and_a_remedy_and_is_documented() -> None:
     assert len(rt.jobs.claims.GateCode) > 1
     for one in rt.jobs.claims.GateCode:
         assert one.meaning.endswith(".") and one.remedy.endswith(".") and f"`{one.code}`" in page
+
+
+@pytest.mark.parametrize(("modules", "words"), [
+    (("m1",), "m1 is to have cooling currents up to 2 A; the declared rating is 1.2 A."),
+    (("m1", "m2"), "m1 is to have cooling currents up to 2 A; the smallest declared rating, which bounds the usable "
+                   "current of all modules, is 1.2 A.")])
+def test_a_rating_of_another_module_is_not_said_to_be_its_own(modules: tuple[str, ...], words: str) -> None:
+    """Two stages of a cooler, of 2 A and 1.2 A: the usable current is one for both."""
+    row = rt.report.UsableRange("cooling", "nominal", modules, [rt.report.Bound("rating", 1.2, "declared", "")], None)
+    asked = {name: (0.0, size) for name, size in zip(modules, (2.0, 1.2), strict=False)}
+    found = current_reasons(asked, {}, [row], True)
+    assert [one.text for one in found] == [words]

@@ -148,3 +148,19 @@ def test_a_stored_report_keeps_all_of_it_and_shows_that_it_was_edited(tmp_path: 
     assert is_unchanged(path)
     path.write_text(path.read_text(encoding="utf-8").replace("1.2119", "9.9"), encoding="utf-8")
     assert not is_unchanged(path)
+
+
+def test_reasons_of_one_kind_are_told_once() -> None:
+    """The worst of them, with what the others are about; all of them in the files for programs."""
+    off = [Reason("fail", "training_misfit", "calibrate", f"run: T{k}", f"T{k} is off.", "Look.", 0.1 * k, 0.1)
+           for k in (1, 4, 2)]
+    open_ = [Reason("remark", "undetermined_parameter", "calibrate", f"p{k}", f"p{k} is open.") for k in range(12)]
+    two = [Reason("remark", "resampled", "calibrate", f"file{k}", f"file{k} is uneven.") for k in (1, 2)]
+    claims = [Reason("fail", "not_certified", "certify", f"claim{k}", f"claim{k} does not hold.") for k in range(3)]
+    report = replace(BARE, gate=(*off, *open_, *two, *claims))
+    said = [(one.level, one.text) for one in report.told if one.stage == "calibrate"]
+    assert said == [("fail", "T4 is off. Likewise: run: T1, run: T2."),
+                    ("remark", "p0 is open. Likewise: p1, p2, p3, p4, p5, p6, p7, p8 and 3 more."),
+                    ("remark", "file1 is uneven."), ("remark", "file2 is uneven.")]
+    assert [one.text for one in report.told if one.about.startswith("claim")] == [one.text for one in claims]
+    assert len(report.reasons) == len(report._of_claims()) + 20

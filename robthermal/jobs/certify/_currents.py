@@ -207,13 +207,20 @@ def current_reasons(current: Pairs, measured: Pairs, rows: Sequence[UsableRange]
         failed.add((module, name))
         usable = _limit(rows, direction, None)
         yield Reason("fail", CODES[name].code, "certify", module, f"{module} is to have {direction} currents up to "
-                     f"{size:.6g} A; {_MEANS[name]} is {rounded_down(limit)} A.", "Ask for at most "
+                     f"{size:.6g} A; {_meant(name, rows)} is {rounded_down(limit)} A.", "Ask for at most "
                      f"{rounded_down(usable or 0.0)} A, the usable current.", size, limit)
     for module, direction, name, size, limit in beyond(measured, rows, True):
         if (module, name) not in failed:
             failed.add((module, name))
             yield Reason("remark", CODES[name].code, "certify", module, f"In the records {module} has {direction} "
-                         f"currents up to {size:.6g} A; {_MEANS[name]} is {rounded_down(limit)} A.", "", size, limit)
+                         f"currents up to {size:.6g} A; {_meant(name, rows)} is {rounded_down(limit)} A.", "", size,
+                         limit)
+
+
+def _meant(name: str, rows: Sequence[UsableRange]) -> str:
+    """A bound in words: the usable current is one for all modules, and so is its rating, the smallest of them."""
+    several = name == "rating" and any(len(row.modules) > 1 for row in rows)
+    return "the smallest declared rating, which bounds the usable current of all modules," if several else _MEANS[name]
 
 
 _MEANS = {"rating": "the declared rating", "runaway": "the runaway limit",
