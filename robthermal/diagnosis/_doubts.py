@@ -63,7 +63,8 @@ def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
         Named effects with their places, and what the records cannot tell from them.
     """
     lumps = [system.inputs[where[0]].lump if name == "input_lag" else system.sensors[where[0]].lump
-             for name, where in effects if name in ("input_lag", "sensor_lag")]
+             for name, where in effects  # a module heats two lumps at once
+             if name == "sensor_lag" or (name == "input_lag" and where[0] in system.inputs)]
     return [f"A lag at {lump} may also be the time that heat takes within {lump}, from where it enters to the "
             f"thermometer: see whether a network with {lump} split in two does as well."
             for lump in dict.fromkeys(filter(None, lumps))]

@@ -9,6 +9,7 @@ import pytest
 import thermocycler
 
 import robthermal as rt
+from robthermal.diagnosis._doubts import within_the_body
 from robthermal.diagnosis.fit import _refitting
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -34,6 +35,12 @@ def test_a_lag_is_named_where_rows_are_even(tmp_path: Path, machine: dict[str, f
     found = rt.diagnose(thermocycler.SYSTEM, records(tmp_path, stamps_right=False, **machine), effects=FEW)
     assert found.verdict == "named" and [one.effect for one in found.effects] == [name]
     assert next(iter(found.effects[0].values.values()))[0] == pytest.approx(size, rel=0.05)
+
+
+def test_a_lag_of_a_current_is_no_doubt_about_a_lump() -> None:
+    """It acts on both faces of a module: the answer "named_with_remainder" had ended with an error there."""
+    said = within_the_body(thermocycler.SYSTEM, [("input_lag", ("m1",)), ("input_lag", ("heater",))])
+    assert len(said) == 1 and "within lid" in said[0]
 
 
 def test_starts_from_rest_are_given_up_where_records_begin_in_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -11,8 +11,7 @@ from scipy.linalg import expm
 import robthermal as rt
 from robthermal.diagnosis.effects import candidates
 from robthermal.diagnosis.evidence import _fewer_trials
-from robthermal.diagnosis.fit import ENOUGH, NoiseScaling, Refit, Structure, exact, fitted
-from robthermal.diagnosis.fit._descent import turned
+from robthermal.diagnosis.fit import ENOUGH, NoiseScaling, Refit, Structure, exact, fitted, turned
 from robthermal.diagnosis.fit._refitting import _fitted
 from robthermal.diagnosis.path import LinearizedRecord, Whitener, averaged_record
 from robthermal.diagnosis.path._riccati import filtered, spread

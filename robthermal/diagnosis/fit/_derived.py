@@ -58,3 +58,31 @@ def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: 
     moved[i] += step
     other = numbers(moved)
     return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
+
+
+def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]], upper: Array
+                    ) -> list[dict[str, float]]:
+    """Derivatives of the numbers by all parameters and quantities of effects, from those by parameters alone.
+
+    Parameters
+    ----------
+    numbers : callable
+        All numbers of the system at some unknowns.
+    v : ndarray
+        Unknowns of the fit: nominal parameters, then quantities of effects, then others.
+    columns : list of dict
+        Derivatives by every parameter of the numbers that it is known to move.
+    upper : ndarray, shape (n,)
+        Upper bounds of parameters and quantities.
+    """
+    p, out, values = len(columns), list(columns), numbers(v)
+    for i in range(p, len(upper)):
+        moved, step = v.copy(), STEP * max(abs(v[i]), 1e-6)
+        step = -step if v[i] + step > upper[i] else step
+        moved[i] += step
+        other = numbers(moved)
+        out.append({name: (other[name] - values[name]) / step for name in values if other[name] != values[name]})
+    if derives(numbers, v, values, columns):
+        for i in range(p):  # what an effect derives from a nominal parameter moves with it
+            out[i] = moved_by(numbers, v, i, values, columns[i])
+    return out

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import Diverged, InputError
-from ._turned import turned
+from ._columns import Columns, Plain
 
 Array = NDArray[np.float64]
 _FLAT = 1e-10  # relative singular value that is rounding
@@ -58,9 +58,15 @@ class Point:
         return self.problem.slopes(self.v)
 
     @cached_property
+    def columns(self) -> Columns:
+        """The derivatives, as the problem has them: some may be the same everywhere."""
+        split = getattr(self.problem, "columns", None)
+        return Plain(self.J) if split is None else split(self.v)
+
+    @cached_property
     def small(self) -> tuple[Array, Array]:
         """Derivatives (p + 1, p) and residuals (p + 1,) turned so that all other rows are 0: for linear problems."""
-        return turned(self.J, self.z)
+        return self.columns.turned(self.z)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +156,7 @@ def _better(new: Point, power: float, goes_on: bool) -> bool:
         if not new.z @ new.z < power:
             return False
         if goes_on:
-            new.J  # noqa: B018
+            new.columns  # noqa: B018
     except (Diverged, InputError):  # beyond what the system accepts or survives
         return False
     return True
@@ -174,21 +180,20 @@ def _curved(now: Point, new: Point, step: Array, damping: float, bounds: tuple[A
     of squares of z - t J step - t² (curvature + J acceleration) is lowest.
     """
     try:
-        beyond = now.z - now.J @ step - new.z
+        beyond = now.z - now.columns.along(step) - new.z
     except (Diverged, InputError):
         return step, 0.0
     if not np.isfinite(beyond).all():
         return step, 0.0
-    J = now.J
-    scale = np.linalg.norm(J, axis=0)
+    rows, against = now.columns.again(now.small[0], -beyond)
+    scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0] = 1.0
-    rows, against = turned(J, -beyond)
     rows = rows / scale
     if damping:
         rows = np.concatenate([rows, np.sqrt(damping) * np.eye(step.size)])
         against = np.append(against, np.zeros(step.size))
     acceleration = np.linalg.lstsq(rows, against, rcond=_FLAT)[0] / scale
-    along, across = J @ step, beyond + J @ acceleration
+    along, across = now.columns.along(step), beyond + now.columns.along(acceleration)
     t = _lowest(now.z, along, across)
     curved = np.clip(now.v + t * step + t**2 * acceleration, *bounds) - now.v
     predicted = now.z - t * along - t**2 * across

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...fitting import Initial, Ranges, started
 from ...thermal import System
-from ..data import DataSet
+from ..data import DataSet, records_of
 from ..effects import Candidate
 from ..path import Linearized, Unknowns, linearize
-from ._derived import STEP, derives, moved_by
+from ._derived import STEP, with_quantities
 from ._sessions import Sessions
 
 Array = NDArray[np.float64]
@@ -238,11 +238,24 @@ class Structure:
         return self._computed(v).paths
 
     def slopes(self, v: Array) -> list[Array]:
-        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all data sets; kept too."""
+        """Derivatives (n, n_sensors, n_unknowns) of the modelled readings of all data sets."""
+        moving, first = self.moving_slopes(v), self.in_coarse.start
+        return moving if first == self.in_coarse.stop else [
+            np.concatenate([slopes[..., :first], columns, slopes[..., first:]], axis=2)
+            for slopes, columns in zip(moving, self.coarse, strict=True)]
+
+    def moving_slopes(self, v: Array) -> list[Array]:
+        """`slopes` without those that are the same everywhere, by what a finer network would change; kept too."""
         computed = self._computed(v)
         if computed.slopes is None:
             computed.slopes = [path.slopes(own) for path, own in zip(computed.paths, self._unknowns(v), strict=True)]
         return computed.slopes
+
+    @property
+    def in_coarse(self) -> slice:
+        """Places of the unknowns of a finer network whose derivatives are the same everywhere: those of records."""
+        first, only_records = self.n_common - self.n_coarse, len(records_of(self.data)) == len(self.data)
+        return slice(first, self.n_common if only_records else first)
 
     def _computed(self, v: Array) -> _Computed:
         key = v.tobytes()
@@ -269,16 +282,17 @@ class Structure:
             del self._last[key]
 
     def _unknowns(self, v: Array) -> Iterator[Unknowns]:
-        """The unknowns as every data set sees them."""
+        """The unknowns as every data set sees them, without those whose derivatives are the same everywhere."""
         names, chain = self._chain(v)
-        n, coarse = self.n_parameters + self.n_effects, slice(self.n_common - self.n_coarse, self.n_common)
+        n, left_out = self.n_parameters + self.n_effects, self.in_coarse.stop - self.in_coarse.start
+        coarse = slice(self.in_coarse.start, self.n_common - left_out)
         steps = STEP * np.concatenate([self.ranges.spread, np.maximum(np.abs(v[self.n_parameters:n]), self._typical)])
-        at, gain_at = self.n_common, v.size - (self.n_own - self.n_starts)
+        at, gain_at = self.n_common - left_out, v.size - (self.n_own - self.n_starts) - left_out
+        asked = np.delete(v, self.in_coarse)
         for one, start in zip(self.data, self.starts, strict=True):
             n_gains = self.sessions.n_free * one.n_sessions
-            yield Unknowns(v, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start,
-                           slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma,
-                           coarse)
+            yield Unknowns(asked, self.system, steps, self.bounds, names, chain, slice(at, at + start.n_free), start,
+                           slice(gain_at, gain_at + n_gains), self.sessions.numbers, self.sessions.sigma, coarse)
             at, gain_at = at + start.n_free, gain_at + n_gains
 
     @property
@@ -357,33 +371,20 @@ class Structure:
     @cached_property
     def _added(self) -> frozenset[str]:
         """Lumps and links that the effects have added."""
-        system = self.base
-        for candidate in self.effects:
-            system = candidate.add(system, candidate.effect.size.typical)
+        system = self._with_typical(self.effects)
         before, after = ({*one.lumps, *(link.name for link in one.links)} for one in (self.base, system))
         return frozenset(after - before)
 
     def _chain(self, v: Array) -> tuple[list[str], Array]:
         """The system's numbers that depend on parameters and quantities, and their derivatives by these coordinates."""
         p, n = self.n_parameters, self.n_parameters + self.n_effects
-        here = self.system(v)
         names = dict.fromkeys(self.ranges.flat)
         columns: list[dict[str, float]] = []
         slopes = self.ranges.slopes(self.ranges.values(v[:p]))
         for group, slope in zip(self.ranges.members, slopes, strict=True):
             columns.append({name: float(slope) for name in group})
         if self.n_effects:
-            numbers, values = (lambda at: self.system(at).parameters), here.parameters
-            for i in range(p, n):
-                moved, step = v.copy(), STEP * max(abs(v[i]), 1e-6)
-                step = -step if v[i] + step > self.bounds[1][i] else step
-                moved[i] += step
-                other = self.system(moved).parameters
-                columns.append({name: (other[name] - values[name]) / step for name in values
-                                if other[name] != values[name]})
-            if derives(numbers, v, values, columns[:p]):
-                for i in range(p):  # what an effect derives from a nominal parameter moves with it
-                    columns[i] = moved_by(numbers, v, i, values, columns[i])
+            columns = with_quantities(lambda at: self.system(at).parameters, v, columns, self.bounds[1][:n])
         for column in columns:
             names |= dict.fromkeys(column)
         return list(names), np.array([[column.get(name, 0.0) for column in columns] for name in names]

@@ -196,7 +196,7 @@ class LinearizedRecord:
         at = {number: J[..., place] for place, number in enumerate([*names, *own])}
         for i, (number, sigma) in enumerate(zip(unknowns.gain_names, unknowns.gain_sigma, strict=True)):
             out[..., unknowns.gains.start + i] = sigma * (self.late_columns if number == LATE_MEANS else at[number])
-        if self.coarse is not None:
+        if self.coarse is not None and unknowns.coarse.stop > unknowns.coarse.start:
             out[..., unknowns.coarse] = self.coarse
         return out
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import scipy
@@ -16,6 +17,7 @@ from ._riccati import filtered, settled, spread
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
+Kept = TypeVar("Kept")
 _IGNORED = 1e6  # K: standard deviation of a missing reading
 _BLOCK = 8  # samples whitened in one product
 _COLUMNS = 32  # whitened at once: they stay in the cache
@@ -110,6 +112,24 @@ class Whitener:
     C: Array
     gains: Array
     roots: Array
+    _last: dict[tuple[int, ...], tuple[Any, Any]] = field(default_factory=dict, init=False, repr=False)
+
+    def kept(self, of: Sequence[object], made: Callable[[], Kept]) -> Kept:
+        """What follows from this filter and some objects, made when it is first asked for; of the last objects alone.
+
+        Parameters
+        ----------
+        of : sequence
+            Objects, compared by identity.
+        made : callable
+            Makes what follows from them.
+        """
+        key = tuple(map(id, of))
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = tuple(of), made()  # kept with it, for another object might get their place
+        found: Kept = self._last[key][1]
+        return found
 
     def __call__(self, r: Array, out: Array | None = None) -> Array:
         """Whiten along time, into `out` of the same shape if it is given: columns of a long record are copied once."""
