@@ -37,10 +37,9 @@ class Augmented:
     ports: NDArray[np.intp]
 
 
-def augment(eq: Equations) -> Augmented:
+def augment(eq: Equations, layout: Layout, heat: PortHeat) -> Augmented:
     """Assemble the augmented linear part (dense: for systems of up to a few hundred lumps)."""
-    layout, n = Layout(eq), len(eq.system.lumps)
-    heat, nz = PortHeat.of(eq, layout), layout.size
+    n, nz = len(eq.system.lumps), layout.size
     F, D = np.zeros((nz, nz)), np.zeros((nz, eq.drives.width))
     F[:n, :n], D[:n] = (dense / eq.capacity[:, None] for dense in eq.dense)
     _sensors(eq, layout, F)
@@ -100,20 +99,23 @@ def without_meters(parts: Augmented, n_free: int) -> Augmented:
     return Augmented(parts.F[:n_free, :n_free], parts.B[:n_free], parts.N[:n_free], parts.ports)
 
 
-def slope(eq: Equations, parts: Augmented, name: str) -> Augmented | None:
+def slope(layout: Layout, parts: Augmented, name: str) -> Augmented | None:
     """Derivative of F, B and N by a parameter of the linear part, meters left out; None when it has no part in it."""
+    eq = layout.eq
     table, part, field = locate(eq.system, name)
-    own = without_meters(parts, Layout(eq).n_free)
+    own = without_meters(parts, layout.n_free)
     if (table, field) == ("links", "conductance"):
         return _slope_by_conductance(eq, own, next(x for x in eq.system.links if x.name == part).between)
     if (table, field) == ("modules", "conductance.value"):
         return _slope_by_conductance(eq, own, (eq.system.modules[part].hot, eq.system.modules[part].cold))
     if (table, field) in AFFINE:  # a difference is exact
         changed, step = unit_change(eq.system, name)
-        other = without_meters(augment(replace(eq, system=changed)), len(own.F))
+        changed_eq = replace(eq, system=changed)
+        changed_layout = Layout(changed_eq)
+        other = without_meters(augment(changed_eq, changed_layout, PortHeat.of(changed_eq, changed_layout)), len(own.F))
         differences = ((other.F - own.F) / step, (other.B - own.B) / step, (other.N - own.N) / step)
         return Augmented(*differences, parts.ports)
-    rows = _rows_of_scale(eq, table, part, field)
+    rows = _rows_of_scale(layout, table, part, field)
     return _rows_scaled(own, rows, -1 / eq.system.parameter(name)) if rows else None
 
 
@@ -132,9 +134,9 @@ def _slope_by_conductance(eq: Equations, parts: Augmented, between: tuple[str, s
     return Augmented(F, B, np.zeros_like(parts.N), parts.ports)
 
 
-def _rows_of_scale(eq: Equations, table: str, part: str, field: str) -> list[int]:
+def _rows_of_scale(layout: Layout, table: str, part: str, field: str) -> list[int]:
     """Rows that are inversely proportional to a capacity, a time constant or a period."""
-    layout = Layout(eq)
+    eq = layout.eq
     if (table, field) == ("lumps", "capacity"):
         return [eq.index[part]]
     if (table, field) == ("lumps", "periodic.period"):

@@ -73,10 +73,10 @@ class Integrator:
     _steps: dict[tuple[int, int], Step] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.parts = augment(self.eq)
-        self.ports = self.parts.ports
         self.layout = Layout(self.eq)
         self.port_heat = PortHeat.of(self.eq, self.layout)
+        self.parts = augment(self.eq, self.layout, self.port_heat)
+        self.ports = self.parts.ports
         self.nz, self.nq = self.parts.F.shape[0], self.parts.N.shape[1]
         self._gains: dict[tuple[int, int], Array] = {}
         self._fixed: dict[tuple[int, int], FixedPoint] = {}

@@ -63,12 +63,12 @@ class Layout:
         read = sorted(set(self.sources.values())) if self.eq.averaged else []
         return {source: first + i for i, source in enumerate(read)}
 
-    @property
+    @cached_property
     def _n_without_integrals(self) -> int:
         return (len(self.eq.system.lumps) + len(self.sensors) + len(self.drives) + len(self.memories)
                 + 2 * len(self.periodic))
 
-    @property
+    @cached_property
     def n_free(self) -> int:
         """Number of states before the meters."""
         return self._n_without_integrals + len(self.integrals)

@@ -53,11 +53,15 @@ class Sensitivity:
         self.names, self.held, self.jumps = list(names), held, jumps
         self.n_free = integrator.layout.n_free  # meters feed nothing back
         self._linear = {name: part for name in self.names
-                        if (part := slope(integrator.eq, integrator.parts, name)) is not None}
+                        if (part := slope(integrator.layout, integrator.parts, name)) is not None}
         eq = integrator.eq
         self._heating = {name for name in self.names if any(True for _ in touched(eq, name))}
         self._acting = [name for name in self.names  # the others move no more than the start
                         if name in self._linear or name in held or name in self._heating]
+        driving = np.unique(np.concatenate([np.zeros(0, np.intp), *(end for place in integrator.port_heat.places
+                                                                    for end in place)])) - integrator.ports.size
+        driving = driving[driving >= 0]  # drives that the terms need
+        self._driving = {name for name, slopes in held.items() if slopes[:, driving].any()}
         self._columns = [self._acting.index(name) for name in self._linear]
         self._steps: dict[tuple[int, int], Array] = {}
 
@@ -168,7 +172,7 @@ class Sensitivity:
         found = None if march is None else march.linearized(z, w, n)
         V = self._at_ports(self.by.step(kind, level), z, w) if found is None else found.V
         q = self.by.port_heat(V) if found is None else found.q
-        G = self.by.port_heat.slopes(V) if found is None or held else np.zeros(0)  # (S, p+1, nq, np + nw)
+        G = self.by.port_heat.slopes(V) if found is None or self._driving else np.zeros(0)  # (S, p+1, nq, np + nw)
         direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, parameters that act)
         F, through = self._through(kind, level, G) if found is None else (found.F, found.through)
         return F, direct[:, nodes:nodes + n] + through @ direct[:, :nodes]
@@ -228,6 +232,7 @@ class Sensitivity:
             heat = self.by.port_heat.parameter(name, V) if name in self._heating else None
             if name in held:
                 out[..., column] += held[name] @ step.Ku[:rows].T
+            if name in self._driving:
                 through_drive = np.einsum("sjqw,sw->sjq", G[..., self.by.ports.size:], held[name])
                 heat = through_drive if heat is None else heat + through_drive
             if heat is not None:

@@ -294,7 +294,8 @@ class _Derivative:
     def __call__(self, names: Sequence[str]) -> Array:
         by, plan, eq, at = self.by, self.plan, self.by.eq, self.plan.samples
         states = self.path.z[at, :by.layout.n_free]
-        by_rate = self.delayed or any(name.endswith((".delay", ".time_constant")) for name in names)
+        by_rate = self.delayed or any(name.startswith("sensors.") and name.endswith((".delay", ".time_constant"))
+                                      for name in names)
         held = held_slopes(eq, self.record, names, plan)
         along = Sensitivity(by, names, held, jump_slopes(by, names, self.path.z, plan))
         slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))

@@ -16,6 +16,7 @@ from .._outcomes import DiagnosisCode
 from ..data import Measured, NoiseEstimate, as_measured, noise_floor, records_of, without_outliers
 from ..path import Linearized, White, linearized_records
 from ._descent import Descent, Point, decrease, descend
+from ._ended import ended
 from ._noise_scaling import NoiseScaling, refined
 from ._refit import Refit
 from ._sessions import SessionGain, sessions_of, with_late_means
@@ -32,6 +33,7 @@ _LONG = 3  # times as many: a long record
 _CLEAR = 10.0  # of BIC
 _LOOK = 2  # evaluations of a start from rest before it is looked at
 _BEYOND_DOUBT = 2.0  # times its price: from more a start from rest does not come back
+_AT_ONCE = 20.0  # the same, before a first step
 _FAR = 3.0  # times the decrease that chance promises: from less the whole record converges as soon
 
 
@@ -167,20 +169,27 @@ def _at_rest(structure: Structure, found: Descent, whiteners: Sequence[White], l
     price = (structure.n_own - rest.n_own) * (math.log(structure.n_readings) + _CLEAR)
     if not price:
         return structure, found
-    other = minimized(rest, rest.carried(structure, found.at.v, structure.quantities(found.at.v)), whiteners,
-                      min(limit, _LOOK))
-    least = float(other.at.z @ other.at.z) - decrease(other.at, rest.bounds)
-    if least > float(found.at.z @ found.at.z) + _BEYOND_DOUBT * price:
+    power = float(found.at.z @ found.at.z)
+    start = rest.carried(structure, found.at.v, structure.quantities(found.at.v))
+    if _least(Point(Whitened(rest, whiteners), np.clip(start, *rest.bounds)), rest) > power + _AT_ONCE * price:
+        return structure, found
+    other = minimized(rest, start, whiteners, min(limit, _LOOK))
+    if _least(other.at, rest) > power + _BEYOND_DOUBT * price:
         return structure, found
     sure = found.converged or limit >= LIMIT
     if not other.converged and (sure or limit > _LOOK):
         other = minimized(rest, other.at.v, whiteners, LIMIT if sure else limit - _LOOK)
-    if float(other.at.z @ other.at.z) > float(found.at.z @ found.at.z) + price:
+    if float(other.at.z @ other.at.z) > power + price:
         return structure, found
     if sure:
         return rest, other
     moving = structure.carried(rest, other.at.v, rest.quantities(other.at.v))
     return structure, min(found, minimized(structure, moving, whiteners, 1), key=lambda one: float(one.at.z @ one.at.z))
+
+
+def _least(at: Point, structure: Structure) -> float:
+    """Sum of squares that the linearization at a point promises."""
+    return float(at.z @ at.z) - decrease(at, structure.bounds)
 
 
 def coarsened(fit: Refit) -> Refit:
@@ -242,7 +251,8 @@ def _refined(paths: Sequence[Linearized], floor: NoiseEstimate, levels: NoiseSca
 
 def minimized(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
-    return descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH)
+    return ended(structure, v, whiteners, limit,
+                 lambda: descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH))
 
 
 def _outcome(found: Descent) -> Outcome:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,8 @@ class Structure:
         sizes are unknowns common to all data, with the prior 0 ± 1. Empty: the network is taken to be right.
     only_heated : bool
         Whether unknown ambients are no warmer than `warmest_room`.
+    ended : dict
+        Where descents ended, for all structures that come from one.
     """
 
     base: System
@@ -73,6 +76,7 @@ class Structure:
     sessions: Sessions = Sessions()
     coarse: tuple[Array, ...] = ()
     only_heated: bool = False
+    ended: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
     _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -342,10 +346,6 @@ class Structure:
         ----------
         n : int
             Number of samples.
-
-        Returns
-        -------
-        Structure
         """
         data = tuple(one.first(n) for one in self.data)
         coarse = tuple(columns[:len(one.readings)] for columns, one in zip(self.coarse, data, strict=False))
