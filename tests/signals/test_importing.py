@@ -375,3 +375,17 @@ def test_workbooks(tmp_path: Path, stage: Any, suffix: str) -> None:
     assert rt.read_records(path, stage, sheet="Log 1", gaps="fill")[0].n_samples == N
     with pytest.raises(InputError, match="no sheet 'Log 2'.*'Notes', 'Log 1'"):
         rt.read_records(path, stage, sheet="Log 2")
+
+
+def test_the_report_tells_temperatures_as_the_file_has_them(tmp_path: Path) -> None:
+    """A technician compares it with the file; what is kept is in kelvin, and said in the column of units."""
+    rows = "\n".join(f"{k},{21.5 + 0.5 * k},{70.7 + 0.9 * k:.1f},500" for k in range(25))
+    path = tmp_path / "run.csv"
+    path.write_text(f"time,T1 [°C],T2 [degF],m1 [mA]\n{rows}\n", encoding="utf-8")
+    record = rt.read_record(path, inputs=["m1"], outputs=["T1", "T2"])
+    said = str(record.imported)
+    assert "degC → K  21.5 … 33.5" in said and "degF → K  70.7 … 92.3" in said
+    assert "converted:" not in said and record["T1"][0] == pytest.approx(294.65)
+    assert [one["what"] for one in record.imported.actions].count("converted") >= 2
+    (first,) = [column for column in record.imported.columns if column.name == "T1"]
+    assert first.min == pytest.approx(294.65)

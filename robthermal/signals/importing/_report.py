@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from ..._celsius import ZERO_CELSIUS
 
 FORMAT = "robthermal-import/1"
 _HEADS = ("column", "name", "role", "unit", "min … max", "missing", "glitches")
@@ -140,15 +142,24 @@ class Import:
         zone = f", zone {self.time['timezone']}" if self.time.get("timezone") else ""
         origin = f", zero is {self.time['origin']}" if self.time.get("origin") else ""
         lines.append(f"  time: {', '.join(self.time['columns']) or 'counted'} as {self.time['format']}{zone}{origin}")
-        lines += [f"  {action['what']}: {action['text']}" for action in self.actions]
+        plain = {f"{column.name} from {column.unit_read} to {column.unit}" for column in self.columns}
+        lines += [f"  {action['what']}: {action['text']}" for action in self.actions
+                  if action["what"] != "mapped" and action["text"] not in plain]  # the table says these
         if self.absent:
             lines.append(f"  no column for: {', '.join(self.absent)}")
         return "\n".join(lines)
 
 
+# A technician compares the table with the file: temperatures are told as they stand there.
+_AS_READ: dict[str, Callable[[float], float]] = {
+    "degC": lambda kelvin: kelvin - ZERO_CELSIUS, "degF": lambda kelvin: (kelvin - ZERO_CELSIUS) * 9.0 / 5.0 + 32.0}
+
+
 def _row(column: ImportedColumn) -> tuple[str, ...]:
     unit = column.unit_read if column.unit_read == column.unit else f"{column.unit_read or '-'} → {column.unit or '-'}"
-    span = "" if column.min is None or column.max is None else f"{column.min:.6g} … {column.max:.6g}"
+    back = _AS_READ.get(column.unit_read or "") if column.unit == "K" else None
+    ends = [end if end is None or back is None else back(end) for end in (column.min, column.max)]
+    span = "" if ends[0] is None or ends[1] is None else f"{ends[0]:.6g} … {ends[1]:.6g}"
     return (
         column.column or "(no name)",
         column.name or "-",
