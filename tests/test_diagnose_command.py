@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -15,6 +16,7 @@ from commands import Run
 from scipy.integrate import solve_ivp
 
 import robthermal as rt
+from robthermal.jobs.diagnose._answer import accepted_in_words
 
 pytestmark = pytest.mark.usefixtures("sketched")
 H, DWELL = 5.0, 20
@@ -293,3 +295,19 @@ def test_a_bad_operating_point_is_refused(files: Any, run: Run, tmp_path: Path) 
     system, train, _ = files(nothing)
     status, _, said = run("diagnose", system, train, "--operating-point", "room=298.15 K", "--out", tmp_path / "out")
     assert status == 2 and "NAME=VALUE" in said and not (tmp_path / "out").exists()
+
+
+def test_sets_of_several_effects_are_read_apart() -> None:
+    """Commas within a set, a semicolon between sets."""
+    def found(*names: tuple[tuple[str, tuple[str, ...]], ...]) -> Any:
+        effects = [SimpleNamespace(effect=one[0][0], where=one[0][1]) for one in names]
+        return SimpleNamespace(reference=None, effects=effects, alternatives=[one[1:] for one in names])
+
+    path, other, gain = ("missing_link", ("a", "b")), ("missing_link", ("a", "c")), ("sensor_gain", ("T",))
+    mass = ("hidden_mass", ("b",))
+    assert accepted_in_words(found((path, other, gain), (mass,))) == (
+        "a heat path between a and b, a heat path between a and c or a gain error of sensor T; "
+        "and a mass that hangs on b")
+    assert accepted_in_words(found((path, other), (mass,))) == (
+        "a heat path between a and b or a heat path between a and c, and a mass that hangs on b")
+    assert accepted_in_words(found((mass,))) == "a mass that hangs on b"

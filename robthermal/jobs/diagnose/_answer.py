@@ -61,7 +61,12 @@ def accepted_in_words(found: Diagnosis) -> str:
     """
     sets = [[_accepted(effect, bool(found.reference)), *(in_words(name, where) for name, where in others)]
             for effect, others in zip(found.effects, found.alternatives, strict=True)]
-    return ", and ".join(" or ".join(names) for names in sets)
+    between = "; and " if any(len(names) > 2 for names in sets) and len(sets) > 1 else ", and "
+    return between.join(map(_one_of, sets))
+
+
+def _one_of(names: list[str]) -> str:
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _shown(found: Diagnosis) -> tuple[Gap, str]:
