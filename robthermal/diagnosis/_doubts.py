@@ -29,8 +29,8 @@ def doubts(system: System, remainder: bool) -> list[str]:
     """
     if not system.modules or not remainder:
         return []
-    return ["A module has no inside of its own in this test. On 18 simulated stacks with a module none of the names "
-            "was wrong, which does not exclude one in five: confirm this name on the machine."]
+    return ["A module has no inside of its own in this test. Of 41 simulated stacks with a module that got a name, one "
+            "got a wrong one, which does not exclude one in eight: confirm this name on the machine."]
 
 
 def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:
