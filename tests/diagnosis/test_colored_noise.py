@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -85,6 +86,9 @@ def test_settled_cost_is_the_log_likelihood(bar: rt.System, heat: Array) -> None
     exact = float(r @ np.linalg.solve(S, r)) + 2 * float(np.log(np.diag(L)).sum())
     assert settled_cost(path, r[:, None], NOISE, heat, SLOW) == pytest.approx(exact, abs=5.0)  # its start is settled
     assert settled_cost(path, r[:, None], NOISE, heat) > exact + 10.0
+    with warnings.catch_warnings():  # of a model that runs away
+        warnings.simplefilter("error")
+        assert settled_cost(path, 1e200 * r[:, None], NOISE, heat) == np.inf
 
 
 def colored(record: rt.Record, size: float, seed: int, pole: float = 0.9) -> rt.Record:

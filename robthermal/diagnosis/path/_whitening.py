@@ -265,4 +265,5 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
     modes = np.array([scipy.signal.lfilter([0.0, 1.0], [1.0, -pole], own) for pole, own in
                       zip(poles, push, strict=True)])
     e = r - (C @ V @ modes).real.T
-    return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])
+    with np.errstate(over="ignore"):  # of a model that runs away: infinite, and not chosen
+        return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])
