@@ -55,8 +55,8 @@ def saying_so(judged: Judged, finer: Refit) -> Judged:
     """
     if judged.verdict not in ("named_with_remainder", "ambiguous"):
         return judged
-    text = (f"{judged.outcome.text} A network with its lumps split would explain the training records without it, by "
-            f"{finer.structure.n_coarse} unknowns more.")
+    text = (f"{judged.outcome.text} A network with its lumps split would explain the training records without it, with "
+            f"{finer.structure.n_coarse} more unknowns.")
     return replace(judged, outcome=replace(judged.outcome, text=text))
 
 

@@ -55,7 +55,7 @@ def test_a_path_that_alone_predicts_is_named_although_a_finer_network_fits_the_t
     (name,), (others,) = found.effects, found.alternatives
     assert {name.where, *(where for _, where in others)} == {("cold", "room"), ("spreader", "room")}
     assert found.gap["validation"].after < 0.1 * found.gap["validation"].before
-    assert "would explain the training records without it, by 14 unknowns more" in found.outcome.text
+    assert "would explain the training records without it, with 14 more unknowns" in found.outcome.text
 
 
 @pytest.mark.exhaustive
