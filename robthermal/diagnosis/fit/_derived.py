@@ -39,7 +39,9 @@ def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[
 
 
 def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: dict[str, float]) -> dict[str, float]:
-    """Derivatives of all numbers that move with one unknown; those that are known are taken.
+    """Derivatives of all numbers that move with one unknown; those that are known are taken where they hold.
+
+    They do not where an effect scales the number: a change of a parameter, a gain.
 
     Parameters
     ----------
@@ -57,7 +59,9 @@ def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: 
     moved, step = v.copy(), STEP * max(abs(v[i]), 1e-3)
     moved[i] += step
     other = numbers(moved)
-    return {name: own.get(name, (other[name] - values[name]) / step) for name in values if other[name] != values[name]}
+    found = {name: (other[name] - values[name]) / step for name in values if other[name] != values[name]}
+    return {name: own[name] if abs(own.get(name, np.inf) - slope) <= _UNLIKE * abs(slope) else slope
+            for name, slope in found.items()}
 
 
 def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]], upper: Array
