@@ -362,10 +362,6 @@ class Structure:
         ----------
         candidate : Candidate
             Effect at a place.
-
-        Returns
-        -------
-        str
         """
         if any(part in self._added for part in candidate.where):
             return "it would act on a part that another effect has added"
