@@ -32,7 +32,7 @@ def compiled(folder: Path = SOURCE.parent) -> Callable[..., None] | None:
     return run
 
 
-def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
+def recursion(A: Array, b: Array, start: Array | None = None, out: Array | None = None) -> Array:
     """States of a linear time-varying recursion.
 
     Parameters
@@ -43,6 +43,8 @@ def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
         What every step adds.
     start : ndarray, shape (n_z, m), optional
         State before the first step; default 0.
+    out : ndarray, shape (n + 1, n_z, m), optional
+        Where the states are written; rows side by side.
 
     Returns
     -------
@@ -58,7 +60,9 @@ def recursion(A: Array, b: Array, start: Array | None = None) -> Array:
     n, n_z, m = b.shape
     if A.shape != (n, n_z, n_z):
         raise ValueError(f"transitions {A.shape} for {b.shape}")
-    x = np.empty((n + 1, n_z, m))
+    x = np.empty((n + 1, n_z, m)) if out is None else out
+    if x.shape != (n + 1, n_z, m) or x.dtype != float or not x.flags.c_contiguous:
+        raise ValueError(f"states {x.shape} for {b.shape}")
     x[0] = 0.0 if start is None else start
     run = compiled()
     if run is not None and A.dtype == b.dtype == float:

@@ -20,7 +20,7 @@ from ._collocation import DEGREE, TAIL, Step, step_matrices, window_matrices
 from ._equations import Equations
 from ._fixed_point import HOTTEST, FixedPoint
 from ._layout import Layout
-from ._march import Marching, holds, library, march
+from ._march import Lengths, Marching, holds, library
 from ._ports import PortHeat
 from ._schedule import Schedule
 from ._terms import Array
@@ -81,6 +81,7 @@ class Integrator:
         self._gains: dict[tuple[int, int], Array] = {}
         self._fixed: dict[tuple[int, int], FixedPoint] = {}
         self._compiled: dict[tuple[int, int], Marching | None] = {}
+        self._together: dict[tuple[tuple[int, int], ...], Lengths | None] = {}
         self._window: tuple[Step, Array, FixedPoint] | None = None
 
     @property
@@ -145,34 +146,39 @@ class Integrator:
                 if not self.nq:
                     k += self._advance_linear(z, plan, k)
                     continue
-                if level == 0 and (done := self._advance_samples(z, plan, k)):
+                if level == 0:
+                    done, level = self._advance_samples(z, plan, k)
                     k += done
-                    continue
+                    if k == n - 1 or (done and not level):
+                        continue
                 level = self._advance_segment(z, plan, k, level, refined)
                 k += 1
         return _path(z, refined)
 
-    def _advance_samples(self, z: Array, plan: Schedule, k: int) -> int:
-        """Segments from k on while that is easy: how many were computed."""
+    def _advance_samples(self, z: Array, plan: Schedule, k: int) -> tuple[int, int]:
+        """Segments from k on while that is easy: how many were computed, and the level to start the next one with."""
         if (marched := self._march(z[k:], plan.kind[k:-1], plan.w[k:-1])) is not None:
-            return marched[0]
+            return marched[0], 1  # where it stopped, a whole segment is not enough
         whole = len(plan.w) - 1 - k >= WINDOW and not plan.kind[k:k + WINDOW].any()
-        return WINDOW if whole and self._advance_window(z, plan.w, k) else 0
+        return (WINDOW if whole and self._advance_window(z, plan.w, k) else 0), 0
 
     def _march(self, z: Array, kind: NDArray[np.intp], w: Array) -> tuple[int, float] | None:
         """Compiled steps of lengths[kind]: how many, and their worst last coefficients; None: not built."""
-        lengths = [self.compiled(one, 0) for one in range(len(self.lengths))]
-        if any(one is None for one in lengths):
-            return None
-        return march([one for one in lengths if one is not None], kind, z, w)
+        lengths = self._marching(tuple((one, 0) for one in range(len(self.lengths))))
+        return None if lengths is None else lengths(kind, z, w)
 
     def _march_segment(self, z: Array, w: Array, kind: int, levels: NDArray[np.intp]) -> tuple[int, float] | None:
         """Compiled steps of lengths[kind] / 2**levels, as `_march`."""
         most, least = int(levels[0]), int(levels[-1])
-        lengths = [self.compiled(kind, level) for level in range(least, most + 1)]
-        if any(one is None for one in lengths):
-            return None
-        return march([one for one in lengths if one is not None], levels - least, z, w.repeat(len(levels), axis=0))
+        lengths = self._marching(tuple((kind, level) for level in range(least, most + 1)))
+        return None if lengths is None else lengths(levels - least, z, w.repeat(len(levels), axis=0))
+
+    def _marching(self, lengths: tuple[tuple[int, int], ...]) -> Lengths | None:
+        """Compiled steps of lengths[kind] / 2**level for some kinds and levels; None: not built."""
+        if lengths not in self._together:
+            compiled = [one for one in (self.compiled(*length) for length in lengths) if one is not None]
+            self._together[lengths] = Lengths(compiled) if len(compiled) == len(lengths) else None
+        return self._together[lengths]
 
     def _advance_window(self, z: Array, w: Array, k: int) -> bool:
         matrices, gain, fixed = self.window()

@@ -25,6 +25,7 @@ from ._terms import Array, NaturalTerm, RadiationTerm
 SOURCE = Path(__file__).with_name("_march.c")
 _MOST, _MOST_PORTS, _NUMBERS = 64, 12, 8  # as in the source
 _FINEST = 1e-11  # K: below it a change of a temperature is rounding
+_FEW = 20  # segments, whose kinds are sooner compared one by one
 _CLOSER = 0.01  # of the change at which numpy stops: one iteration more costs little here
 
 March = Callable[..., int]  # of a pointer to a problem: samples that were computed
@@ -145,32 +146,44 @@ class Marching:
         return _Problem(*self._size, len(w), *self._of_step, w.ctypes.data, z.ctypes.data, *rest)
 
 
-def march(lengths: Sequence[Marching], kind: NDArray[np.intp], z: Array, w: Array) -> tuple[int, float]:
-    """Compute the states after the first, segment by segment.
-
-    How many were computed, and what the last coefficients of the heats are worth at most in these [K].
+class Lengths:
+    """Segments of several lengths, all of one system, one after the other.
 
     Parameters
     ----------
     lengths : sequence of Marching
-        Steps of every length that segments have, all of one system.
-    kind : ndarray of int, shape (count,)
-        Which of them every segment is.
-    z : ndarray, shape (count + 1, n_z)
-        States; filled after the first.
-    w : ndarray, shape (count, n_w)
-        Drives, constant over every segment.
+        Steps of every length that segments have.
     """
-    first, count = lengths[0], len(kind)
-    n_z, n_w = first._size[:2]
-    if z.shape != (count + 1, n_z) or w.shape != (count, n_w) or z.dtype != float or not z.flags.c_contiguous:
-        raise ValueError("states and drives do not fit")
-    if not count or not 0 <= kind.min() <= kind.max() < len(lengths):
-        raise ValueError("no segments, or of another length")
-    held, kinds = np.ascontiguousarray(w, float), np.ascontiguousarray(kind, np.int64)
-    problems = (_Problem * len(lengths))(*(one._problem(held, z) for one in lengths))
-    worst = ctypes.c_double()
-    return first._built.march(problems, kinds.ctypes.data, ctypes.byref(worst)), worst.value
+
+    def __init__(self, lengths: Sequence[Marching]):
+        self._lengths, self._sizes = tuple(lengths), lengths[0]._size[:2]  # the first keep the arrays alive
+        self._problems = (_Problem * len(lengths))(*(_Problem(*one._size, 0, *one._of_step, 0, 0) for one in lengths))
+
+    def __call__(self, kind: NDArray[np.intp], z: Array, w: Array) -> tuple[int, float]:
+        """Compute the states after the first, segment by segment.
+
+        How many were computed, and what the last coefficients of the heats are worth at most in these [K].
+
+        Parameters
+        ----------
+        kind : ndarray of int, shape (count,)
+            Which of the lengths every segment has.
+        z : ndarray, shape (count + 1, n_z)
+            States; filled after the first.
+        w : ndarray, shape (count, n_w)
+            Drives, constant over every segment.
+        """
+        count, (n_z, n_w) = len(kind), self._sizes
+        if z.shape != (count + 1, n_z) or w.shape != (count, n_w) or z.dtype != float or not z.flags.c_contiguous:
+            raise ValueError("states and drives do not fit")
+        few = kind.tolist() if count <= _FEW else (kind.min(), kind.max())
+        if not count or not 0 <= min(few) <= max(few) < len(self._lengths):
+            raise ValueError("no segments, or of another length")
+        held, kinds = np.ascontiguousarray(w, float), np.ascontiguousarray(kind, np.int64)
+        drives, states, worst = held.ctypes.data, z.ctypes.data, ctypes.c_double()
+        for problem in self._problems:
+            problem.count, problem.w, problem.z = count, drives, states
+        return self._lengths[0]._built.march(self._problems, kinds.ctypes.data, ctypes.byref(worst)), worst.value
 
 
 def holds(heat: PortHeat, n_z: int) -> bool:

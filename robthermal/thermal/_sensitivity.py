@@ -56,17 +56,15 @@ class Sensitivity:
                         if (part := slope(integrator.layout, integrator.parts, name)) is not None}
         eq = integrator.eq
         self._heating = {name for name in self.names if any(True for _ in touched(eq, name))}
-        self._acting = [name for name in self.names  # the others move no more than the start
-                        if name in self._linear or name in held or name in self._heating]
         driving = np.unique(np.concatenate([np.zeros(0, np.intp), *(end for place in integrator.port_heat.places
                                                                     for end in place)])) - integrator.ports.size
         driving = driving[driving >= 0]  # drives that the terms need
         self._driving = {name for name, slopes in held.items() if slopes[:, driving].any()}
-        self._columns = [self._acting.index(name) for name in self._linear]
+        self._columns = [self.names.index(name) for name in self._linear]
         self._steps: dict[tuple[int, int], Array] = {}
 
     def _step_slopes(self, kind: int, level: int) -> Array:
-        """Derivatives of a step's matrices [K Ku M] by all parameters of the linear part, (columns, rows, P)."""
+        """Derivatives of a step's matrices [K Ku M] by all parameters, (columns, rows, P): 0 by those of the heats."""
         if (kind, level) not in self._steps:
             parts, h = without_meters(self.by.parts, self.n_free), self.by.lengths[kind] / 2**level
             size = max(1, _ENTRIES // self.n_free**2)
@@ -78,7 +76,9 @@ class Sensitivity:
                                   parts.N + 1j * _IMAGINARY * np.stack([part.N for part in d]), parts.ports)
                 s = step_matrices(moved, h)
                 done.append(np.concatenate([s.K, s.Ku, s.M], axis=2).imag / _IMAGINARY)
-            self._steps[kind, level] = np.ascontiguousarray(np.concatenate(done).T)
+            by_linear = np.concatenate(done).T
+            self._steps[kind, level] = np.zeros((*by_linear.shape[:2], len(self.names)))
+            self._steps[kind, level][..., self._columns] = by_linear
         return self._steps[kind, level]
 
     def along(self, path: Path, plan: Schedule, start: Array) -> Array:
@@ -108,11 +108,11 @@ class Sensitivity:
             for name, jump in self.jumps.items():
                 moved = jump[segment[begins], :, None]
                 maps.P[begins, :, self.names.index(name)] += (maps.F[begins] @ moved)[..., 0]
+            if len(begins) == len(segment):  # one step each
+                now = recursion(maps.F, maps.P, now, out[segment[0]:segment[-1] + 2])[-1]
+                continue
             states = recursion(maps.F, maps.P, now)
-            if len(begins) == len(segment):  # one step each: a view is several times as fast
-                out[segment[0] + 1:segment[-1] + 2] = states[1:]
-            else:
-                out[segment[ends[chunk]] + 1] = states[1:][ends[chunk]]
+            out[segment[ends[chunk]] + 1] = states[1:][ends[chunk]]
             now = states[-1]
         return out
 
@@ -122,27 +122,13 @@ class Sensitivity:
         kind = plan.kind[segment]
         if np.all((kind == kind[0]) & (level == level[0])):
             held = {name: slopes[segment] for name, slopes in self.held.items()}
-            F, by_acting = self._of_length(path.starts[chunk], plan.w[segment], held, int(kind[0]), int(level[0]))
-            return Transitions(F, self._of_all(by_acting))
-        F, P = np.empty((len(segment), n, n)), np.zeros((len(segment), n, len(self.names)))
-        acting = np.array([self.names.index(name) for name in self._acting], np.intp)
+            return Transitions(*self._of_length(path.starts[chunk], plan.w[segment], held, int(kind[0]), int(level[0])))
+        F, P = np.empty((len(segment), n, n)), np.empty((len(segment), n, len(self.names)))
         for which, depth in set(zip(kind.tolist(), level.tolist(), strict=True)):
             own = (kind == which) & (level == depth)
             held = {name: slopes[segment[own]] for name, slopes in self.held.items()}
-            F[own], by_acting = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
-            P[np.ix_(np.flatnonzero(own), np.arange(n), acting)] = by_acting
+            F[own], P[own] = self._of_length(path.starts[chunk][own], plan.w[segment[own]], held, which, depth)
         return Transitions(F, P)
-
-    def _of_all(self, by_acting: Array) -> Array:
-        """Derivatives by all parameters of those by the ones that act on a step."""
-        if len(self._acting) == len(self.names):
-            return by_acting
-        out = np.zeros((*by_acting.shape[:2], len(self.names)))
-        if self._acting == self.names[:len(self._acting)]:
-            out[..., :len(self._acting)] = by_acting
-        else:
-            out[..., [self.names.index(name) for name in self._acting]] = by_acting
-        return out
 
     def rate_slopes(self, states: Array, w: Array, slopes: Array, held: Mapping[str, Array]) -> Array:
         """Derivative (n, n_free, n_parameters) of ż at states (n, n_free) that move by slopes, and drives by held."""
@@ -173,7 +159,7 @@ class Sensitivity:
         V = self._at_ports(self.by.step(kind, level), z, w) if found is None else found.V
         q = self.by.port_heat(V) if found is None else found.q
         G = self.by.port_heat.slopes(V) if found is None or self._driving else np.zeros(0)  # (S, p+1, nq, np + nw)
-        direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, parameters that act)
+        direct = self._direct(kind, level, z, w, held, V, q, G)  # (S, rows, P)
         F, through = self._through(kind, level, G) if found is None else (found.F, found.through)
         return F, direct[:, nodes:nodes + n] + through @ direct[:, :nodes]
 
@@ -217,18 +203,15 @@ class Sensitivity:
 
     def _direct(self, kind: int, level: int, z: Array, w: Array, held: Mapping[str, Array], V: Array, q: Array,
                 G: Array) -> Array:
-        """Derivative of all rows with respect to the parameters that act on a step, at fixed port states."""
+        """Derivative of all rows with respect to all parameters, at fixed port states; 0 by those of the start."""
         step, rows = self.by.step(kind, level), DEGREE * self.by.ports.size + self.n_free
-        out: Array = np.zeros((len(z), rows, len(self._acting)))
         if self._linear:
             d = self._step_slopes(kind, level)
             by = np.concatenate([z[:, :self.n_free], w, q.reshape(len(z), -1)], axis=1)
-            linear = (by @ d.reshape(len(d), -1)).reshape(len(z), rows, -1)
-            if linear.shape == out.shape:
-                out = linear
-            else:
-                out[..., self._columns] = linear
-        for column, name in enumerate(self._acting):
+            out: Array = (by @ d.reshape(len(d), -1)).reshape(len(z), rows, -1)
+        else:
+            out = np.zeros((len(z), rows, len(self.names)))
+        for column, name in enumerate(self.names):
             heat = self.by.port_heat.parameter(name, V) if name in self._heating else None
             if name in held:
                 out[..., column] += held[name] @ step.Ku[:rows].T

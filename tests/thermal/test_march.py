@@ -139,10 +139,10 @@ def test_sizes_that_do_not_fit_are_refused(full: rt.System) -> None:
     for states, drives in ((z[:-1], w), (z[:, :-1], w), (z, w[:, 1:]), (np.zeros((11, 2 * by.nz))[:, ::2], w),
                            (z.astype(np.float32), w)):
         with pytest.raises(ValueError, match="do not fit"):
-            _march.march([march], np.zeros(10, int), states, drives)
+            _march.Lengths([march])(np.zeros(10, int), states, drives)
     for kinds in (np.zeros(0, int), np.full(10, 1), np.full(10, -1)):
         with pytest.raises(ValueError, match="no segments, or of another length"):
-            _march.march([march], kinds, z[:len(kinds) + 1], w[:len(kinds)])
+            _march.Lengths([march])(kinds, z[:len(kinds) + 1], w[:len(kinds)])
     for states, drives, n_free in ((z[:9], w, 3), (z[:, :-1], w, 3), (z[:10], w[:, 1:], 3), (z[:10], w, by.nz + 1)):
         with pytest.raises(ValueError, match="do not fit"):
             march.linearized(states, drives, n_free)
@@ -164,7 +164,7 @@ def test_a_sample_without_a_fixed_point_is_not_computed(full: rt.System) -> None
     assert march.linearized(z, w, 4) is not None
     w[1, by.eq.drives.column["tem"]] = 1e6
     assert march.linearized(z, w, 4) is None
-    assert _march.march([march], np.zeros(2, int), np.full((3, by.nz), 300.0), w)[0] == 1
+    assert _march.Lengths([march])(np.zeros(2, int), np.full((3, by.nz), 300.0), w)[0] == 1
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
