@@ -50,6 +50,13 @@ def test_a_descent_is_made_once(fit: Refit, made: list[np.ndarray]) -> None:
     assert again.outcome == first.outcome
 
 
+def test_a_fit_can_be_pickled(fit: Refit, made: list[np.ndarray]) -> None:
+    first = extended(fit, fit.structure, fit.v + 0.03)
+    again = pickle.loads(pickle.dumps(first))
+    assert first.structure.ended.of and not again.structure.ended.of
+    assert np.array_equal(again.v, first.v) and len(made) == 1
+
+
 def test_what_it_depends_on_makes_it_another(fit: Refit, made: list[np.ndarray]) -> None:
     """Start, evaluations, filters, bounds, data and effects, an effect's fixed numbers among them."""
     v, structure = fit.v + 0.02, fit.structure

@@ -56,11 +56,12 @@ def ended(structure: Structure, v: Array, whiteners: Sequence[White], limit: int
            limit, structure.tolerance, structure.only_heated, tuple(start.names for start in structure.starts),
            tuple((one.key, tuple(one.shape.items())) for one in structure.effects), *numbers,
            *map(id, shared), *map(id, others))
-    kept = structure.ended.get(key)
+    kept = structure.ended.of.get(key)
     if kept is not None and all(one() is other for one, other in zip(kept.others, others, strict=True)):
         return Descent(Point(Whitened(structure, whiteners), kept.v), kept.converged, kept.iterations)
     found = made()
-    structure.ended[key] = _End(shared, tuple(map(weakref.ref, others)), found.at.v, found.converged, found.iterations)
+    structure.ended.of[key] = _End(shared, tuple(map(weakref.ref, others)), found.at.v, found.converged,
+                                   found.iterations)
     return found
 
 

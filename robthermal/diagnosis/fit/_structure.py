@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from ..data import DataSet, records_of
 from ..effects import Candidate
 from ..path import Linearized, Unknowns, linearize
 from ._derived import STEP, with_quantities
+from ._ends import Ends
 from ._sessions import Sessions
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ class Structure:
         sizes are unknowns common to all data, with the prior 0 ± 1. Empty: the network is taken to be right.
     only_heated : bool
         Whether unknown ambients are no warmer than `warmest_room`.
-    ended : dict
+    ended : Ends
         Where descents ended, for all structures that come from one.
     """
 
@@ -76,7 +76,7 @@ class Structure:
     sessions: Sessions = Sessions()
     coarse: tuple[Array, ...] = ()
     only_heated: bool = False
-    ended: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
+    ended: Ends = field(default_factory=Ends, repr=False)
     _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
