@@ -74,9 +74,3 @@ def test_what_it_depends_on_makes_it_another(fit: Refit, made: list[np.ndarray])
         with_lag = structure.with_effects((replace(lag, shape=shape),))
         extended(fit, with_lag, with_lag.carried(structure, fit.v, [{"time_constant": 5.0}]))
     assert len(made) >= 8 and other.rss == pytest.approx(0.25 * fit.rss, rel=0.01) and moved.rss > 2.0 * fit.rss
-
-
-def test_where_descents_ended_is_not_pickled(fit: Refit) -> None:
-    assert fit.structure.ended
-    again = pickle.loads(pickle.dumps(fit))
-    assert not again.structure.ended and again.v.tolist() == fit.v.tolist()

@@ -79,10 +79,6 @@ class Structure:
     ended: Ends = field(default_factory=Ends, repr=False)
     _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without the ends of descents, which belong to objects of this process."""
-        return {**vars(self), "ended": {}}
-
     @property
     def n_parameters(self) -> int:
         """Number of nominal parameters."""
