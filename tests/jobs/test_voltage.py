@@ -14,7 +14,7 @@ from robthermal.report import measured_against_model, residuals_before_after
 
 def test_reasons_say_volts() -> None:
     one = Misfit("train", "r", "V1", 0.0, 0.02, 0.002, 0.02, 0.006, 1e-9, "V")
-    (reason,) = _misfits([one])
+    (reason,) = _misfits([one], diagnosed=False)
     assert "0.02 V rms off the model at 0.002 V of noise" in reason.text and "tolerance 0.006 V" in reason.text
     assert " K" not in reason.text
 
