@@ -81,7 +81,10 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
                 return saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
             return _nothing_lasts(judged, finer)
         state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
-        state = _predicting(validated(state, validation, progress), finer, validation, progress)
+        kept = validated(state, validation, progress)
+        if len(kept.rounds) < len(state.rounds):  # what is left has been tested beside what is gone
+            kept, _ = lasting(kept, finer, validation)
+        state = _predicting(kept, finer, validation, progress)
         return _graded(judged, with_rivals(state, finer, validation), finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
