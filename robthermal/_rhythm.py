@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 _BACK = 4  # distances before, among which one that is the same is looked for: pulses between samples alternate
 _SPREAD = 0.05  # relative, by which the distances of a rhythm differ; a sample at least
@@ -56,5 +56,5 @@ def _even(events: NDArray[np.intp]) -> bool:
     usual = float(np.mean(distances))
     one = min((2.0 * max(1.0, _SPREAD * usual) + 1.0) / (2.0 * usual), 1.0)  # of two exponential distances
     count = int(again.sum())
-    by_chance = float(bdtrc(count - 1, tried, 1.0 - (1.0 - one) ** _BACK)) if count else 1.0
+    by_chance = float(scipy.special.bdtrc(count - 1, tried, 1.0 - (1.0 - one) ** _BACK)) if count else 1.0
     return count >= _OFTEN * tried and by_chance < _SURE

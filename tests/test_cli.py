@@ -301,8 +301,9 @@ def test_interrupt_between_stages_keeps_what_is_finished_and_nothing_else(tmp_pa
         while not (tmp_path / "out" / ".cache" / "calibrate.json").exists():
             time.sleep(0.01)
 
-    said = interrupted(tmp_path, kept)
-    assert said == "robthermal: interrupted; finished stages are kept in out: the same command goes on from there\n"
+    *progress, said = interrupted(tmp_path, kept).splitlines()
+    assert said == "robthermal: interrupted; finished stages are kept in out: the same command goes on from there"
+    assert all(line.endswith("s so far") for line in progress)  # of a slow machine
     assert "calibrated.toml" in {path.name for path in (tmp_path / "out").iterdir()}
     assert {path.name for path in (tmp_path / "out" / ".cache").iterdir()} == {"calibrate.json"}
 
