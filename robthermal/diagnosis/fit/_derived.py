@@ -13,7 +13,8 @@ STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbe
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
-def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]]) -> bool:
+def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]], upper: Array
+            ) -> bool:
     """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?
 
     Parameters
@@ -26,9 +27,11 @@ def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[
         Numbers of the system at v.
     columns : list of dict
         Derivatives of the numbers that each parameter is known to move.
+    upper : ndarray
+        Upper bounds of the parameters, at which numbers stand still.
     """
     p = len(columns)
-    steps = STEP * np.maximum(np.abs(v[:p]), 1e-3)
+    steps = np.array([_step(v[i], upper[i]) for i in range(p)])
     moved = numbers(np.concatenate([v[:p] + steps, v[p:]]))
     known = dict.fromkeys(values, 0.0)
     for step, column in zip(steps, columns, strict=True):
@@ -38,7 +41,8 @@ def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[
     return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
 
 
-def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: dict[str, float]) -> dict[str, float]:
+def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: dict[str, float], upper: float
+             ) -> dict[str, float]:
     """Derivatives of all numbers that move with one unknown; those that are known are taken where they hold.
 
     They do not where an effect scales the number: a change of a parameter, a gain.
@@ -55,13 +59,21 @@ def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: 
         Numbers of the system at v.
     own : dict
         Derivatives that are known.
+    upper : float
+        Upper bound of the unknown, at which numbers stand still.
     """
-    moved, step = v.copy(), STEP * max(abs(v[i]), 1e-3)
+    moved, step = v.copy(), _step(v[i], upper)
     moved[i] += step
     other = numbers(moved)
     found = {name: (other[name] - values[name]) / step for name in values if other[name] != values[name]}
     return {name: own[name] if abs(own.get(name, np.inf) - slope) <= _UNLIKE * abs(slope) else slope
             for name, slope in found.items()}
+
+
+def _step(value: float, upper: float) -> float:
+    """Away from the upper bound, where there is no room for a step."""
+    step = STEP * max(abs(value), 1e-3)
+    return -step if value + step > upper else step
 
 
 def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]], upper: Array
@@ -86,7 +98,7 @@ def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]],
         moved[i] += step
         other = numbers(moved)
         out.append({name: (other[name] - values[name]) / step for name in values if other[name] != values[name]})
-    if derives(numbers, v, values, columns):
+    if derives(numbers, v, values, columns, upper):
         for i in range(p):  # what an effect derives from a nominal parameter moves with it
-            out[i] = moved_by(numbers, v, i, values, columns[i])
+            out[i] = moved_by(numbers, v, i, values, columns[i], upper[i])
     return out
