@@ -72,7 +72,7 @@ def estimate_locally(records: Sequence[Record], basis: LocalBasis, method: str) 
     estimate = LocalEstimate([spectrum_of(r.inputs, r.outputs) for r in records], basis)
     found = estimate.run()
     first = records[0]
-    frequencies = np.arange(1, estimate.n_bins + 1) / (basis.n_samples * first.sample_time)
+    frequencies = np.arange(1.0, estimate.n_bins + 1.0) / (basis.n_samples * first.sample_time)
     notes = undetermined_inputs(found.response, frequencies, first.input_names)
     return FrequencyResponse(
         frequencies=frequencies,

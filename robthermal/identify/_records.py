@@ -171,7 +171,8 @@ def spectrum_of(inputs: Array, outputs: Array) -> Spectrum:
         np.fft.rfft(column, norm="ortho", out=whole[c])
         if c < n_u:
             row = spectra[c]
-            row[np.abs(row) <= level[c]] = 0.0
+            if np.abs(row.view(float)).min(initial=np.inf) <= level[c]:  # else no line is so small
+                row[np.abs(row) <= level[c]] = 0.0
 
     run_all(transform, range(n_u + n_y), worth=_SIDE_BY_SIDE[0] < n < _SIDE_BY_SIDE[1])
     return Spectrum(U=spectra[:n_u], Y=spectra[n_u:], n_samples=n, rounding=level[n_u:])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Numbers = Callable[[Array], dict[str, float]]
 STEP = 1e-4  # of a quantity, relative: for the derivative of the system's numbers, which are smooth in it
+_LEAST_PARAMETER, _LEAST_QUANTITY = 1e-3, 1e-6  # sizes a step is taken of at least: some quantities are that small
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
@@ -31,7 +32,7 @@ def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[
         Upper bounds of the parameters, at which numbers stand still.
     """
     p = len(columns)
-    steps = np.array([_step(v[i], upper[i]) for i in range(p)])
+    steps = np.array([_step(v[i], upper[i], _LEAST_PARAMETER) for i in range(p)])
     moved = numbers(np.concatenate([v[:p] + steps, v[p:]]))
     known = dict.fromkeys(values, 0.0)
     for step, column in zip(steps, columns, strict=True):
@@ -62,18 +63,23 @@ def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: 
     upper : float
         Upper bound of the unknown, at which numbers stand still.
     """
-    moved, step = v.copy(), _step(v[i], upper)
-    moved[i] += step
-    other = numbers(moved)
-    found = {name: (other[name] - values[name]) / step for name in values if other[name] != values[name]}
+    found = _slopes(numbers, v, i, values, _step(v[i], upper, _LEAST_PARAMETER))
     return {name: own[name] if abs(own.get(name, np.inf) - slope) <= _UNLIKE * abs(slope) else slope
             for name, slope in found.items()}
 
 
-def _step(value: float, upper: float) -> float:
+def _step(value: float, upper: float, least: float) -> float:
     """Away from the upper bound, where there is no room for a step."""
-    step = STEP * max(abs(value), 1e-3)
+    step = STEP * max(abs(value), least)
     return -step if value + step > upper else step
+
+
+def _slopes(numbers: Numbers, v: Array, i: int, values: dict[str, float], step: float) -> dict[str, float]:
+    """Derivatives by unknown i of the numbers that move with it."""
+    moved = v.copy()
+    moved[i] += step
+    other = numbers(moved)
+    return {name: (other[name] - values[name]) / step for name in values if other[name] != values[name]}
 
 
 def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]], upper: Array
@@ -93,11 +99,7 @@ def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]],
     """
     p, out, values = len(columns), list(columns), numbers(v)
     for i in range(p, len(upper)):
-        moved, step = v.copy(), STEP * max(abs(v[i]), 1e-6)
-        step = -step if v[i] + step > upper[i] else step
-        moved[i] += step
-        other = numbers(moved)
-        out.append({name: (other[name] - values[name]) / step for name in values if other[name] != values[name]})
+        out.append(_slopes(numbers, v, i, values, _step(v[i], upper[i], _LEAST_QUANTITY)))
     if derives(numbers, v, values, columns, upper):
         for i in range(p):  # what an effect derives from a nominal parameter moves with it
             out[i] = moved_by(numbers, v, i, values, columns[i], upper[i])
