@@ -1,6 +1,7 @@
 """Time and memory of a diagnosis of 10 000 samples: a plant of the blind suite, a bar and a stack of foreign truth.
 
 Run: python tests/benchmarks/bench_long_records.py [--samples 10000] [--cases blind/B/hidden/missing_link/101 ...].
+Without --cases then also the longest catalog, two modules and nine lumps, on records of 1 500 samples.
 Every case runs in a process of its own, whose peak memory is the case's.
 """
 
@@ -10,7 +11,7 @@ import argparse
 import multiprocessing
 import os
 import resource
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import process_time
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -24,6 +25,8 @@ import robthermal as rt  # noqa: E402
 
 Data = tuple[rt.System, rt.Record, rt.Record]
 CASES = ("blind/B/hidden/missing_link/101", "foreign/bar/hidden/missing_link/2", "foreign/stack/hidden/missing_link/2")
+
+LONGEST_CATALOG = ("foreign/pair/hidden/missing_link/25", "foreign/pair/hidden/missing_link/27")
 
 
 def of_blind_suite(key: str, samples: int) -> Data:
@@ -58,16 +61,23 @@ def row(name: str, samples: int) -> str:
             f"{peak:.0f} MB at most, {found.verdict}: {named}")
 
 
-def main() -> None:
+def rows(samples: int, cases: Sequence[str]) -> None:
     """Diagnose every case and print a row of it."""
+    header(f"diagnosis of {samples} samples")
+    for name in cases:
+        with multiprocessing.get_context("spawn").Pool(1) as own:
+            print(own.apply(row, (name, samples)), flush=True)
+
+
+def main() -> None:
+    """Long records; then the longest catalog, unless cases are given."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--samples", type=int, default=10_000)
-    parser.add_argument("--cases", nargs="*", default=CASES)
+    parser.add_argument("--cases", nargs="*")
     chosen = parser.parse_args()
-    header(f"diagnosis of {chosen.samples} samples")
-    for name in chosen.cases:
-        with multiprocessing.get_context("spawn").Pool(1) as own:
-            print(own.apply(row, (name, chosen.samples)), flush=True)
+    rows(chosen.samples, chosen.cases or CASES)
+    if not chosen.cases:
+        rows(1_500, LONGEST_CATALOG)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ def all_cases(seeds: list[int]) -> list[Case]:
     """Every effect once per seed, a null and an outside effect of every machine and seed."""
     out = []
     for seed in seeds:
-        for machine in MACHINES:
+        for machine in OUTSIDE:  # those of the suite; the pair serves to time a catalog of more than 155 candidates
             out += [Case(machine, "hidden", effect, seed) for effect in CATALOG[machine]]
             out += [Case(machine, "nothing", "nothing", 2 * seed + i) for i in (0, 1)]
             out += [Case(machine, "outside", effect, seed) for effect in OUTSIDE[machine]]

@@ -237,7 +237,8 @@ CATALOG: dict[str, dict[str, tuple[list[tuple[str, ...]], float]]] = {
                 "missing_ambient_link": ([("rack", "floor"), ("air", "room")], 0.1),
                 "radiation": ([("board", "room")], 5e-10),
                 "heater_power_slope": ([("q1",), ("q2",)], 4e-3),
-                "periodic_load": ([("rack",)], 0.4)}}
+                "periodic_load": ([("rack",)], 0.4)},
+    "pair": {"missing_link": ([("block1", "block2"), ("bar", "far")], 0.3)}}
 OUTSIDE: dict[str, dict[str, tuple[list[tuple[str, ...]], float]]] = {
     "bar": {"fan": ([("x1", "room"), ("x4", "room")], 0.1), "melting": ([("x1",)], 1.0),
             "doors": ([("x4",)], 2.0)},

@@ -156,5 +156,35 @@ def housing(rng: np.random.Generator) -> Machine:
                    draughts={"air": 0.02})
 
 
+def pair(rng: np.random.Generator) -> Machine:
+    """Two blocks joined by a bar, each on a module with distributed legs, both on one water-cooled base: nine lumps."""
+    plant = Field(("room", "water"), currents=("m1", "m2"))
+    bar, base, links, modules = plant.chain(24, 30.0, 0.5), plant.chain(40, 260.0, 8.0), {}, {}
+    for i, end in ((1, 0), (2, -1)):
+        block, cold, hot, legs = plant.chain(30, 50.0, 6.0), plant.block(1, 16.0), plant.block(1, 18.0), plant.block(
+            20, 4.0)
+        K, S, R = rng.uniform(0.45, 0.65), rng.uniform(0.026, 0.034), rng.uniform(1.5, 2.1)
+        plant.links += [(int(a), int(b), K * 21) for a, b in zip([*cold, *legs], [*legs, *hot], strict=True)]
+        plant.bridge(block[-1:], cold, rng.uniform(2.0, 3.0))
+        plant.bridge(block[:1], bar[end:][:1], 0.8)
+        plant.bridge(hot, base[8:12] if i == 1 else base[28:32], 5.0)
+        plant.lose(block, "room", 0.06)
+        plant.zones |= {f"block{i}": block, f"cold{i}": np.concatenate([cold, legs[:10]]),
+                        f"hot{i}": np.concatenate([hot, legs[10:]])}
+        plant.legs.append(Legs(legs, int(cold[0]), int(hot[0]), i + 1, S, rng.uniform(-2e-4, 2e-4), R,
+                               rng.uniform(-3e-4, 3e-4), ROOM))
+        plant.heaters[f"q{i}"], plant.sensors[f"T{i}"] = block[3:10], block[14:16]
+        links |= {(f"block{i}", f"cold{i}"): 2.0, (f"block{i}", "bar"): 0.4, (f"block{i}", "room"): 0.06}
+        links[f"hot{i}", "near" if i == 1 else "far"] = 3.0
+        modules[f"m{i}"] = f"hot{i}", f"cold{i}", S, R, K
+    plant.lose(base[-3:], "water", 6.0)
+    plant.lose(base, "room", 0.3)
+    plant.zones |= {"bar": bar, "near": base[:20], "far": base[20:]}
+    plant.sensors |= {"Tb": bar[11:13], "Tn": base[4:6], "Tf": base[33:35]}
+    links |= {("near", "far"): 10.0, ("far", "water"): 4.0, ("near", "room"): 0.15, ("far", "room"): 0.15}
+    limits = {"q1": (0.0, 12.0), "q2": (0.0, 10.0), "m1": (-1.2, 2.5), "m2": (-1.2, 2.5)}
+    return Machine(plant, links, {"room": ROOM, "water": 291.0}, limits, modules, {"far": 0.05})
+
+
 MACHINES: dict[str, Callable[[np.random.Generator], Machine]] = {
-    "bar": bar, "plate": plate, "stack": stack, "housing": housing}
+    "bar": bar, "plate": plate, "stack": stack, "housing": housing, "pair": pair}
