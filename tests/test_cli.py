@@ -415,12 +415,28 @@ def test_verify_of_missing_files_and_folders_without_certificates(run: Run, tmp_
 
 
 def test_check_of_sound_input(run: Run, system: Path, record: Path) -> None:
-    assert run("check", system, record).status == 0
+    said = run("check", system, record)
+    assert said.status == 0 and "no [fit] table" not in said.out
     done = run("check", system, record, "--json")
     answer = json.loads(done.out)
     understood = answer["records"][0]["import"]
     assert done.status == 0 and answer["modules"] == ["m1"]
     assert understood["rows"] == {"file": 200, "used": 200} and [p["samples"] for p in understood["parts"]] == [200]
+
+
+def test_check_says_that_a_system_without_a_fit_table_fits_nothing(run: Run, tmp_path: Path) -> None:
+    text = """[system]
+temperature_unit = "K"
+[ambients.room]
+temperature = 295.0
+[lumps.bar]
+capacity = 9.0
+[[links]]
+between = ["bar", "room"]
+conductance = 0.5
+"""
+    done = run("check", write(tmp_path / "bar.toml", text))
+    assert done.status == 0 and "no [fit] table" in done.out
 
 
 def changed(old: str, new: str) -> str:

@@ -156,13 +156,13 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     held_out = validation.predicted(before, state.fit)
     excess, bare_excess = excess_of(fit, healthy), excess_of(new, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
-    verdict, outcome = _verdict(found, excess, gaps, excess.removed(bare_excess), _bare(fit, healthy))
+    verdict, outcome = _verdict(found, excess, gaps, excess.removed(bare_excess), healthy,
+                                _bare(fit, healthy))
     moving = unsteady(fit, found.rounds, healthy) if verdict in _NAMING else []
     if moving:
         verdict, outcome = "unexplained", DiagnosisCode.UNEXPLAINED.outcome(
-            "Something has changed; no change of a parameter and no effect of the catalog explains it. "
-            f"{', '.join(moving)} would, but with another size in every part of the record, where the same on healthy "
-            "records stays: something drifts or comes and goes.")
+            f"{_nothing_explains(healthy)} {', '.join(moving)} would, but with another size in every part of "
+            "the record, where the same on healthy records stays: something drifts or comes and goes.")
     found_some = verdict in _NAMING
     return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
                   plain=exact(fit) if found_some else None)
@@ -182,8 +182,8 @@ def _bare(fit: Refit, healthy: Reference) -> bool:
             and all(one.variance < _NOISE_ONLY for one in healthy.each))
 
 
-def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float, bare: bool
-             ) -> tuple[Verdict, Outcome]:
+def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
+             healthy: Reference, bare: bool) -> tuple[Verdict, Outcome]:
     reasons = " ".join(excess.reasons)
     if not found.rounds and not reasons:
         text = ("Nothing has changed that the new records would show: they are within the scatter of the reference "
@@ -191,7 +191,7 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
         return "consistent", DiagnosisCode.CONSISTENT.outcome(text)
     if not found.rounds or (reasons and removed < _MOST) or not _closes(gaps[1:]):
         helped = "; ".join(map(str, found.rounds))
-        text = f"Something has changed; no change of a parameter and no effect of the catalog explains it. {reasons}"
+        text = f"{_nothing_explains(healthy)} {reasons}"
         text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else f" {found.nearest}".rstrip())
         return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
     if any(map(alternatives, found.rounds)):
@@ -201,6 +201,14 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
             "One change explains what is outside the scatter of the reference records; what is left beyond the noise "
             f"is stated, and has no name. {reasons}".rstrip())
     return "named", DiagnosisCode.NAMED.outcome("One change explains the new records.")
+
+
+def _nothing_explains(healthy: Reference) -> str:
+    """What was tried; without parameters of a fit table no change of one was."""
+    if healthy.listed.names:
+        return "Something has changed; no change of a parameter and no effect of the catalog explains it."
+    return ("Something has changed; no effect of the catalog explains it, and no change of a parameter was tried: none "
+            "is fitted.")
 
 
 def _closes(validation: Sequence[Gap]) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from .._celsius import ZERO_CELSIUS
 from ..thermal import System
-from ._judge import Name
+from ._judge import Name, Verdict
 from .effects import AMBIENT_DRIFT, Candidate
 from .fit import FoundAmbient, Refit, found_ambients
 from .search import Accepted, other_periods
@@ -31,6 +31,22 @@ def doubts(system: System, remainder: bool) -> list[str]:
         return []
     return ["A module has no inside of its own in this test. Of 41 simulated stacks with a module that got a name, one "
             "got a wrong one, which does not exclude one in eight: confirm this name on the machine."]
+
+
+def nothing_fitted(nominal: Refit, verdict: Verdict) -> list[str]:
+    """That all numbers were taken as right where something is missing, a sentence; none with a fit table.
+
+    Parameters
+    ----------
+    nominal : Refit
+        Fit of the nominal system that was diagnosed.
+    verdict : str
+        Of the answer.
+    """
+    if verdict == "consistent" or not nominal.records or nominal.system.fit or nominal.structure.n_parameters:
+        return []
+    return ["The system has no fit table, so its numbers were taken as right: a wrong one can pass for what is "
+            "missing. Put what is not known for certain under [fit], with its range."]
 
 
 def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:

@@ -18,6 +18,7 @@ from ._doubts import (
     held_ambients,
     may_be_the_room,
     may_drift,
+    nothing_fitted,
     periods_undecided,
     place_undecided,
     within_the_body,
@@ -131,7 +132,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                              remedy="Leave it out: a record brings its own inputs.")
         judged, compared = changed(system, records, reference, validation=checked, parameters=parameters, names=names,
                                    noise=noise, session_gain=session_gain, progress=progress)
-        return _with_reference(concluded(judged), compared)
+        return _with_reference(concluded(judged, "new records"), compared)
     progress("reading the noise off the records")
     floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
     progress("refitting the nominal system")
@@ -174,13 +175,15 @@ def _asks_for_a_warm_room(judged: Judged) -> bool:
     return judged.plain is not None and too_warm(judged.plain)
 
 
-def concluded(judged: Judged) -> Diagnosis:
+def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
     """The answer: names, values, gaps, what could not be tested, and the next experiment.
 
     Parameters
     ----------
     judged : Judged
         State of the search with its tests and verdict.
+    trained : str
+        What the records of the fit are called.
     """
     judged = without_names_of_noise(judged)
     state, nominal = judged.state, judged.state.nominal
@@ -193,7 +196,7 @@ def concluded(judged: Judged) -> Diagnosis:
         gap["validation"] = judged.hold_out.gap
     where = locate(nominal)
     with_rest = unexplained or (judged.plain is not None and judged.verdict != "named")
-    rest = _beyond_noise(fit, gap) if with_rest else None
+    rest = _beyond_noise(fit, gap, trained) if with_rest else None
     resolves = None if rest is None else resolving(rest, nominal.system)
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
@@ -229,6 +232,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     """What to hold against the answer."""
     state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
     said = [judged.means] if judged.means else []
+    said += nothing_fitted(nominal, verdict)
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
     if verdict in ("named", "named_with_remainder", "ambiguous"):
@@ -243,9 +247,9 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
             *doubts(nominal.system, remainder=True))
 
 
-def _beyond_noise(fit: Refit, gap: dict[str, Gap]) -> Remainder | None:
+def _beyond_noise(fit: Refit, gap: dict[str, Gap], trained: str) -> Remainder | None:
     """The remainder; None if all is within the noise."""
-    return remainder(fit, gap) if any(left(one).rms for one in gap.values()) else None
+    return remainder(fit, gap, trained) if any(left(one).rms for one in gap.values()) else None
 
 
 def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:

@@ -57,6 +57,8 @@ class Remainder:
         Rms of the free heat into the first of these lumps [W].
     line : Line, optional
         A single period that holds most of what is left at a thermometer.
+    trained : str
+        What the records of the fit are called.
     """
 
     gaps: dict[str, Left]
@@ -67,6 +69,7 @@ class Remainder:
     share: float
     heat: float
     line: Line | None = None
+    trained: str = "training records"
 
     @property
     def located(self) -> bool:
@@ -77,7 +80,7 @@ class Remainder:
         """How much, at which sensor and lump, in which band, and whether a single period."""
         seen = "validation" if "validation" in self.gaps else "train"
         sensor = max(self.sensors, key=lambda name: self.sensors[name])
-        kind = "validation records" if seen == "validation" else "training records"
+        kind = "validation records" if seen == "validation" else self.trained
         lump, share = self.where[0]
         removed = (f"a free heat of {self.heat:.2g} W rms into {lump} would remove {100 * share:.0f} % of it"
                    if self.located else f"no slow heat into a lump would remove more than {100 * share:.2g} % of it")
@@ -98,7 +101,7 @@ class Remainder:
                 **({} if self.line is None else {"line": vars(self.line)})}
 
 
-def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:
+def remainder(fit: Refit, gaps: Mapping[str, Gap], trained: str = "training records") -> Remainder | None:
     """Remainder of a fit with the network taken to be right; None without any record of temperatures.
 
     Parameters
@@ -107,13 +110,15 @@ def remainder(fit: Refit, gaps: Mapping[str, Gap]) -> Remainder | None:
         With the named effects, its noise levels no larger than declared.
     gaps : mapping
         `Gap` of "train" and, if given, "validation".
+    trained : str
+        What the records of the fit are called.
     """
     squares = _squares(fit)
     if not squares:
         return None
     where, heat = _places(fit)
     return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat,
-                     single_period(fit))
+                     single_period(fit), trained)
 
 
 def left(gap: Gap) -> Left:
