@@ -46,6 +46,7 @@ app = typer.Typer(name="robthermal", no_args_is_help=True, add_completion=True, 
 # A wrong command line. It has no public name that all versions share: newer ones of typer bring their own click.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 _INTERRUPTED = 130
+_UNFITTED = "no [fit] table: calibrate has nothing to fit, and diagnose takes every number as right"  # seldom meant
 _OBJECTS = 5_000  # made between two searches for cycles: a command keeps most, and 700 cost it a tenth of its time
 
 MedianFilter = Annotated[float | None, typer.Option("--median-filter", help="Length of a median filter [s].")]
@@ -135,15 +136,8 @@ def check(files: Annotated[list[Path], typer.Argument(help="A system file (.toml
                    "modules": list(found.modules), "heaters": list(found.inputs), "sensors": list(found.sensors),
                    "time_constants_s": None if constants is None else [float(constants.min()), float(constants.max())],
                    **summary}
-    answer(summary, as_json, lambda: say(*_soundness(found), *map(str, reports)))
-
-
-def _soundness(system: rt.System | None) -> list[str]:
-    """What the lines before the records say; that nothing is fitted is no fault, but seldom meant."""
-    if system is None:
-        return []
-    unfitted = ["no [fit] table: calibrate has nothing to fit, and diagnose takes every number as right"]
-    return [f"{system.name}: sound.", *([] if system.fit else unfitted)]
+    sound = [] if found is None else [f"{found.name}: sound.", *([] if found.fit else [_UNFITTED])]
+    answer(summary, as_json, lambda: say(*sound, *map(str, reports)))
 
 
 @app.command()
