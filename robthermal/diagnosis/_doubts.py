@@ -43,7 +43,7 @@ def nothing_fitted(nominal: Refit, verdict: Verdict) -> list[str]:
     verdict : str
         Of the answer.
     """
-    if verdict == "consistent" or not nominal.records or nominal.system.fit or nominal.structure.n_parameters:
+    if verdict == "consistent" or not nominal.takes_all_as_right:
         return []
     return ["The system has no fit table, so its numbers were taken as right: a wrong one can pass for what is "
             "missing. Put what is not known for certain under [fit], with its range."]

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.jobs.diagnose._answer import answer_sentence
 
 H = 10.0
 FIT = {"links.plate-room.conductance": (0.05, 5.0), "lumps.plate.capacity": (20.0, 300.0)}
@@ -62,3 +63,11 @@ def test_the_remainder_between_two_days_is_of_the_new_records():
     found = rt.diagnose(plate(), measured(4, 0.3), reference=[measured(1, 0.8), measured(2, 0.8)],
                         effects=["sensor_offset"])
     assert "of the error on the new records is not explained" in found.outcome.text
+
+
+@pytest.mark.parametrize("old", [None, [measured(1, 0.8), measured(2, 0.8)]])
+def test_the_first_sentence_of_the_report_says_so_too(old):
+    found = rt.diagnose(plate(), measured(4, 0.3), reference=old, effects=["sensor_lag"])
+    assert found.verdict == "unexplained"
+    said = answer_sentence(found)
+    assert "under [fit]" in said and "no parameter and" not in said

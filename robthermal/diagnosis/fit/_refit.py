@@ -203,6 +203,11 @@ class Refit:
                      if any(name not in path.one.record.input_names for path in self.records))
 
     @property
+    def takes_all_as_right(self) -> bool:
+        """Whether no number of the system is fitted because it has no fit table; none may be chosen as well."""
+        return not self.structure.n_parameters and not self.structure.base.fit
+
+    @property
     def unit(self) -> str:
         """Unit of `rms`."""
         if not self.records:

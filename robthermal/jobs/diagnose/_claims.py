@@ -26,7 +26,7 @@ _CHANGED = {
     "ambiguous": "Changes explain the new records, but other ones do as well: {names}.",
     "consistent": "The new records are within the scatter of the reference records: nothing has changed that they "
                   "would show.",
-    "unexplained": "Something has changed, and neither a parameter nor a known effect explains it.",
+    "unexplained": "Something has changed, and nothing that was tried explains it.",
 }
 _HOW_CHANGED = ("A change is accepted where healthy records exceed it with a chance below 0.03 for all parameters "
                 "together, 0.01 for the effects of the catalog (F test with the scatter among the reference records).")
