@@ -66,7 +66,7 @@ _STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters: Choice = None,
               validation: Measured | Sequence[Measured] | None = None, initial: Start = "free",
-              loss: Loss = "linear", noise: Mapping[str, float] | float | None = None, max_iterations: int = 50,
+              loss: Loss = "linear", noise: Mapping[str, float] | float | None = None, max_iterations: int = 200,
               method: Method = "output_error", operating_point: Mapping[str, float] | None = None) -> Fit:
     """Estimate parameters of a system from records, frequency responses or both: one weighted least squares.
 

@@ -172,7 +172,7 @@ def calibrate(system: SystemFile,
                   "--validation", help="Held-out record or response, may repeat.", metavar="FILE")] = None,
               out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
                   "calibrated.toml"),
-              max_iterations: Annotated[int, typer.Option(help="A fit that needs more has not converged.")] = 50,
+              max_iterations: Annotated[int, typer.Option(help="A fit that needs more has not converged.")] = 200,
               median_filter: MedianFilter = None,
               operating_point: OperatingPoint = None, column: ColumnMap = None, record: ReadOption = None,
               as_json: Json = False) -> None:

@@ -15,7 +15,7 @@ from ._measured import read_measured
 
 def calibrate_files(system: System, records: Sequence[Path], validation: Sequence[Path] = (), *,
                     median_filter: float | None = None, operating_point: Mapping[str, float] | None = None,
-                    tables: Sequence[ReadTable] = (), max_iterations: int = 50) -> Fit:
+                    tables: Sequence[ReadTable] = (), max_iterations: int = 200) -> Fit:
     """Calibrate a system with files of records and of frequency responses together.
 
     Parameters

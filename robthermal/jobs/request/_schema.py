@@ -50,7 +50,7 @@ class CalibrateTable(Table):
     loss: Loss = "linear"
     parameters: dict[str, dict[str, Number]] = {}
     responses: list[str] = []
-    max_iterations: Annotated[int, Field(ge=1, le=10_000, strict=True)] = 50
+    max_iterations: Annotated[int, Field(ge=1, le=10_000, strict=True)] = 200
 
 
 class CertifyTable(Table):
@@ -237,7 +237,7 @@ class Project:
     design: DesignTable | None = None
     couple: CoupleTable | None = None
     notes: str = ""
-    max_iterations: int = 50
+    max_iterations: int = 200
     identity: Mapping[str, str] = field(default_factory=dict)
 
 
