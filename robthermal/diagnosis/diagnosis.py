@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .._digits import probability
 from .._html import short_table
 from ..errors import Outcome
 from ..thermal import System
@@ -155,9 +156,9 @@ class Diagnosis:
         for found, others in zip(self.effects, self.alternatives, strict=True):
             lines.append(f"  {found.label}: " + ", ".join(
                 f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
-                + f"   ΔBIC {found.delta_bic:.1f}, p {found.p_value:.1g}")
+                + f"   ΔBIC {found.delta_bic:.1f}, {probability(found.p_value)}")
             lines += [f"    or {effect}({', '.join(where)})" for effect, where in others]
-        for name, gap in self.gap.items():
+        for name, gap in self._gaps():
             lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
                          f"[{gap.unit}]")
         lines.append(f"could not have been seen: {len(self.not_testable)} candidates")
@@ -170,8 +171,13 @@ class Diagnosis:
             values = (f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
             rows.append((found.label, ", ".join(values)))
         rows += [(f"rms, {name}", f"{gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise [{gap.unit}]")
-                 for name, gap in self.gap.items()]
+                 for name, gap in self._gaps()]
         return short_table("Diagnosis", rows, str(self.outcome))
+
+    def _gaps(self) -> list[tuple[str, Gap]]:
+        """As they are printed: between two days nothing was trained on the new records."""
+        return [("new" if name == "train" and self.reference is not None else name, gap)
+                for name, gap in self.gap.items()]
 
     def plot(self) -> NDArray[Any]:
         """Residuals of the first training record [K, V], or response, before and after; returns the matplotlib axes."""

@@ -6,6 +6,7 @@ from scipy.linalg import expm
 
 import robthermal as rt
 from robthermal.jobs.diagnose._answer import answer_sentence
+from robthermal.jobs.diagnose._effect_words import labels_in_words
 
 H = 10.0
 FIT = {"links.plate-room.conductance": (0.05, 5.0), "lumps.plate.capacity": (20.0, 300.0)}
@@ -56,7 +57,8 @@ def test_with_parameters_the_change_is_found_and_what_is_left_is_of_the_new_reco
     assert [one.key for one in found.effects] == [("parameter_change", ("links.plate-room.conductance",))]
     value, std, _ = found.effects[0].values["relative"]
     assert abs(value - (truth / 0.8 - 1.0)) < max(4.0 * std, 0.02)
-    assert "training records" not in found.outcome.text
+    assert "training records" not in found.outcome.text and "train: rms" not in str(found)
+    assert "new: rms" in str(found) and "p 0" not in str(found)
 
 
 def test_the_remainder_between_two_days_is_of_the_new_records():
@@ -71,3 +73,8 @@ def test_the_first_sentence_of_the_report_says_so_too(old):
     assert found.verdict == "unexplained"
     said = answer_sentence(found)
     assert "under [fit]" in said and "no parameter and" not in said
+
+
+def test_labels_of_changes_are_written_out():
+    said = labels_in_words("parameter_change(links.plate-room.conductance) would, sensor_lag(T) too.")
+    assert said.startswith("a change of the conductance of link plate-room would, ") and "sensor_lag(" not in said

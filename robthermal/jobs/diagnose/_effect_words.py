@@ -71,4 +71,4 @@ def labels_in_words(text: str) -> str:
 
 def _written_out(label: re.Match[str]) -> str:
     name, where = label.group(1), tuple(label.group(2).split(", "))
-    return in_words(name, where) if name in WORDS else label.group()
+    return in_words(name, where) if name in WORDS or name == "parameter_change" else label.group()

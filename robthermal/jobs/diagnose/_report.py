@@ -25,6 +25,7 @@ from ._answer import answer_sentence, number_that_matters
 from ._change_section import change_section
 from ._claims import diagnosis_assumptions, diagnosis_claims
 from ._diagnose import Diagnosed, Residuals, ResponseResiduals
+from ._effect_words import labels_in_words
 from ._ranking import NOT_NEEDED, ranking
 from ._refinement_section import refinement_section
 
@@ -189,7 +190,7 @@ def _own_words(found: Diagnosis) -> str:
     text = found.outcome.text
     for sentence in said:
         text = text.replace(sentence, "")
-    return " ".join(text.split())
+    return labels_in_words(" ".join(text.split()))
 
 
 def _evidence(effect: Found) -> dict[str, float]:
