@@ -204,7 +204,7 @@ class Refit:
 
     @property
     def takes_all_as_right(self) -> bool:
-        """Whether no number of the system is fitted because it has no fit table; none may be chosen as well."""
+        """Whether no number of the system is fitted because it has no fit table."""
         return not self.structure.n_parameters and not self.structure.base.fit
 
     @property

@@ -30,14 +30,14 @@ def answer_sentence(found: Diagnosis) -> str:
     remarks = found.noise_floor.remarks[:1]
     if found.noise_floor.quiet:
         return " ".join(["The model moves and the readings do not.", *remarks])
-    unfitted = found.nominal.takes_all_as_right if found.reference is None else not found.reference.scatter
+    unfitted = found.nominal.takes_all_as_right
     parameter = "" if unfitted else "no parameter and "
     what = (f"Something has changed that {parameter}no effect of the catalog explains" if found.reference else
             "Something is missing in the model that no effect of the catalog explains")
-    untried = ["No change of a parameter was tried, for none is fitted: put what may have changed under [fit]."] if found.reference else [
-        "Every number of the system was taken as right, for none is under [fit]."]
+    untried = "No change of a parameter was tried, for none is fitted: put what may have changed under [fit]." if (
+        found.reference) else "Every number of the system was taken as right, for none is under [fit]."
     return " ".join([f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
-                     f"{gap.noise:.2g} {gap.unit}.", *(untried if unfitted else []), *remarks,
+                     f"{gap.noise:.2g} {gap.unit}.", *([untried] if unfitted else []), *remarks,
                      *filter(None, [found.means, labels_in_words(found.nearest)])])
 
 
