@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fit import Structure
+from ..fit import Refit, Structure, Whitened, relinearized
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,22 @@ class Held(Structure):
         known = np.zeros((len(self.center), v.size))
         known[:, :len(self.center)] = self.root
         return np.concatenate([-self.root @ (v[:len(self.center)] - self.center), z]), np.concatenate([known, J])
+
+
+def healthy_point(fit: Refit) -> Refit:
+    """The same unknowns with the parameters of a healthy day, changes and filters as they are: not a fit.
+
+    Parameters
+    ----------
+    fit : Refit
+        With a structure whose parameters are held.
+    """
+    structure = fit.structure
+    assert isinstance(structure, Held)
+    v = fit.v.copy()
+    v[:structure.n_parameters] = np.clip(structure.center, *(bound[:structure.n_parameters]
+                                                             for bound in structure.bounds))
+    return relinearized(replace(fit, v=v, z=Whitened(structure, fit.whiteners).residual(v), paths=structure.paths(v)))
 
 
 def root_of(covariance: Array) -> Array:

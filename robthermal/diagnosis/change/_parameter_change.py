@@ -13,6 +13,7 @@ from ..effects import Candidate, Effect, Quantity
 NAME = "parameter_change"
 SIZE = "log_ratio"  # the coordinate in which a factor is linear; said to the user as a relative change
 _FARTHEST = 3.5  # a factor of 33: what has broken off altogether
+_ROOM = 2.0  # factor about a changed number that its range in the fit table leaves
 
 
 def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
@@ -31,7 +32,17 @@ def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
 
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
     factor = math.exp(values[SIZE])
-    return system.with_parameters({name: system.parameter(name) * factor for name in where})
+    changed = {name: system.parameter(name) * factor for name in where}
+    return _with_wider_fit(system.with_parameters(changed), changed)
+
+
+def _with_wider_fit(system: System, changed: Mapping[str, float]) -> System:
+    """With a fit table that holds the changed numbers: its ranges are those of the healthy machine."""
+    wider = {name: system.fit[name].model_copy(update={"lower": min(system.fit[name].lower, value / _ROOM),
+                                                       "upper": max(system.fit[name].upper, value * _ROOM)})
+             for name, value in changed.items() if name in system.fit
+             and not system.fit[name].lower <= value <= system.fit[name].upper}
+    return system.model_copy(update={"fit": {**system.fit, **wider}}) if wider else system
 
 
 def _places(members: tuple[str, ...], system: System) -> list[tuple[str, ...]]:

@@ -15,10 +15,12 @@ from ..evidence import ALIAS, Scores, score_candidates
 from ..fit import Refit, relinearized
 from ..search import Accepted, Entry, between_trials, refit_short_list
 from ._excess import excess_of
+from ._held import healthy_point
 from ._parameter_change import NAME, parameter_changes, relative, says_again
 from ._reference import Reference
 from ._yardstick import chance, effective_number, inflation, squares, within_scatter
 
+Key = tuple[str, tuple[str, ...]]
 MOST_CHANGES = 2
 _ALPHA_PARAMETERS, _ALPHA_CATALOG = 0.03, 0.01  # family-wise
 _WORTH_SAYING = 0.2  # chance of the best candidate that is no answer
@@ -152,12 +154,28 @@ def _refitted(fit: Refit, scores: Scores, reference: Reference, alpha: float) ->
     family = effective_number(scores.signatures, n)
     if not any(family * chance(_HOPE * squares(fit, scores, i), 1, 1.0, n) < alpha for i in scores.order):
         return
-    for entry in refit_short_list(fit, scores).entries:
+    for entry in _entries(fit, scores):
         kappa = inflation(entry.candidate, reference.each, fit.n_readings)
         dimension, decrease = len(entry.candidate.effect.free), fit.rss - entry.fit.rss
         p = min(family * _trials(entry.candidate, fit) * chance(decrease, dimension, kappa, n), 1.0)
         bic = decrease - dimension * math.log(fit.n_readings)  # the noise is known: no logarithm of the sum of squares
         yield _Tried(replace(entry, p_value=p, delta_bic=bic), kappa, p < alpha)
+
+
+def _entries(fit: Refit, scores: Scores) -> list[Entry]:
+    """The short lists from the fit and from the parameters of a healthy day: the better refit of every candidate.
+
+    Without its change the fit bends the other parameters as far as their scatter lets them; what it is linear about
+    there may promise nothing of the change that is true, and much of that of the next link of a chain.
+    """
+    healthy = healthy_point(fit)
+    lists = (refit_short_list(fit, scores), refit_short_list(healthy, score_candidates(healthy, scores.candidates)))
+    best: dict[Key, Entry] = {}
+    for entry in (entry for short in lists for entry in short.entries):
+        other = best.get(entry.candidate.key)
+        if other is None or entry.fit.rss < other.fit.rss:
+            best[entry.candidate.key] = entry
+    return list(best.values())
 
 
 def _trials(candidate: Candidate, fit: Refit) -> float:

@@ -1,0 +1,87 @@
+"""What changed between two days, where the truth is finer than the network.
+
+Run: python tests/benchmarks/bench_foreign_changes.py [--seeds 1 2 3] [--machines bar ...] [--kinds ambient ...]
+[--jobs 2]. Fields of 150 cells and more, integrated by the code beside this file; every number of every day is off by
+3 %; three healthy days, one new. Wilson intervals of 95 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[_name] = "1"  # before numpy is loaded: one core a case
+
+from _timing import header  # noqa: E402
+from foreign.days import CHANGES, OUTSIDE, Change, days  # noqa: E402
+from foreign.judge import NAMED, rate  # noqa: E402
+from joblib import Parallel, delayed  # noqa: E402
+
+import robthermal as rt  # noqa: E402
+
+
+def compared(change: Change) -> dict[str, Any]:
+    """Verdict, what is named, and whether the truth is among it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        one = days(change)
+        start = time.process_time()
+        found = rt.diagnose(one.system, one.new, reference=one.healthy)
+        seconds = time.process_time() - start
+    sets = [[(effect.effect, effect.where), *others]
+            for effect, others in zip(found.effects, found.alternatives, strict=True)]
+    holds = [any(one.truth in where for _, where in names) for names in sets]
+    return {"key": change.key, "kind": change.kind, "verdict": found.verdict, "truth": one.truth, "size": one.size,
+            "names": [[f"{name}({', '.join(where)})" for name, where in names] for names in sets],
+            "right": bool(sets) and all(holds), "alone": bool(sets) and all(len(names) == 1 for names in sets),
+            "gap": found.to_dict()["gap"]["train"], "text": found.outcome.text, "seconds": seconds}
+
+
+def answer(row: dict[str, Any]) -> str:
+    """healthy, unique, in the set, set without, WRONG or refused."""
+    if row["verdict"] not in NAMED:
+        return "healthy" if row["verdict"] == "consistent" else "refused"
+    if not row["right"]:
+        return "WRONG" if row["alone"] else "set without"
+    return "unique" if row["alone"] else "in the set"
+
+
+def main() -> None:
+    """Run the cases asked for and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", nargs="*", type=int, default=[1, 2, 3])
+    parser.add_argument("--machines", nargs="*", default=["bar", "plate", "stack", "housing"])
+    parser.add_argument("--kinds", nargs="*", default=["healthy", *CHANGES, *OUTSIDE])
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="rows as JSON")
+    chosen = parser.parse_args()
+    header("what changed, finer truth: three healthy days of 900 samples, scatter 3 %")
+    rows = list(Parallel(n_jobs=chosen.jobs)(delayed(compared)(Change(machine, kind, seed))
+                for kind in chosen.kinds for seed in chosen.seeds for machine in chosen.machines))
+    if chosen.out:
+        chosen.out.write_text(json.dumps(rows, indent=1))
+    for kind in chosen.kinds:
+        own = [row for row in rows if row["kind"] == kind]
+        print(f"{kind}: named alone {rate(own, lambda r: answer(r) == 'unique')}; among others "
+              f"{rate(own, lambda r: answer(r) == 'in the set')}; without the truth "
+              f"{rate(own, lambda r: answer(r) in ('WRONG', 'set without'))}; unexplained "
+              f"{rate(own, lambda r: answer(r) == 'refused')}; consistent {rate(own, lambda r: answer(r) == 'healthy')}")
+    for row in rows:
+        if answer(row) != {"healthy": "healthy"}.get(row["kind"], "refused" if row["kind"] in OUTSIDE else "unique"):
+            names = "; ".join(" or ".join(names) for names in row["names"]) or row["text"][:250]
+            print(f"  {row['key']} {row['truth']} {row['size']:.2f}: {answer(row)}, {row['gap']['before']:.3g} to "
+                  f"{row['gap']['after']:.3g} K: {names}")
+    seconds = sorted(row["seconds"] for row in rows)
+    print(f"CPU seconds: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
