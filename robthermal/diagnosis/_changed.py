@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .._digits import downwards
 from ..errors import InputError, Outcome
 from ..fitting import Choice
 from ..thermal import System
@@ -156,16 +157,27 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     held_out = validation.predicted(before, state.fit)
     excess, bare_excess = excess_of(fit, healthy), excess_of(new, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
-    verdict, outcome = _verdict(found, excess, gaps, excess.removed(bare_excess), healthy,
-                                _bare(fit, healthy))
+    why = _short_of(excess, excess.removed(bare_excess), gaps[1:])
+    verdict, outcome = _verdict(found, excess, gaps, bool(why), healthy, _bare(fit, healthy))
     moving = unsteady(fit, found.rounds, healthy) if verdict in _NAMING else []
     if moving:
-        verdict, outcome = "unexplained", DiagnosisCode.UNEXPLAINED.outcome(
-            f"{_nothing_explains(healthy)} {', '.join(moving)} would, but with another size in every part of "
-            "the record, where the same on healthy records stays: something drifts or comes and goes.")
-    found_some = verdict in _NAMING
+        verdict, outcome = "unexplained", DiagnosisCode.UNEXPLAINED.outcome(_nothing_explains(healthy))
+        why = (f"{' and '.join(moving)} {'has' if len(moving) == 1 else 'have'} another size in every part of the "
+               "record, where the same on healthy records stays: something drifts or comes and goes")
     return Judged(state=state, adequacy=adequacy(state.fit), hold_out=held_out, verdict=verdict, outcome=outcome,
-                  plain=exact(fit) if found_some else None)
+                  plain=exact(fit) if verdict in _NAMING else None, compared=True,
+                  why=why if verdict == "unexplained" else "")
+
+
+def _short_of(excess: Excess, removed: float, validation: Sequence[Gap]) -> str:
+    """What keeps accepted changes from being an answer, in words that follow "because"; empty if nothing does."""
+    if excess.reasons and removed < _MOST:
+        share = downwards(100.0 * max(removed, 0.0), 3)
+        return (f"{share} % of what is outside the scatter of the reference records is gone, less than "
+                f"{100.0 * _MOST:.0f} %, and what is left is still outside")
+    if not all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in validation):
+        return f"on the validation records less than {100.0 * _CLOSED:.0f} % of the error beyond noise is gone"
+    return ""
 
 
 def _refuse_same(reference: Sequence[DataSet], new: Sequence[DataSet]) -> None:
@@ -182,17 +194,15 @@ def _bare(fit: Refit, healthy: Reference) -> bool:
             and all(one.variance < _NOISE_ONLY for one in healthy.each))
 
 
-def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], removed: float,
+def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], short: bool,
              healthy: Reference, bare: bool) -> tuple[Verdict, Outcome]:
     reasons = " ".join(excess.reasons)
     if not found.rounds and not reasons:
         text = ("Nothing has changed that the new records would show: they are within the scatter of the reference "
                 "records.")
         return "consistent", DiagnosisCode.CONSISTENT.outcome(text)
-    if not found.rounds or (reasons and removed < _MOST) or not _closes(gaps[1:]):
-        helped = "; ".join(map(str, found.rounds))
-        text = f"{_nothing_explains(healthy)} {reasons}"
-        text = text.rstrip() + (f" Provisional, no name: {helped}." if helped else f" {found.nearest}".rstrip())
+    if not found.rounds or short:
+        text = " ".join(filter(None, [_nothing_explains(healthy), reasons, "" if found.rounds else found.nearest]))
         return "unexplained", DiagnosisCode.UNEXPLAINED.outcome(text)
     if any(map(alternatives, found.rounds)):
         return "ambiguous", DiagnosisCode.AMBIGUOUS.outcome("The new records cannot distinguish some changes.")
@@ -210,7 +220,3 @@ def _nothing_explains(healthy: Reference) -> str:
     return ("Something has changed; no effect of the catalog explains it, and no change of a parameter was tried: none "
             "is fitted.")
 
-
-def _closes(validation: Sequence[Gap]) -> bool:
-    """Whether enough of the gap is gone on the validation records, if there are any."""
-    return all(left(gap).share_explained >= 1.0 - (1.0 - _CLOSED) ** 2 for gap in validation)

@@ -71,6 +71,8 @@ class Judged:
         For every effect, where the model is not exact.
     why : str
         Of an answer "unexplained" that was graded: what kept effects from being named, in words that follow "because".
+    compared : bool
+        Whether new records were compared with those of a healthy machine.
     means : str
         What the records would be if their values were means over a step; empty where that explains nothing.
     """
@@ -83,6 +85,7 @@ class Judged:
     plain: Refit | None = None
     evidence: tuple[Evidence, ...] = ()
     why: str = ""
+    compared: bool = False
     means: str = ""
 
     def __str__(self) -> str:

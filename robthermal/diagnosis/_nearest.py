@@ -9,6 +9,7 @@ from ._judge import Judged
 from ._lasting import evidence_of
 from .evidence import Gap, left
 
+_TRAINED = {False: "training", True: "new"}  # what the records of the fit are called, between two days
 _LABEL = re.compile(r"\w+\(")  # of an effect at its place
 
 
@@ -26,7 +27,8 @@ def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
     if not labels or not judged.why:
         return ""
     seen = "validation" if "validation" in gap else "train"
-    records, one = "the validation records" if seen == "validation" else "the training records", gap[seen]
+    records = "the validation records" if seen == "validation" else f"the {_TRAINED[judged.compared]} records"
+    one = gap[seen]
     what, them, comes = " and ".join(labels), "it" if len(labels) == 1 else "them", "s" if len(labels) == 1 else ""
     if left(one).share_explained <= 0.0:
         return (f"Nearest come{comes} {what}, with which the error on {records} does not fall ({one.before:.2g} to "
@@ -47,6 +49,8 @@ def _with_digits(before: float, after: float) -> tuple[str, str]:
 
 def _why(judged: Judged) -> str:
     """Why each of the effects is no name: the first of its own tests that fails, or what was wrong beside others."""
+    if judged.compared:
+        return judged.why
     state = judged.state
     found = evidence_of(state.rounds, state.fit, state.nominal)
     labels = [round_.best.candidate.label for round_ in state.rounds]

@@ -37,15 +37,18 @@ def compared(change: Change) -> dict[str, Any]:
         seconds = time.process_time() - start
     sets = [[(effect.effect, effect.where), *others]
             for effect, others in zip(found.effects, found.alternatives, strict=True)]
-    holds = [any(one.truth in where for _, where in names) for names in sets]
+    holds = [any(tuple(where) in one.truth for _, where in names) for names in sets]
     return {"key": change.key, "kind": change.kind, "verdict": found.verdict, "truth": one.truth, "size": one.size,
             "names": [[f"{name}({', '.join(where)})" for name, where in names] for names in sets],
             "right": bool(sets) and all(holds), "alone": bool(sets) and all(len(names) == 1 for names in sets),
             "gap": found.to_dict()["gap"]["train"], "text": found.outcome.text, "seconds": seconds}
 
 
+ANSWERS = ("healthy", "refused", "unique", "in the set", "set without", "WRONG")
+
+
 def answer(row: dict[str, Any]) -> str:
-    """healthy, unique, in the set, set without, WRONG or refused."""
+    """One of `ANSWERS`."""
     if row["verdict"] not in NAMED:
         return "healthy" if row["verdict"] == "consistent" else "refused"
     if not row["right"]:
@@ -68,15 +71,18 @@ def main() -> None:
     if chosen.out:
         chosen.out.write_text(json.dumps(rows, indent=1))
     for kind in chosen.kinds:
-        own = [row for row in rows if row["kind"] == kind]
-        print(f"{kind}: named alone {rate(own, lambda r: answer(r) == 'unique')}; among others "
-              f"{rate(own, lambda r: answer(r) == 'in the set')}; without the truth "
-              f"{rate(own, lambda r: answer(r) in ('WRONG', 'set without'))}; unexplained "
-              f"{rate(own, lambda r: answer(r) == 'refused')}; consistent {rate(own, lambda r: answer(r) == 'healthy')}")
+        answers = [answer(row) for row in rows if row["kind"] == kind]
+        print(f"{kind}: " + "; ".join(f"{said} {answers.count(said)}" for said in ANSWERS) + f" of {len(answers)}")
+    for title, kinds, said in (("changes named alone", CHANGES, ("unique",)),
+                               ("  alone or among others", CHANGES, ("unique", "in the set")),
+                               ("  without the truth", CHANGES, ("WRONG", "set without")),
+                               ("healthy days called changed", ("healthy",), ANSWERS[1:]),
+                               ("outside: a name", OUTSIDE, ("WRONG", "set without"))):
+        print(f"{title:<28} {rate([row for row in rows if row['kind'] in kinds], lambda r: answer(r) in said)}")  # noqa: B023
     for row in rows:
         if answer(row) != {"healthy": "healthy"}.get(row["kind"], "refused" if row["kind"] in OUTSIDE else "unique"):
             names = "; ".join(" or ".join(names) for names in row["names"]) or row["text"][:250]
-            print(f"  {row['key']} {row['truth']} {row['size']:.2f}: {answer(row)}, {row['gap']['before']:.3g} to "
+            print(f"  {row['key']} {row['truth'][:1]} {row['size']:.2f}: {answer(row)}, {row['gap']['before']:.3g} to "
                   f"{row['gap']['after']:.3g} K: {names}")
     seconds = sorted(row["seconds"] for row in rows)
     print(f"CPU seconds: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")

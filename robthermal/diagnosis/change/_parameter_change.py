@@ -11,6 +11,7 @@ from ...thermal import System
 from ..effects import Candidate, Effect, Quantity
 
 NAME = "parameter_change"
+GAIN = "input_gain"  # the same for a heater or module whose gain is no parameter of the fit
 SIZE = "log_ratio"  # the coordinate in which a factor is linear; said to the user as a relative change
 _FARTHEST = 3.5  # a factor of 33: what has broken off altogether
 _ROOM = 2.0  # factor about a changed number that its range in the fit table leaves

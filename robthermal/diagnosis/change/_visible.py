@@ -12,13 +12,12 @@ from ...errors import Diverged
 from ...thermal import System
 from ..effects import Candidate
 from ..fit import Refit, Whitened, orthonormal
-from ._parameter_change import NAME
+from ._parameter_change import GAIN, NAME
 from ._reference import Reference
 from ._search import Search, families
 from ._yardstick import effective_number, freedom_of, inflation, length_of
 
 _POWER = 0.9
-_GAIN = "input_gain"
 _SMALL = 0.3  # size up to which the derivatives without a change decide
 _ROUNDS, _CLOSE = 2, 0.05  # of the search for a size beyond that
 _FLAT = 1e-9  # relative size of a direction that counts as none
@@ -62,7 +61,7 @@ def visible_changes(new: Refit, reference: Reference, found: Search) -> tuple[Vi
     for scores, alpha in families(found.scores):
         family = effective_number(scores.signatures, n)
         for i, candidate in enumerate(scores.candidates):
-            if candidate.effect.name not in (NAME, _GAIN):
+            if candidate.effect.name not in (NAME, GAIN):
                 continue
             kappa, freedom = inflation(candidate, reference.each, new.n_readings), freedom_of(n)
             seen = math.sqrt(kappa * f_isf(alpha / family, 1, freedom))  # distance that the test asks for, then

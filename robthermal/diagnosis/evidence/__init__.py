@@ -6,6 +6,7 @@ from ._blocks import NEEDED as NEEDED
 from ._blocks import SURE as SURE
 from ._blocks import Evidence as Evidence
 from ._blocks import Stability as Stability
+from ._blocks import Wandering as Wandering
 from ._blocks import reproducible as reproducible
 from ._blocks import sandwich as sandwich
 from ._blocks import stability as stability
@@ -38,7 +39,8 @@ from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
-           "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "adequacy",
+           "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "Wandering",
+           "adequacy",
            "expected_rms", "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised",
            "promising", "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates",
            "stability", "unknown_heat", "validation_data", "wandering"]

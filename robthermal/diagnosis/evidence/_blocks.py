@@ -42,6 +42,25 @@ class Stability:
 
 
 @dataclass(frozen=True)
+class Wandering:
+    """How far an unknown moves over the segments of the records.
+
+    Parameters
+    ----------
+    moves : float
+        Mean square of its deviations, each in units of what the declared noise makes of it: 1 for white noise.
+    segments : int
+        Number of segments that tell anything about it.
+    per_variance : float
+        By how much `moves` grows per variance of the unknown itself from segment to segment.
+    """
+
+    moves: float
+    segments: int
+    per_variance: float
+
+
+@dataclass(frozen=True)
 class Evidence:
     """How far one effect of a set can be relied on where the model is not exact.
 
@@ -135,8 +154,8 @@ def stability(fit: Refit, column: int) -> Stability:
     return Stability(weight.size, float(np.sqrt(_deviations(moved, weight) / weight.sum())))
 
 
-def wandering(fit: Refit, column: int) -> tuple[float, int]:
-    """How far one unknown moves over segments, in units of the declared noise: 1 for white noise; number of segments.
+def wandering(fit: Refit, column: int) -> Wandering:
+    """How far one unknown moves over segments.
 
     Parameters
     ----------
@@ -146,7 +165,12 @@ def wandering(fit: Refit, column: int) -> tuple[float, int]:
         Place of the unknown.
     """
     moved, weight = _segments(fit, column)
-    return (_deviations(moved, weight) / max(weight.size - 1, 1) if weight.size else 0.0), weight.size
+    if weight.size < 2:
+        return Wandering(0.0, weight.size, 0.0)
+    freedom = weight.size - 1
+    total = float(weight.sum())
+    return Wandering(_deviations(moved, weight) / freedom, weight.size,
+                     (total - float(weight @ weight) / total) / freedom)
 
 
 def _below(share: float, limit: float) -> str:

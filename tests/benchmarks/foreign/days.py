@@ -37,12 +37,12 @@ class Change:
 
 @dataclass(frozen=True)
 class Days:
-    """What the comparison is given, and the truth: a part that the right name holds; empty if there is none."""
+    """What the comparison is given, and the truth: where the right names are; empty if there is none."""
 
     system: rt.System
     healthy: list[rt.Record]
     new: rt.Record
-    truth: str
+    truth: tuple[tuple[str, ...], ...]
     size: float  # relative; of an offset or drift [K], of gusts [W]
 
 
@@ -78,11 +78,12 @@ def _nothing(machine: Machine, day: _Day) -> None:
     """A healthy day."""
 
 
-def _drawn(kind: str, machine: Machine, rng: np.random.Generator) -> tuple[str, float, Act]:
+def _drawn(kind: str, machine: Machine, rng: np.random.Generator
+           ) -> tuple[tuple[tuple[str, ...], ...], float, Act]:
     """Truth, size, and what does it to a machine."""
     zones, ambients = machine.plant.zones, set(machine.ambients)
     if kind == "healthy":
-        return "", 0.0, _nothing
+        return (), 0.0, _nothing
     if kind in ("ambient", "fan"):  # the path that takes most of the heat; of air that no fan moves: a law of its own
         pair = max((pair for pair in machine.links if pair[1] in ambients), key=lambda pair: machine.links[pair])
         f = float(rng.uniform(0.3, 0.6))
@@ -92,21 +93,21 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator) -> tuple[str, 
             if kind == "fan":
                 day.heats.append(_lifting(m, (pair[0],)))
 
-        return _name(pair), f - 1.0, less
+        return ((_name(pair),), pair)[:1 + (kind == "fan")], f - 1.0, less  # the law of the air is a name, too
     if kind == "contact":
         inner = [pair for pair in machine.links if not ambients & set(pair) and _joins(machine, pair)]
         pair = inner[int(rng.integers(len(inner)))]
         f = float(rng.uniform(0.3, 0.6))
-        return _name(pair), f - 1.0, lambda m, day: _loosen(m, pair, f)
+        return ((_name(pair),),), f - 1.0, lambda m, day: _loosen(m, pair, f)
     if kind == "heater":
         name = str(rng.choice(list(machine.plant.heaters)))
         gain = float(rng.uniform(0.6, 0.85))
-        return name, gain - 1.0, lambda m, day: day.power.update({name: gain})
+        return ((name,),), gain - 1.0, lambda m, day: day.power.update({name: gain})
     sensor, size = str(rng.choice(list(machine.plant.sensors))), float(rng.uniform(1.0, 3.0))
     if kind == "offset":
-        return sensor, size, lambda m, day: day.added.update({sensor: np.full(N, size)})
+        return ((sensor,),), size, lambda m, day: day.added.update({sensor: np.full(N, size)})
     if kind == "sensor drifts":
-        return "", size, lambda m, day: day.added.update({sensor: size * np.linspace(0.0, 1.0, N)})
+        return (), size, lambda m, day: day.added.update({sensor: size * np.linspace(0.0, 1.0, N)})
     lump = str(rng.choice(list(zones)))
     on = np.cumsum(rng.random(N + 1) < 0.03) % 2  # a few minutes at a time
     heat = float(rng.uniform(0.05, 0.2)) * max(high for name, (_, high) in machine.limits.items()
@@ -116,7 +117,7 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator) -> tuple[str, 
         cells = zones[lump]
         Q[cells] -= heat * on[int(t / H)] / len(cells)
 
-    return "", heat, lambda m, day: day.heats.append(gusts)
+    return (), heat, lambda m, day: day.heats.append(gusts)
 
 
 def _record(machine: Machine, noise: float, rng: np.random.Generator, act: Act = _nothing, convection: bool = False
