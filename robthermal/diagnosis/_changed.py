@@ -24,6 +24,7 @@ from .change import (
     excess_of,
     held,
     pinned,
+    place_of,
     reference_of,
     searched,
     unsteady,
@@ -37,6 +38,7 @@ from .search import SearchState, ShortList
 _NOISE_ONLY = 1.5  # whitened variance
 _MOST = 0.95  # of what is outside the scatter, that changes must remove where they leave some of it
 _NAMING: tuple[Verdict, ...] = ("named", "named_with_remainder", "ambiguous")
+_COARSE = 5.0  # of the noise, that the model leaves of the reference records
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -76,6 +78,17 @@ class Compared:
     scatter: dict[str, float]
     deviation: dict[str, float]
     visible: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def caveats(self) -> tuple[str, ...]:
+        """What the remainder of the reference records says against an answer, a sentence; none if it is small."""
+        noise = math.sqrt(max(self.rms**2 - self.remainder**2, 0.0))
+        if not self.remainder > _COARSE * noise:
+            return ()
+        return (f"The model leaves {self.remainder:.2g} K of the reference records, noise would leave {noise:.2g} K. "
+                "Until it is better, effects at the same lump may stand for each other, a heat into it for a weaker "
+                "path out of it: diagnose the reference records alone first, and compare with the system that this "
+                "gives.",)
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "reference"; null for a change that is not seen at all.
@@ -143,7 +156,7 @@ def _compared(healthy: Reference, new: Refit) -> Compared:
     moved = new.v[:new.structure.n_parameters] - healthy.scatter.center
     for candidate, values in zip(new.structure.effects, new.structure.quantities(new.v), strict=True):
         if candidate.effect.name == NAME:
-            moved[ranges.members.index(candidate.where)] += values[SIZE]
+            moved[place_of(candidate.where, ranges)] += values[SIZE]
     moved = moved[:len(ranges.names)]
     deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / ranges.unit)
     return Compared(len(healthy.each), fit.rms, float(np.sqrt(beyond)), healthy.relative,

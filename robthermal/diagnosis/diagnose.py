@@ -214,10 +214,10 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
 
 
 def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
-    """With what the reference records say, and how large a change would have been seen."""
-    visible = visible_in_words(compared.visible)
-    return replace(found, reference=compared, caveats=(*found.caveats, *visible),
-                   outcome=replace(found.outcome, text=" ".join([found.outcome.text, *visible])))
+    """With what the reference records say: how large a change would have been seen, or how good the model is."""
+    said = visible_in_words(compared.visible) if found.verdict == "consistent" else compared.caveats
+    return replace(found, reference=compared, caveats=(*found.caveats, *said),
+                   outcome=replace(found.outcome, text=" ".join([found.outcome.text, *said])))
 
 
 def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:

@@ -6,6 +6,7 @@ from ._held import Held as Held
 from ._parameter_change import NAME as NAME
 from ._parameter_change import SIZE as SIZE
 from ._parameter_change import parameter_changes as parameter_changes
+from ._parameter_change import place_of as place_of
 from ._parameter_change import relative as relative
 from ._reference import Reference as Reference
 from ._reference import held as held
@@ -20,5 +21,5 @@ from ._visible import visible_changes as visible_changes
 from ._yardstick import effective_number as effective_number
 
 __all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "Visible", "effective_number", "excess_of",
-           "held", "parameter_changes", "pinned", "random_effects", "reference_of", "relative", "searched", "unsteady",
-           "visible_changes"]
+           "held", "parameter_changes", "pinned", "place_of", "random_effects", "reference_of", "relative", "searched",
+           "unsteady", "visible_changes"]

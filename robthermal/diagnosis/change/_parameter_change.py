@@ -20,6 +20,9 @@ _ROOM = 2.0  # factor about a changed number that its range in the fit table lea
 def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
     """One candidate per parameter of the fit that may change; tied parameters change together.
 
+    Where air takes heat beside a conductance, another law between the same parts, the whole path may change as well:
+    dust and a cover reduce both.
+
     Parameters
     ----------
     system : System
@@ -27,8 +30,32 @@ def parameter_changes(system: System, ranges: Ranges) -> list[Candidate]:
     ranges : Ranges
         Parameters that were fitted.
     """
-    return [Candidate(_effect(members), members) for members in ranges.members
-            if all(system.parameter(name) for name in members)]
+    groups = [members for members in ranges.members if all(system.parameter(name) for name in members)]
+    paths = [(*members, *beside) for members in groups if (beside := _beside(system, members))]
+    return [Candidate(_effect(members), members) for members in [*groups, *paths]]
+
+
+def place_of(where: tuple[str, ...], ranges: Ranges) -> int:
+    """Place of the parameter of the fit that a `parameter_change` changes, alone or with others.
+
+    Parameters
+    ----------
+    where : tuple of str
+        Of the change.
+    ranges : Ranges
+        Parameters that were fitted.
+    """
+    return next(i for i, members in enumerate(ranges.members) if set(members) <= set(where))
+
+
+def _beside(system: System, members: tuple[str, ...]) -> tuple[str, ...]:
+    """Gains of natural convection between the parts that the link of a conductance joins."""
+    joined = {frozenset(link.between) for link in system.links if f"links.{link.name}.conductance" in members}
+    if len(joined) != 1:
+        return ()
+    beside = [f"links.{link.name}.natural.gain" for link in system.links
+              if frozenset(link.between) in joined and link.natural and link.natural.gain > 0]
+    return tuple(name for name in beside if name not in members)
 
 
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:

@@ -45,7 +45,8 @@ _PINNED = 1e3  # times as certain as the scatter says: fixed, with the same unkn
 _WIDEST = 0.1  # relative scatter of a parameter from one new record to another
 _OF_RECORD = (".temperature", ".initial")  # numbers that are each record's own
 _FARTHEST = 6.0  # factor from its value within which a number stays that the fit table leaves out
-_OF_MACHINE = (".capacity", ".conductance", ".conductance.value", ".seebeck.value", ".resistance.value")
+_OF_MACHINE = (".capacity", ".conductance", ".natural.gain", ".conductance.value", ".seebeck.value",
+               ".resistance.value")
 
 
 @dataclass(frozen=True, eq=False)

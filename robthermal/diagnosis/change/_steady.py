@@ -12,7 +12,7 @@ from ..evidence import score_candidates, wandering
 from ..fit import Refit
 from ..search import Accepted, refit_short_list
 from ._excess import louder
-from ._parameter_change import GAIN, NAME
+from ._parameter_change import GAIN, NAME, place_of
 from ._reference import Reference
 from ._scatter import ASSUMED
 from ._yardstick import with_held_shape
@@ -65,6 +65,6 @@ def _on_healthy(candidate: Candidate, reference: Reference) -> list[float]:
 def _scatter_of(candidate: Candidate, reference: Reference) -> float:
     """Standard deviation of the size on healthy days, if it is the factor of a number of the machine; else 0."""
     if candidate.effect.name == NAME:
-        at = reference.listed.members.index(candidate.where)
+        at = place_of(candidate.where, reference.listed)
         return float(reference.scatter.std[at] / reference.listed.unit[at])
     return ASSUMED if candidate.effect.name == GAIN else 0.0

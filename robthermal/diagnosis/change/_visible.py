@@ -61,8 +61,8 @@ def visible_changes(new: Refit, reference: Reference, found: Search) -> tuple[Vi
     for scores, alpha in families(found.scores):
         family = effective_number(scores.signatures, n)
         for i, candidate in enumerate(scores.candidates):
-            if candidate.effect.name not in (NAME, GAIN):
-                continue
+            if candidate.effect.name != GAIN and candidate.where not in new.structure.ranges.members:
+                continue  # neither a parameter nor a gain
             kappa, freedom = inflation(candidate, reference.each, new.n_readings), freedom_of(n)
             seen = math.sqrt(kappa * f_isf(alpha / family, 1, freedom))  # distance that the test asks for, then
             needed = seen + math.sqrt(kappa) * float(t_isf(1.0 - _POWER, freedom))  # that which scatter may take off
