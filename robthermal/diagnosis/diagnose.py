@@ -23,6 +23,7 @@ from ._doubts import (
     place_undecided,
     within_the_body,
 )
+from ._finer_network import unless_finer
 from ._graded import graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
@@ -162,6 +163,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
 def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> Judged:
     """Search, verdict, and where something is left beyond the noise the graded verdict."""
     judged = lasting_beyond_steps(judge(searched(nominal, names, validation, progress), validation, progress))
+    judged = unless_finer(judged)
     return graded(reconsider_noise(judged, validation), validation, progress)
 
 
