@@ -15,6 +15,7 @@ from ._joint import JointProblem
 
 _SAMPLES = 10  # of a mean, for the example
 _LITTLE = 5e-4  # relative change of a parameter that is not worth a word
+_FAR = 3.0  # residuals of so many times the declared noise are more than a declaration somewhat too low
 
 
 def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
@@ -51,6 +52,33 @@ def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
         yield ("The records hold means, which are late or early by up to half a sample of the logger; that is not "
                "estimated here." + (f" If they are late and of {_SAMPLES} samples each, {moved} than it is." if moved
                                     else "") + " `robthermal diagnose` estimates it beside the parameters.")
+    yield from _beyond_noise(joint, v)
+
+
+def _beyond_noise(joint: JointProblem, v: Floats) -> Iterator[str]:
+    """Residuals far above what the declared noise, and the disturbance where a filter weighs it, explain.
+
+    An undeclared noise is estimated from the residuals and tells nothing about them.
+    """
+    problem = joint.records
+    squares: dict[str, list[Floats]] = {}
+    white: dict[str, list[Floats]] = {}
+    for one, r, weigh in zip(problem.data, problem.residuals(v), problem.weigh, strict=True):
+        whitened = weigh(r)
+        for i, name in enumerate(one.sensors):
+            squares.setdefault(name, []).append(r[:, i] ** 2)
+            white.setdefault(name, []).append(whitened[:, i] ** 2)
+    times = {name: float(np.sqrt(np.nanmean(np.concatenate(parts)))) for name, parts in white.items()}
+    far = sorted((name for name in times if times[name] > _FAR), key=lambda name: -times[name])
+    if not far:
+        return
+    worst, unit = far[0], problem.system.sensor_units.get(far[0], "K")
+    left = float(np.sqrt(np.nanmean(np.concatenate(squares[worst]))))
+    others = f", and at {_listed(far[1:])}, likewise," if far[1:] else ""
+    yield (f"At {worst}{others} the model leaves far more than the declared noise explains: {left:.2g} {unit}, "
+           f"{times[worst]:.0f} times as much. It lacks something, which the parameters make up for as far as they "
+           "can; their standard deviations do not say by how much. `robthermal diagnose` looks for what is missing; "
+           "if nothing is, the noise is declared too low.")
 
 
 def _most_moved(joint: JointProblem, v: Floats, changes: Sequence[NDArray[Any]]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
@@ -25,10 +26,11 @@ def warm() -> list[rt.Record]:
 
 def test_an_ambient_that_was_not_recorded_is_said_with_what_it_does(warm: list[rt.Record]) -> None:
     fit = rt.calibrate(model(both=True), warm)
-    (said,) = fit.remarks
+    said, beyond = fit.remarks
+    assert beyond.startswith("At ") and "far more than the declared noise explains" in beyond
     assert "No record holds the temperature of room: it was taken to be 21.85 °C all the time" in said
     assert f'"{ROOM_NUMBER}" under [fit]' in said and "Record it as a column" in said
-    assert said in str(fit) and fit.to_dict()["remarks"] == [said] and said in unescape(fit._repr_html_())
+    assert said in str(fit) and fit.to_dict()["remarks"] == [said, beyond] and said in unescape(fit._repr_html_())
     better = rt.calibrate(model(both=True), records(room=ROOM + 1.0, both=True, recorded=True))
     assert better.remarks == ()
     share, way = re.search(r"With 1 K more the conductance of link block-room comes out (\d+) % (\w+)", said).groups()
@@ -72,7 +74,7 @@ def test_late_means_are_said_with_what_they_do() -> None:
     ranges = {"lumps.bar.capacity": (10.0, 500.0), "links.bar-room.conductance": (0.1, 5.0)}
     late, even = (rt.calibrate(system, late_means(400, 20.0, which), parameters=ranges) for which in (True, False))
     assert even.parameters["lumps.bar.capacity"] == pytest.approx(100.0, rel=1e-3)
-    said = late.remarks[-1]
+    (said,) = (one for one in late.remarks if "hold means" in one)
     (size,) = re.findall(r"late and of 10 samples each, the heat capacity of bar comes out ([\d.]+) % higher", said)
     truly = late.parameters["lumps.bar.capacity"] / even.parameters["lumps.bar.capacity"] - 1.0
     assert truly > 0.002 and 0.01 * float(size) == pytest.approx(truly, rel=0.15)
@@ -87,3 +89,28 @@ def test_the_verdict_of_a_job_says_so(tmp_path: Path) -> None:
     result = rt.jobs.run_job(rt.jobs.read_project(write_project(tmp_path, table, system=SYSTEM, project=PROJECT)))
     (one,) = [one for one in result.reasons if one.code == "ambient_not_recorded"]
     assert one.level == "remark" and one.about == "room" and "taken to be 20 °C" in one.text
+
+
+def test_what_a_model_leaves_beyond_the_declared_noise_is_said() -> None:
+    system = model(both=True)
+    exact = records(room=ROOM, both=True, recorded=True)
+    assert rt.calibrate(system, exact).remarks == ()
+    bent = [replace(one, outputs=one.outputs + 2.0 * np.sin(np.arange(len(one)) / 40.0)[:, None]) for one in exact]
+    (said,) = rt.calibrate(system, bent).remarks
+    left, times = map(float, re.search(r"explains: ([\d.]+) K, (\d+) times", said).groups())
+    fit = rt.calibrate(system, bent)
+    worst = said.split()[1].rstrip(",")
+    assert left == pytest.approx(fit.rmse[worst], rel=0.05)
+    assert times == pytest.approx(left / system.sensors[worst].noise, rel=0.05)
+    assert "`robthermal diagnose`" in said and "standard deviations do not say" in said
+
+
+def test_an_undeclared_noise_is_estimated_and_nothing_is_beyond_it() -> None:
+    system = rt.System(ambients={"room": {"temperature": ROOM}}, lumps={"bar": {"capacity": 90.0}},
+                       links=[{"between": ("bar", "room"), "conductance": 0.6}], inputs={"q": {"lump": "bar"}},
+                       sensors={"T": {"lump": "bar"}})
+    ranges = {"lumps.bar.capacity": (10.0, 500.0), "links.bar-room.conductance": (0.1, 5.0)}
+    one = replace(late_means(400, 20.0, False), averaged=False)
+    fit = rt.calibrate(system, replace(one, outputs=one.outputs + np.sin(np.arange(len(one)) / 20.0)[:, None]),
+                       parameters=ranges)
+    assert not any("far more than the declared noise" in said for said in fit.remarks)
