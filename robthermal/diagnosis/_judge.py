@@ -75,6 +75,8 @@ class Judged:
         Whether new records were compared with those of a healthy machine.
     means : str
         What the records would be if their values were means over a step; empty where that explains nothing.
+    finer : str
+        That a finer network explains the records as well as the one effect named; empty where it does not.
     """
 
     state: SearchState
@@ -87,6 +89,7 @@ class Judged:
     why: str = ""
     compared: bool = False
     means: str = ""
+    finer: str = ""
 
     def __str__(self) -> str:
         return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else

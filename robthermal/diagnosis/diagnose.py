@@ -233,7 +233,7 @@ def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
 def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     """What to hold against the answer."""
     state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
-    said = [judged.means] if judged.means else []
+    said = [one for one in (judged.means, judged.finer) if one]
     said += nothing_fitted(nominal, verdict)
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)

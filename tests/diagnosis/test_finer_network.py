@@ -29,3 +29,14 @@ def test_an_effect_beside_slight_coarseness_is_named(monkeypatch: pytest.MonkeyP
     one = cases.made(cases.Case("housing", "hidden", "missing_link", 301))
     found = rt.diagnose(one.system, one.train, validation=one.unseen)
     assert [(effect.effect, effect.where) for effect in found.effects] == [truth[:2] for truth in one.truth]
+    assert not found.caveats
+
+
+def test_one_effect_that_a_finer_network_makes_up_for_keeps_its_name_with_a_caveat(monkeypatch: pytest.MonkeyPatch
+                                                                                   ) -> None:
+    """Nothing is hidden in this stack; its whitened variance is 1.09."""
+    monkeypatch.setattr(cases, "DISCRETE", (1.03, 1.3))
+    one = cases.made(cases.Case("stack", "nothing", "nothing", 322))
+    found = rt.diagnose(one.system, one.train, validation=one.unseen)
+    assert any("the network may be too coarse instead" in said for said in found.caveats)
+    assert "the network may be too coarse instead" in found.outcome.text

@@ -127,6 +127,14 @@ def test_the_file_holds_what_the_contract_asks_for():
     assert [set(place) for place in rest["where"]] == [{"lump", "share"}] * len(rest["where"])
 
 
+def test_an_error_that_is_within_the_noise_on_validation_records_is_not_the_one_that_is_said():
+    """Noise of the validation records hides what is left of the training records: no "0 K is not explained"."""
+    rest = diagnosed("nothing", "nothing", 0).remainder
+    hidden = replace(rest, gaps={**rest.gaps, "validation": replace(rest.gaps["validation"], rms=0.0)})
+    assert str(hidden).startswith(f"{rest.gaps['train'].rms:.2g} K of the error on the training records")
+    assert str(rest).startswith(f"{rest.gaps['validation'].rms:.2g} K of the error on the validation records")
+
+
 def test_a_gap_without_excess_is_explained():
     assert left(rt.diagnosis.Gap(3.0, 2.0, 1.0)).share_explained == pytest.approx(5.0 / 8.0)
     assert left(rt.diagnosis.Gap(3.0, 0.9, 1.0)).rms == 0.0

@@ -78,7 +78,7 @@ class Remainder:
 
     def __str__(self) -> str:
         """How much, at which sensor and lump, in which band, and whether a single period."""
-        seen = "validation" if "validation" in self.gaps else "train"
+        seen = "validation" if "validation" in self.gaps and self.gaps["validation"].rms else "train"
         sensor = max(self.sensors, key=lambda name: self.sensors[name])
         kind = "validation records" if seen == "validation" else self.trained
         lump, share = self.where[0]
