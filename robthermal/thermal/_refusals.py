@@ -66,7 +66,8 @@ def refusal(error: ValidationError) -> InputError:
     expected = _EXPECTED.get(kind, fault["msg"]).format(**fault.get("ctx", {}))
     if expected == "a table" and len(fault["loc"]) > 1:
         expected = "a table with the keys " + ", ".join(_known(fault["loc"]))
-    return InputError(f"{key} = {shown}" if key else f"it is {shown}", where=place, expected=expected, remedy=_remedy(kind, key, fault))
+    return InputError(f"{key} = {shown}" if key else f"it is {shown}", where=place, expected=expected,
+                      remedy=_remedy(kind, key, fault))
 
 
 def _place(loc: tuple[int | str, ...]) -> tuple[str, str]:

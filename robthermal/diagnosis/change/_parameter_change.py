@@ -59,8 +59,22 @@ def _beside(system: System, members: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
-    factor = math.exp(values[SIZE])
-    changed = {name: system.parameter(name) * factor for name in where}
+    return changed_by(system, where, values[SIZE])
+
+
+def changed_by(system: System, where: tuple[str, ...], logarithm: float) -> System:
+    """System with some numbers times a factor.
+
+    Parameters
+    ----------
+    system : System
+        System of the reference records.
+    where : tuple of str
+        Names of the numbers.
+    logarithm : float
+        Of the factor.
+    """
+    changed = {name: system.parameter(name) * math.exp(logarithm) for name in where}
     return _with_wider_fit(system.with_parameters(changed), changed)
 
 
@@ -92,7 +106,8 @@ def relative(values: Mapping[str, tuple[float, float, str]]) -> dict[str, tuple[
         Quantities of a `parameter_change` with standard deviation and unit.
     """
     value, std, unit = values[SIZE]
-    return {"relative": (math.expm1(value), std * math.exp(value), unit)}
+    others = {name: one for name, one in values.items() if name != SIZE}
+    return {"relative": (math.expm1(value), std * math.exp(value), unit), **others}
 
 
 def says_again(candidate: Candidate, system: System, ranges: Ranges) -> bool:

@@ -18,6 +18,7 @@ from ._excess import excess_of
 from ._held import healthy_point
 from ._parameter_change import NAME, parameter_changes, relative, says_again
 from ._reference import Reference
+from ._still_air import with_still_air
 from ._yardstick import chance, effective_number, inflation, squares, within_scatter
 
 Key = tuple[str, tuple[str, ...]]
@@ -175,7 +176,7 @@ def _entries(fit: Refit, scores: Scores) -> list[Entry]:
         other = best.get(entry.candidate.key)
         if other is None or entry.fit.rss < other.fit.rss:
             best[entry.candidate.key] = entry
-    return list(best.values())
+    return [with_still_air(entry) for entry in best.values()]
 
 
 def _trials(candidate: Candidate, fit: Refit) -> float:

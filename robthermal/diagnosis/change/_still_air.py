@@ -1,0 +1,72 @@
+"""A conductance to an ambient that falls because the air stands still: it grows with the difference from then on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ...errors import Diverged, InputError
+from ...thermal import Link, Natural, System
+from ..effects import Quantity
+from ..evidence import BIC_GAP
+from ..fit import Refit, extended
+from ..search import Entry
+from ._parameter_change import NAME, SIZE, changed_by
+
+EXPONENT = "exponent"
+DIFFERENCE = 10.0  # K, at which the relative change is meant
+_LAMINAR = 0.25  # of the difference, for the conductance
+_WHOLE = 0.2  # of the logarithm of the factor: at twice that 2 % of the former law are left
+_MOST = 1.0 - 1e-6  # share of the new law: a conductance stays above zero
+_FALLS = -0.3  # logarithm of the factor at or below which a conductance may be that of still air
+
+
+def with_still_air(entry: Entry) -> Entry:
+    """The same change of a parameter where the air stands still, if that explains more; else as it was.
+
+    Parameters
+    ----------
+    entry : Entry
+        A candidate refitted.
+    """
+    candidate, structure = entry.candidate, entry.fit.structure
+    place = len(structure.effects) - 1
+    if candidate.effect.name != NAME or _size(entry.fit) > _FALLS or not _link_of(
+            structure.system(entry.fit.v), candidate.where):
+        return entry
+    form = replace(candidate, shape={EXPONENT: _LAMINAR}, effect=replace(
+        candidate.effect, add=_add, quantities=(
+            *candidate.effect.quantities, Quantity(EXPONENT, "-", _LAMINAR, _LAMINAR, grid=(_LAMINAR,)))))
+    try:
+        fit = extended(entry.fit, replace(structure, effects=(*structure.effects[:place], form)), entry.fit.v)
+    except (Diverged, InputError):
+        return entry
+    clear = fit.rss + BIC_GAP < entry.fit.rss and _size(fit) < _FALLS
+    return replace(entry, candidate=form, fit=fit) if clear else entry
+
+
+def _size(fit: Refit) -> float:
+    """Logarithm of the factor that the last effect is."""
+    return fit.structure.quantities(fit.v)[-1][SIZE]
+
+
+def _link_of(system: System, where: tuple[str, ...]) -> Link | None:
+    """The link to an ambient whose conductance is changed, if nothing else takes heat along it."""
+    for link in system.links:
+        if where == (f"links.{link.name}.conductance",) and any(end in system.ambients for end in link.between):
+            plain = not (link.natural or link.radiation or link.step or link.follow)
+            return link if plain else None
+    return None
+
+
+def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
+    """Conductance G e^s (|dT| / 10 K)^(1/4), with a share of the former law that is gone for s < -0.4."""
+    link = _link_of(system, where)
+    assert link is not None
+    share = _MOST * -math.expm1(-(min(values[SIZE], 0.0) / _WHOLE) ** 2)
+    changed = changed_by(system, where, values[SIZE] + math.log1p(-share))
+    gain = link.conductance * math.exp(values[SIZE]) * share / DIFFERENCE**values[EXPONENT]
+    natural = Natural(gain=gain, exponent=values[EXPONENT])
+    return changed.model_copy(update={"links": tuple(
+        one.model_copy(update={"natural": natural}) if one.name == link.name else one for one in changed.links)})
