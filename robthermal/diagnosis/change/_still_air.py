@@ -16,7 +16,7 @@ from ._parameter_change import NAME, SIZE, changed_by
 
 EXPONENT = "exponent"
 DIFFERENCE = 10.0  # K, at which the relative change is meant
-_LAMINAR = 0.25  # of the difference, for the conductance
+_LAMINAR, _STEEPEST = 0.25, 0.5  # power of the difference: where it starts, and the largest (turbulent: 1/3)
 _WHOLE = 0.2  # of the logarithm of the factor: at twice that 2 % of the former law are left
 _MOST = 1.0 - 1e-6  # share of the new law: a conductance stays above zero
 _FALLS = -0.3  # logarithm of the factor at or below which a conductance may be that of still air
@@ -37,12 +37,15 @@ def with_still_air(entry: Entry) -> Entry:
         return entry
     form = replace(candidate, shape={EXPONENT: _LAMINAR}, effect=replace(
         candidate.effect, add=_add, quantities=(
-            *candidate.effect.quantities, Quantity(EXPONENT, "-", _LAMINAR, _LAMINAR, grid=(_LAMINAR,)))))
+            *candidate.effect.quantities, Quantity(EXPONENT, "-", 0.0, _STEEPEST, grid=(_LAMINAR,)))))
     try:
-        fit = extended(entry.fit, replace(structure, effects=(*structure.effects[:place], form)), entry.fit.v)
+        with_law = replace(structure, effects=(*structure.effects[:place], form))
+        values = structure.quantities(entry.fit.v)
+        start = with_law.carried(structure, entry.fit.v, [*values[:place], {**values[place], EXPONENT: _LAMINAR}])
+        fit = extended(entry.fit, with_law, start)
     except (Diverged, InputError):
         return entry
-    clear = fit.rss + BIC_GAP < entry.fit.rss and _size(fit) < _FALLS
+    clear = fit.rss + math.log(fit.n_readings) + BIC_GAP < entry.fit.rss and _size(fit) < _FALLS
     return replace(entry, candidate=form, fit=fit) if clear else entry
 
 
@@ -61,7 +64,7 @@ def _link_of(system: System, where: tuple[str, ...]) -> Link | None:
 
 
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
-    """Conductance G e^s (|dT| / 10 K)^(1/4), with a share of the former law that is gone for s < -0.4."""
+    """Conductance G e^s (|dT| / 10 K)^n, with a share of the former law that is gone for s < -0.4."""
     link = _link_of(system, where)
     assert link is not None
     share = _MOST * -math.expm1(-(min(values[SIZE], 0.0) / _WHOLE) ** 2)

@@ -16,8 +16,12 @@ def change_in_words(found: Found) -> str:
     """
     value, std, _ = found.values["relative"]
     names = " and ".join(map(parameter_in_words, found.where))
+    still = ""
+    if "exponent" in found.values:
+        still = (f" at a difference of 10 K, and now grows with the difference to the power "
+                 f"{found.values['exponent'][0]:.2f} (air that stands still: 0.25 to 0.33)")
     return (f"{names} {'is' if len(found.where) == 1 else 'are'} {100 * abs(value):.0f} % "
-            f"{'lower' if value < 0 else 'higher'} (± {100 * std:.0f} %)")
+            f"{'lower' if value < 0 else 'higher'} (± {100 * std:.0f} %){still}")
 
 
 def gain_in_words(found: Found) -> str:

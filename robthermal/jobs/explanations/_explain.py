@@ -23,7 +23,9 @@ _CHANGE = Explanation("parameter_change", "effect",
                       ("A parameter of [fit] has another value on the new records than on the reference records, by "
                        "more than healthy records scatter.",),
                       {"Acts on": ("parameter of [fit]; tied parameters together",),
-                       "Quantities": ("relative [-], the change over the value on a healthy day",)},
+                       "Quantities": ("relative [-], the change over the value on a healthy day",
+                                      "exponent [-], where a conductance to an ambient has become that of still air: "
+                                      "it grows with this power of the difference, and the change is that at 10 K")},
                       "docs/explanations/diagnosis_change.md")
 _DRIFT = Explanation("ambient_drift", "effect",
                      ("An ambient that a record does not hold is not the constant of the system: it swings or drifts. "
