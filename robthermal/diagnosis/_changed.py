@@ -221,9 +221,9 @@ def _verdict(found: Search, excess: Excess, gaps: Sequence[Gap], short: bool,
         return "ambiguous", DiagnosisCode.AMBIGUOUS.outcome("The new records cannot distinguish some changes.")
     if (reasons or not bare) and any(left(gap).rms for gap in gaps):
         return "named_with_remainder", DiagnosisCode.NAMED_WITH_REMAINDER.outcome(
-            "One change explains what is outside the scatter of the reference records; what is left beyond the noise "
-            f"is stated, and has no name. {reasons}".rstrip())
-    return "named", DiagnosisCode.NAMED.outcome("One change explains the new records.")
+            "One set of changes explains what is outside the scatter of the reference records; what is left beyond the "
+            f"noise is stated, and has no name. {reasons}".rstrip())
+    return "named", DiagnosisCode.NAMED.outcome("One set of changes explains the new records.")
 
 
 def _nothing_explains(healthy: Reference) -> str:

@@ -127,3 +127,21 @@ def test_a_covered_sink_changes_both_its_paths_to_the_room() -> None:
     assert ("parameter_change", ("links.sink-room.conductance", "links.air.natural.gain")) in names
     assert rt.diagnose(system, covered(8, 1.0), reference=[covered(seed, 1.0) for seed in (1, 2, 3)]
                        ).verdict == "consistent"
+
+
+def test_a_size_that_ends_at_its_bound_does_not_rule_out_its_neighbors() -> None:
+    """Side to bottom "broken off" explained a failed fan below the bottom, which no sensor sees, a little better."""
+    one = days(Change("housing", "fan", 108))
+    found = rt.diagnose(one.system, one.new, reference=one.healthy)
+    assert found.verdict == "ambiguous"
+    (names,) = [[(effect.effect, effect.where), *others]
+                for effect, others in zip(found.effects, found.alternatives, strict=True)]
+    assert any(where in one.truth for _, where in names)
+
+
+def test_a_fan_that_stands_still_leaves_the_law_of_still_air() -> None:
+    """A sink of a stack: 250 cells and more; before, a heat into the sink came nearest, and no name."""
+    one = days(Change("stack", "fan", 102))
+    found = rt.diagnose(one.system, one.new, reference=one.healthy)
+    assert [effect.where for effect in found.effects] == [one.truth[0]] and not any(found.alternatives)
+    assert 0.1 < found.effects[0].values["exponent"][0] < 0.4

@@ -27,6 +27,8 @@ _ALPHA_PARAMETERS, _ALPHA_CATALOG = 0.03, 0.01  # family-wise
 _WORTH_SAYING = 0.2  # chance of the best candidate that is no answer
 _SAID = 3  # of those
 _HOPE = 2.0  # times what the linearization promises: a refit may gain over it
+_NEAR = 1e-3  # of a bound: at it
+_UNSURE = 3.0  # times the difference to rivals that is asked of a size that ends at its bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +118,19 @@ def _one(fit: Refit, tried: Sequence[_Tried], reference: Reference) -> Accepted 
     if not sure:
         return None
     best = max(sure, key=lambda one: one.entry.delta_bic)
+    kappa = best.kappa * (_UNSURE if _at_bound(best.entry) else 1.0)
     rivals = (one for one in tried if one is not best and not _more_general(one.entry, best.entry)
-              and within_scatter(best.entry.delta_bic - one.entry.delta_bic, best.kappa, len(reference.each)))
+              and within_scatter(best.entry.delta_bic - one.entry.delta_bic, kappa, len(reference.each)))
     accepted = replace(best.entry, fit=relinearized(best.entry.fit))
     return Accepted(fit, best=accepted, contenders=tuple(sorted((one.entry for one in rivals),
                                                                   key=lambda entry: -entry.delta_bic)))
+
+
+def _at_bound(entry: Entry) -> bool:
+    """Whether the size is the largest that is tried: what the records tell of it is that it is large."""
+    size = entry.candidate.effect.size
+    value = entry.values[size.name][0]
+    return not size.lower + _NEAR * abs(size.lower) < value < size.upper - _NEAR * abs(size.upper)
 
 
 def _nearest(tried: Sequence[_Tried], n_records: int) -> str:

@@ -20,9 +20,9 @@ _SENTENCE = {
     "unexplained": "None of the known effects explains the records.",
 }
 _CHANGED = {
-    "named": "One change explains the new records: {names}.",
-    "named_with_remainder": "One change explains what is outside the scatter of the reference records: {names}. What "
-                            "is left beyond the noise is stated, and has no name.",
+    "named": "One set of changes explains the new records: {names}.",
+    "named_with_remainder": "One set of changes explains what is outside the scatter of the reference records: "
+                            "{names}. What is left beyond the noise is stated, and has no name.",
     "ambiguous": "Changes explain the new records, but other ones do as well: {names}.",
     "consistent": "The new records are within the scatter of the reference records: nothing has changed that they "
                   "would show.",
