@@ -168,9 +168,9 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     state = SearchState(nominal=before, names=None, scores=found.scores, fit=fit if found.rounds else exact(before),
                         current=found.scores, short=ShortList(fit, (), {}), rounds=found.rounds, complete=True)
     held_out = validation.predicted(before, state.fit)
-    excess, bare_excess = excess_of(fit, healthy), excess_of(new, healthy)
+    excess = excess_of(fit, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
-    why = _short_of(excess, excess.removed(bare_excess), gaps[1:])
+    why = _short_of(excess, excess.removed(excess_of(before, healthy)), gaps[1:])
     verdict, outcome = _verdict(found, excess, gaps, bool(why), healthy, _bare(fit, healthy))
     moving = unsteady(fit, found.rounds, healthy) if verdict in _NAMING else []
     if moving:

@@ -339,3 +339,18 @@ def test_a_column_that_heats_nothing_and_a_module_change_by_their_drive() -> Non
     assert found.verdict == "consistent" and found.reference is not None  # the same misfit on all days
     names = [name for name in found.reference.visible if "gain" in name]
     assert sorted(names) == ["inputs.fan.drive.gain", "inputs.heater.gain"]
+
+
+def test_a_fan_beside_a_path_that_no_file_has_is_named(rig: rt.System) -> None:
+    """What is left without bending other parameters is what a change has to explain: 6.3 K fall to 0.5 K."""
+    old = [record(1_101_000 + i, Day(loss=0.15)) for i in range(3)]
+    found = rt.diagnose(rig, record(1_101_999, Day({"fan": 0.5}, loss=0.15)), reference=old)
+    assert [(one.effect, one.where) for one in found.effects] == [("parameter_change", (FAN,))]
+    assert found.gap["train"].before > 5.0 > 1.0 > found.gap["train"].after
+
+
+def test_what_was_added_first_is_no_part_of_the_reference_records(rig: rt.System) -> None:
+    """Natural convection came first and its gain was to change next, on records that have none: bad input, exit 2."""
+    old = [record(1_120_000 + i) for i in range(3)]
+    found = rt.diagnose(rig, record(1_120_999, Day(draught=1.0)), reference=old)
+    assert found.verdict == "unexplained" and not found.effects

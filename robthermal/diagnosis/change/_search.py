@@ -86,11 +86,12 @@ def searched(new: Refit, reference: Reference, names: Iterable[str] | None) -> S
 
 
 def _tested(fit: Refit, ranges: Ranges, names: Sequence[str] | None) -> list[Candidate]:
-    """Changes of listed parameters, and what the catalog adds to them."""
-    system = fit.system
-    listed = [one for one in fit.testable(candidates(system, names, fit.drifting))
-              if not says_again(one, system, ranges)]
-    return [*parameter_changes(system, ranges), *listed]
+    """Changes of listed parameters, and what the catalog adds to them, of parts that the reference records have too."""
+    base = fit.structure.base
+    there = {one.key for one in candidates(base, names, fit.drifting)}
+    listed = [one for one in fit.testable(candidates(fit.system, names, fit.drifting))
+              if one.key in there and not says_again(one, fit.system, ranges)]
+    return [*parameter_changes(base, ranges), *listed]
 
 
 def _all_refitted(fit: Refit, scores: Scores, reference: Reference) -> list[_Tried]:
