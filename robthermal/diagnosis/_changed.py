@@ -170,7 +170,8 @@ def _judged(found: Search, new: Refit, healthy: Reference, validation: Validatio
     held_out = validation.predicted(before, state.fit)
     excess = excess_of(fit, healthy)
     gaps = [Gap(before.rms, fit.rms, expected_rms(exact(fit)))] + ([] if held_out is None else [held_out.gap])
-    why = _short_of(excess, excess.removed(excess_of(before, healthy)), gaps[1:])
+    listed = all(round_.best.candidate.effect.name == NAME for round_ in found.rounds)
+    why = _short_of(excess, excess.removed(excess_of(before if listed else new, healthy)), gaps[1:])
     verdict, outcome = _verdict(found, excess, gaps, bool(why), healthy, _bare(fit, healthy))
     moving = unsteady(fit, found.rounds, healthy) if verdict in _NAMING else []
     if moving:
