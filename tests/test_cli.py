@@ -559,6 +559,13 @@ def test_calibrate_says_no_where_the_data_leave_it_open(run: Run, system: Path, 
     assert "not determined" in done.out
 
 
+def test_a_calibrated_system_is_named_as_one(run: Run, system: Path, record: Path, tmp_path: Path) -> None:
+    """Without .toml every later command would take it for a record."""
+    before = everything(tmp_path)
+    done = run("calibrate", system, record, "--out", tmp_path / "fitted")
+    assert done.status == 2 and "fitted.toml" in done.err and everything(tmp_path) == before
+
+
 def test_simulation_that_runs_away_says_no(run: Run, tmp_path: Path) -> None:
     loose = write(tmp_path / "loose.toml", changed("current_limits = [-3.3, 3.3]", ""))
     rows = HEADER + "".join(f"{i},60,22,22,22\n" for i in range(2000))

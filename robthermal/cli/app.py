@@ -36,6 +36,7 @@ from .terminal import (
     reading,
     say,
     show_report,
+    system_place,
     there,
 )
 
@@ -170,7 +171,7 @@ def calibrate(system: SystemFile,
                   help="Training records, frequency responses from `robthermal frf`, or both.", metavar="TRAIN.csv")],
               validation: Annotated[list[Path] | None, typer.Option(
                   "--validation", help="Held-out record or response, may repeat.", metavar="FILE")] = None,
-              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=place)] = Path(
+              out: Annotated[Path, typer.Option("--out", help="Calibrated system file.", callback=system_place)] = Path(
                   "calibrated.toml"),
               max_iterations: Annotated[int, typer.Option(help="A fit that needs more has not converged.")] = 200,
               median_filter: MedianFilter = None,

@@ -92,6 +92,15 @@ def place(file: Path | None) -> Path | None:
     return file
 
 
+def system_place(file: Path) -> Path:
+    """As `place`, for a system file: commands take a file for a record or a system by its name."""
+    if file.suffix.lower() != ".toml":
+        raise typer.BadParameter(f"{file.name!r} is to be a system file: give it a name that ends in .toml, as "
+                                 f"{file.with_suffix('.toml').name}")
+    place(file)
+    return file
+
+
 def free(out: Path) -> None:
     """Refuse a folder with other things in it before the work; an earlier result there is replaced, and said."""
     rt.jobs.folder.check_free(out)
