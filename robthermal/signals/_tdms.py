@@ -13,9 +13,9 @@ from ..errors import InputError
 from ._checks import Array
 from ._source import refuse_large
 
-# What npTDMS raises for damaged files, by what its parser trips over. NotImplementedError: data it does not know.
-# OverflowError: a damaged place in the file, or a damaged date.
-_DAMAGED = (ValueError, KeyError, OSError, OverflowError, struct.error, NotImplementedError)
+# What npTDMS raises where the bytes are not those of the format. OverflowError: a place in the file, or a date.
+_DAMAGED = (ValueError, KeyError, OverflowError, struct.error)
+_READING = (*_DAMAGED, OSError, NotImplementedError)  # also: the disk or the rights to it; data that npTDMS lacks
 
 
 class TdmsSource:
@@ -29,8 +29,8 @@ class TdmsSource:
             described = nptdms.TdmsFile.read_metadata(path)
             self._group = {channel.name: group.name for group in described.groups() for channel in group.channels()}
             found = [channel for group in described.groups() for channel in group.channels()]
-        except _DAMAGED as error:
-            raise InputError(f"this is no TDMS file ({error})", where=f"{path}") from error
+        except _READING as error:
+            raise _refusal(error, "this is no TDMS file", path) from error
         if not found:
             raise InputError("this is no TDMS file, or it holds no channels", where=f"{path}")
         refuse_large(path, 8.0 * sum(len(channel) for channel in found), "bytes unpacked", max_bytes)
@@ -50,8 +50,8 @@ class TdmsSource:
         try:
             with self._library.TdmsFile.open(self.path) as file:
                 raw = {name: np.asarray(file[group][name][:]) for name, group in self._group.items()}
-        except _DAMAGED as error:
-            raise InputError(f"the file is damaged ({error})", where=f"{self.path}") from error
+        except _READING as error:
+            raise _refusal(error, "the file is damaged", self.path) from error
         columns = {name: np.asarray(column, np.float64) for name, column in raw.items() if column.dtype.kind in "fiu"}
         columns |= {name: column.astype("datetime64[ns]") for name, column in raw.items() if column.dtype.kind == "M"}
         left_out = {name: "text" for name in raw if name not in columns}
@@ -79,6 +79,15 @@ class TdmsSource:
             )
         rows: Array = np.arange(n, dtype=np.float64)
         return offset + increment * rows
+
+
+def _refusal(error: Exception, damaged: str, path: Path) -> InputError:
+    """What stopped the reader: what is no damage is not called so."""
+    if isinstance(error, NotImplementedError):
+        return InputError(f"npTDMS does not read this kind of data ({error})", where=f"{path}",
+                          remedy="Export the channels to CSV.")
+    said = "the file cannot be read" if isinstance(error, OSError) else damaged
+    return InputError(f"{said} ({error})", where=f"{path}")
 
 
 def _waveform(channel: Any, path: Path) -> tuple[float | None, float]:

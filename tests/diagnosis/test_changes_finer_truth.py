@@ -145,3 +145,11 @@ def test_a_fan_that_stands_still_leaves_the_law_of_still_air() -> None:
     found = rt.diagnose(one.system, one.new, reference=one.healthy)
     assert [effect.where for effect in found.effects] == [one.truth[0]] and not any(found.alternatives)
     assert 0.1 < found.effects[0].values["exponent"][0] < 0.4
+
+
+@pytest.mark.exhaustive
+def test_a_sensor_that_drifts_beside_missing_convection_is_no_step_of_a_conductance() -> None:
+    """Named while what is gone was counted from the unchanged model for effects of the catalog too."""
+    one = days(Change("housing", "sensor drifts" + CONVECTION, 112))
+    found = rt.diagnose(one.system, one.new, reference=one.healthy)
+    assert found.verdict == "unexplained" and not found.effects

@@ -286,6 +286,23 @@ def test_tdms_refuses(tmp_path: Path) -> None:
         read(path)
 
 
+@pytest.mark.parametrize(("error", "message"), [(NotImplementedError("DAQmx"), "does not read this kind of data"),
+                                               (PermissionError("denied"), "cannot be read"),
+                                               (KeyError("T"), "no TDMS file")])
+def test_only_damage_of_a_tdms_file_is_called_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                     error: Exception, message: str) -> None:
+    nptdms = pytest.importorskip("nptdms", reason="optional extra robthermal[tdms]")
+    path = tmp_path / "run.tdms"
+    path.write_bytes(b"TDSm")
+
+    def refuse(*args: object) -> None:
+        raise error
+
+    monkeypatch.setattr(nptdms.TdmsFile, "read_metadata", refuse)
+    with pytest.raises(InputError, match=message):
+        read(path)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".mat", ".parquet", ".tdms"])
 def test_no_format_runs_a_pickle(tmp_path: Path, suffix: str) -> None:
     optional(suffix)

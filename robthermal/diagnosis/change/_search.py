@@ -130,7 +130,7 @@ def _one(fit: Refit, tried: Sequence[_Tried], reference: Reference) -> Accepted 
 def _at_bound(entry: Entry) -> bool:
     """Whether the size is the largest that is tried: what the records tell of it is that it is large."""
     size = entry.candidate.effect.size
-    value = entry.values[size.name][0]
+    value = entry.found[size.name]
     return not size.lower + _NEAR * abs(size.lower) < value < size.upper - _NEAR * abs(size.upper)
 
 

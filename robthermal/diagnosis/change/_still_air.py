@@ -32,8 +32,9 @@ def with_still_air(entry: Entry) -> Entry:
     """
     candidate, structure = entry.candidate, entry.fit.structure
     place = len(structure.effects) - 1
-    if candidate.effect.name != NAME or _size(entry.fit) > _FALLS or not _link_of(
-            structure.system(entry.fit.v), candidate.where):
+    system = structure.system(entry.fit.v)
+    if candidate.effect.name != NAME or _size(entry.fit) > _FALLS or not any(
+            _plain(link, system) for link in _links_of(system, candidate.where)):
         return entry
     form = replace(candidate, shape={EXPONENT: _LAMINAR}, effect=replace(
         candidate.effect, add=_add, quantities=(
@@ -43,7 +44,7 @@ def with_still_air(entry: Entry) -> Entry:
         values = structure.quantities(entry.fit.v)
         start = with_law.carried(structure, entry.fit.v, [*values[:place], {**values[place], EXPONENT: _LAMINAR}])
         fit = extended(entry.fit, with_law, start)
-    except (Diverged, InputError):
+    except (Diverged, InputError):  # the law runs away on these records: the constant conductance stands
         return entry
     clear = fit.rss + math.log(fit.n_readings) + BIC_GAP < entry.fit.rss and _size(fit) < _FALLS
     return replace(entry, candidate=form, fit=fit) if clear else entry
@@ -54,19 +55,20 @@ def _size(fit: Refit) -> float:
     return fit.structure.quantities(fit.v)[-1][SIZE]
 
 
-def _link_of(system: System, where: tuple[str, ...]) -> Link | None:
-    """The link to an ambient whose conductance is changed, if nothing else takes heat along it."""
-    for link in system.links:
-        if where == (f"links.{link.name}.conductance",) and any(end in system.ambients for end in link.between):
-            plain = not (link.natural or link.radiation or link.step or link.follow)
-            return link if plain else None
-    return None
+def _links_of(system: System, where: tuple[str, ...]) -> list[Link]:
+    """The link whose conductance alone is changed; none where other numbers change or change with it."""
+    return [link for link in system.links if where == (f"links.{link.name}.conductance",)]
+
+
+def _plain(link: Link, system: System) -> bool:
+    """Whether a link joins an ambient, and nothing else takes heat along it."""
+    return any(end in system.ambients for end in link.between) and not (
+        link.natural or link.radiation or link.step or link.follow)
 
 
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
     """Conductance G e^s (|dT| / 10 K)^n, with a share of the former law that is gone for s < -0.4."""
-    link = _link_of(system, where)
-    assert link is not None
+    (link,) = _links_of(system, where)
     share = _MOST * -math.expm1(-(min(values[SIZE], 0.0) / _WHOLE) ** 2)
     changed = changed_by(system, where, values[SIZE] + math.log1p(-share))
     gain = link.conductance * math.exp(values[SIZE]) * share / DIFFERENCE**values[EXPONENT]
