@@ -68,8 +68,10 @@ def _beyond_noise(joint: JointProblem, v: Floats) -> Iterator[str]:
         for i, name in enumerate(one.sensors):
             squares.setdefault(name, []).append(r[:, i] ** 2)
             white.setdefault(name, []).append(whitened[:, i] ** 2)
-    times = {name: float(np.sqrt(np.nanmean(np.concatenate(parts)))) for name, parts in white.items()}
-    far = sorted((name for name in times if times[name] > _FAR), key=lambda name: -times[name])
+    squared = {name: np.concatenate(parts) for name, parts in white.items()}
+    times = {name: float(np.sqrt(np.nanmean(one))) for name, one in squared.items()}
+    lasting = {name for name, one in squared.items() if np.nanmedian(one) > 1.0}  # of noise and glitches: 0.45
+    far = sorted((name for name in lasting if times[name] > _FAR), key=lambda name: -times[name])
     if not far:
         return
     worst, unit = far[0], problem.system.sensor_units.get(far[0], "K")

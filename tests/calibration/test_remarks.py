@@ -114,3 +114,15 @@ def test_an_undeclared_noise_is_estimated_and_nothing_is_beyond_it() -> None:
     fit = rt.calibrate(system, replace(one, outputs=one.outputs + np.sin(np.arange(len(one)) / 20.0)[:, None]),
                        parameters=ranges)
     assert not any("far more than the declared noise" in said for said in fit.remarks)
+
+
+def test_glitches_are_nothing_that_a_model_lacks() -> None:
+    system = model(both=True)
+    exact = records(room=ROOM, both=True, recorded=True)
+    struck = []
+    for one in exact:
+        outputs = one.outputs.copy()
+        outputs[::50] += 8.0
+        struck.append(replace(one, outputs=outputs))
+    assert not any("far more than the declared noise" in said for said in rt.calibrate(
+        system, struck, loss="huber").remarks)

@@ -74,10 +74,12 @@ def test_a_fan_that_is_slower_keeps_a_constant_conductance(old: list[rt.Record])
     assert set(found.effects[0].values) == {"relative"} and "still" not in answer_sentence(found)
 
 
-@pytest.mark.parametrize("power", [0.1, 1.0 / 3.0])
-def test_the_power_is_estimated(old: list[rt.Record], power: float) -> None:
-    """Turbulent air, or fins that lose by conduction: with the power held at 1/4 neither had a right name."""
-    found = rt.diagnose(CONTENT, still_day(76, 0.25, power), reference=old)
+@pytest.mark.parametrize(("seed", "power"), [(76, 0.1), (76, 1.0 / 3.0), *(
+    pytest.param(seed, power, marks=pytest.mark.exhaustive) for seed in (75, 76, 77)
+    for power in (0.1, 0.15, 0.2, 0.25, 1.0 / 3.0))])
+def test_the_power_is_estimated(old: list[rt.Record], seed: int, power: float) -> None:
+    """Turbulent air, or fins that lose by conduction: held at 1/4 they had none, or a second name."""
+    found = rt.diagnose(CONTENT, still_day(seed, 0.25, power), reference=old)
     assert [(one.effect, one.where) for one in found.effects] == [("parameter_change", (FAN,))]
     value, std, _ = found.effects[0].values["exponent"]
     assert abs(value - power) < 4.0 * std < 0.02
