@@ -7,9 +7,19 @@ from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ._judge import Validation
-from .evidence import SURE, left, reproducible, score
+from ._lasting import evidence_of
+from .evidence import SURE, left, reproducible, score, validation_data
 from .fit import Refit, exact
-from .search import ALIKE, Entry, SearchState, refit_short_list, with_neighbors, with_other_end, without
+from .search import (
+    ALIKE,
+    Entry,
+    SearchState,
+    refit_short_list,
+    resolve_places,
+    with_neighbors,
+    with_other_end,
+    without,
+)
 
 CLOSED_SQUARE = 1.0 - (1.0 - 0.3) ** 2  # of the excess mean square of the validation records: 30 % of its rms
 
@@ -18,7 +28,8 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
     """List beside every effect the rivals that it does not beat in block after block, refitted beside the others.
 
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
-    was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there. A rival with
+    was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there, and places
+    that training and validation records exclude together are dropped. A rival with
     which the validation data keep their gap could not be named itself, and is none.
 
     Parameters
@@ -31,7 +42,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         Data that no fit has seen.
     """
     if finer.structure.n_coarse:
-        return at_neighboring_lumps(state)
+        return _at_one_place(at_neighboring_lumps(state), finer, validation)
     rounds = []
     for place, round_ in enumerate(state.rounds):
         known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)
@@ -39,6 +50,18 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         rivals = (entry for entry in _rivals(state, place, finer) if predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*known, *rivals)))
     return replace(state, rounds=tuple(rounds))
+
+
+def _at_one_place(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
+    """The state without the places that training and validation records exclude; a better one has to last as well."""
+    if validation.data is None or not state.rounds:
+        return state
+    data = validation_data(state.fit, validation.data, validation.operating_point)
+    rounds, fit = resolve_places(state.rounds, state.fit, data)
+    named = rounds[-1].best.candidate.key
+    if named != state.rounds[-1].best.candidate.key and not evidence_of(rounds, fit, finer, validation)[-1].lasting:
+        return state
+    return replace(state, rounds=rounds, fit=fit)
 
 
 def at_neighboring_lumps(state: SearchState) -> SearchState:

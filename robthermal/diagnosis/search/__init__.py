@@ -17,6 +17,7 @@ from ._neighbors import with_neighbors as with_neighbors
 from ._other_end import with_other_end as with_other_end
 from ._periods import between_trials as between_trials
 from ._periods import other_periods as other_periods
+from ._places import resolve_places as resolve_places
 from ._resolve_alternatives import resolve_alternatives as resolve_alternatives
 from ._resolve_alternatives import ruled_out as ruled_out
 from ._revise import needed as needed
@@ -42,6 +43,6 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
            "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods",
-           "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "revise",
-           "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
-           "with_wider_noise", "without", "without_contradicted"]
+           "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
+           "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
+           "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]

@@ -12,6 +12,7 @@ from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
 from ._exchange import with_exchanged
 from ._joint_check import checked_jointly
+from ._places import FIRST_ORDER
 from ._resolve_alternatives import resolve_alternatives
 from ._revise import needed, revised
 from ._short_list import ShortList, leaves_large_misfit, refit_short_list
@@ -19,7 +20,6 @@ from ._state import SearchState
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
-_LITTLE = 0.04  # of the sum of squares: to first order a finer network is described no better than that
 _LEAST = 0.3  # share of a large misfit that the last effect allowed must promise: it has to explain all of it
 
 
@@ -155,7 +155,7 @@ def exchange(state: SearchState, data: Sequence[DataSet] = ()) -> SearchState:
 def _too_little(fit: Refit, scores: Scores) -> bool:
     """Whether, beside a network that may be too coarse, no candidate explains more than that may have left."""
     least = min((promised(fit, scores, i) for i in scores.order), default=fit.rss)
-    return bool(fit.structure.coarse) and least > (1.0 - _LITTLE) * fit.rss
+    return bool(fit.structure.coarse) and least > (1.0 - FIRST_ORDER) * fit.rss
 
 
 def too_much_left(fit: Refit, scores: Scores) -> bool:
