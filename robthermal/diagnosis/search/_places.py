@@ -15,6 +15,7 @@ from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, coarsened, extended
 from ._decide import Accepted
 from ._neighbors import neighboring
+from ._short_list import Entry, Key
 
 FIRST_ORDER = 0.04  # of the sum of squares: to first order a finer network is described no better than that
 
@@ -35,22 +36,30 @@ def resolve_places(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
         Validation data, which no fit has seen.
     """
     *others, last = rounds
-    near = [entry for entry in last.contenders if neighboring(fit.structure.base, entry.candidate, last.best.candidate)
-            and [one.key for one in entry.fit.structure.effects[:-1]] == [one.best.candidate.key for one in others]]
-    if not near or fit.structure.effects[-1].key != last.best.candidate.key:
+    near = _near(last, [one.best.candidate.key for one in others], fit)
+    if not near:
         return rounds, fit
-    own = replace(last.best, fit=fit)
-    best = own
-    refitted = [replace(entry, fit=coarsened(entry.fit)) for entry in near]
-    for entry in refitted:
+    best = own = replace(last.best, fit=fit)
+    for entry in near.values():
         if _beats(entry.fit, best.fit, data):
             best = entry
-    left = [entry for entry in (own, *refitted) if entry is not best]
+    left = [entry for entry in (own, *near.values()) if entry is not best]
     worse = tuple(entry for entry in left if _beats(best.fit, entry.fit, data))
-    alike = tuple(entry for entry in left if entry not in worse)
-    kept = tuple(entry for entry in last.contenders if entry not in near)
-    new = replace(last, best=best, contenders=(*alike, *kept), ruled_out=(*last.ruled_out, *worse))
+    alike = [entry for entry in left if entry not in worse]
+    others_left = [entry for entry in last.contenders if entry not in near]
+    new = replace(last, best=best, contenders=(*alike, *others_left), ruled_out=(*last.ruled_out, *worse))
     return (*others, new), best.fit
+
+
+def _near(last: Accepted, others: Sequence[Key], fit: Refit) -> dict[Entry, Entry]:
+    """The same path at neighboring lumps, fitted beside the others; refitted where a finer network stands then."""
+    def beside_them(one: Refit, own: Entry) -> bool:
+        return [effect.key for effect in one.structure.effects] == [*others, own.candidate.key]
+
+    if not beside_them(fit, last.best):
+        return {}
+    return {entry: replace(entry, fit=coarsened(entry.fit)) for entry in last.contenders
+            if neighboring(fit.structure.base, entry.candidate, last.best.candidate) and beside_them(entry.fit, entry)}
 
 
 def _beats(one: Refit, other: Refit, data: Sequence[DataSet]) -> bool:
