@@ -21,9 +21,18 @@ from robthermal.diagnosis._rivals import predicts
 from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift
-from robthermal.diagnosis.evidence import Evidence, Stability, Twin
+from robthermal.diagnosis.evidence import Evidence, Stability, Twin, score_candidates, validation_data
 from robthermal.diagnosis.fit import Refit, coarsened
-from robthermal.diagnosis.search import Accepted, begin, decide, one_place, refit_short_list, with_neighbors
+from robthermal.diagnosis.search import (
+    Accepted,
+    _places,
+    begin,
+    decide,
+    one_place,
+    refit_short_list,
+    resolve_places,
+    with_neighbors,
+)
 from robthermal.diagnosis.search._neighbors import neighboring
 from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
@@ -119,10 +128,49 @@ def test_one_path_at_neighboring_lumps_is_named_with_its_other_place():
     assert answer.verdict == "named_with_remainder" and answer.outcome.ok
     assert {frozenset(one.where), *(frozenset(where) for _, where in others)} == {
         frozenset({"x1", "x5"}), frozenset({"x2", "x5"})}
+    assert not {one.key for one in answer.ruled_out} & set(others)
     headline = diagnosis_report(Diagnosed(answer, (), (), ())).headline
     assert " or a heat path between " in headline
     assert "The records do not tell whether this path goes between" in headline
     assert answer.to_dict()["alternatives"] == [[{"effect": name, "where": list(where)} for name, where in others]]
+
+
+@pytest.mark.parametrize(("beaten", "best", "rivals", "out"), [
+    ([], "x1", ["x2"], []), ([("x1", "x2")], "x1", [], ["x2"]), ([("x2", "x1")], "x2", [], ["x1"])])
+def test_of_two_places_the_one_that_is_beaten_is_dropped(monkeypatch, beaten, best, rivals, out):
+    """Which place beats which is told here; a rival of another kind stays."""
+    def place(fit: Refit) -> str:
+        return fit.structure.effects[-1].where[0]
+
+    monkeypatch.setattr(_places, "_beats", lambda one, other, data: (place(one), place(other)) in beaten)
+    both = with_neighbors(found(16))
+    assert both.best.candidate.where[0] == "x1" and {c.candidate.where[0] for c in both.contenders} == {"x2"}
+    lag = other_effect(both)
+    (new,), fit = resolve_places((replace(both, contenders=(*both.contenders, lag)),), both.best.fit, [])
+    assert new.best.candidate.where == (best, "x5") and fit is new.best.fit and place(fit) == best
+    assert [entry.candidate.where[0] for entry in new.contenders] == [*rivals, lag.candidate.where[0]]
+    assert [entry.candidate.where[0] for entry in new.ruled_out] == out
+
+
+@pytest.mark.exhaustive
+def test_a_place_beats_another_only_where_both_kinds_of_records_say_so():
+    """From the middle of the second lump: the third is beaten, by training and by validation records."""
+    before = finer(18, 0.8)
+    own, far = (refit_short_list(before, score_candidates(
+        before, [one for one in rt.diagnosis.candidates(bar(), ["missing_link"]) if set(one.where) == {lump, "x5"}])
+        ).entries[0].fit for lump in ("x2", "x3"))
+    own, far = coarsened(own), coarsened(far)
+    data = validation_data(own, measured(18, seed=2, path=0.8), None)
+    assert _places._beats(own, far, data)
+    assert not _places._beats(far, own, data) and not _places._beats(own, own, data)
+
+
+def test_a_place_ruled_out_that_is_listed_again_is_not_said_to_be_ruled_out():
+    one = replace(found(18), contenders=())
+    rival, = with_neighbors(one).contenders
+    again = with_neighbors(replace(one, ruled_out=(rival, other_effect(one))))
+    assert [entry.candidate.key for entry in again.contenders] == [rival.candidate.key]
+    assert [entry.candidate.key for entry in again.ruled_out] == [other_effect(one).candidate.key]
 
 
 def test_a_path_from_the_middle_of_a_lump_is_among_its_names():

@@ -42,7 +42,9 @@ def with_neighbors(round_: Accepted) -> Accepted:
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
     alike = [entry for entry in _nearly_best(before, short.entries) if entry.candidate.key != best.candidate.key]
-    return replace(round_, contenders=(*round_.contenders, *alike))
+    listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
+    return replace(round_, contenders=(*round_.contenders, *alike),
+                   ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
 
 
 def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
