@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...errors import Diverged, InputError
 from ...thermal import System
 from ..effects import Candidate, candidates
-from ..evidence import score_candidates
+from ..evidence import NEEDED, score_candidates
 from ..fit import Refit
 from ._decide import Accepted
 from ._short_list import Entry, refit_short_list
@@ -20,7 +20,9 @@ def with_neighbors(round_: Accepted) -> Accepted:
     """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
 
     A path from the middle of a lump looks in a coarse network as if it came from between that lump and the next; the
-    sum of squares decides for one of them beyond every statistical doubt, and can be wrong.
+    sum of squares decides for one of them beyond every statistical doubt, and can be wrong. Legs of modules have no
+    inside even in a finer network, and a face takes over what they would do: of a path at a face, the lump beside it is
+    listed where it would be needed itself.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def with_neighbors(round_: Accepted) -> Accepted:
         short = refit_short_list(before, score_candidates(before, [own, *near]))
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
-    alike = [entry for entry in _nearly_best(before, short.entries) if entry.candidate.key != best.candidate.key]
+    alike = _nearly_best(before, short.entries, best.candidate)
     listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
     return replace(round_, contenders=(*round_.contenders, *alike),
                    ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
@@ -80,7 +82,24 @@ def one_place(round_: Accepted, system: System) -> bool:
     return all(one.key == best.key or neighboring(system, one, best) for one in others)
 
 
-def _nearly_best(before: Refit, entries: Sequence[Entry]) -> list[Entry]:
-    """Entries that reach most of the decrease that the best of them reaches."""
+def faces_of(system: System) -> set[str]:
+    """Lumps that are faces of modules.
+
+    Parameters
+    ----------
+    system : System
+        Network with its modules.
+    """
+    return {face for module in system.modules.values() for face in (module.hot, module.cold)}
+
+
+def _nearly_best(before: Refit, entries: Sequence[Entry], best: Candidate) -> list[Entry]:
+    """Others that reach most of the decrease that the best of them reaches; beside a face, what would be needed."""
     most = before.rss - min((entry.fit.rss for entry in entries), default=before.rss)
-    return [entry for entry in entries if before.rss - entry.fit.rss > ALIKE * most]
+    faces = faces_of(before.structure.base)
+
+    def least(entry: Entry) -> float:
+        return NEEDED if faces & (set(best.where) - set(entry.candidate.where)) else ALIKE
+
+    return [entry for entry in entries if entry.candidate.key != best.key
+            and before.rss - entry.fit.rss > least(entry) * most]

@@ -2,7 +2,8 @@
 
 Beside a finer network a path from one lump looks much like one from the next, and the one that removes less may be the
 right one. What a finer network changes is known to first order only: a difference in the sum of squares counts from the
-same few percent on from which an effect may be accepted beside it, and with the filters of either place.
+same few percent on from which an effect may be accepted beside it, and with the filters of either place. Faces of
+modules are left out: the legs have no inside in a finer network either, and a face takes over what they would do.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from ..data import DataSet
 from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, coarsened, extended
 from ._decide import Accepted
-from ._neighbors import neighboring
+from ._neighbors import faces_of, neighboring
 from ._short_list import Entry, Key
 
 FIRST_ORDER = 0.04  # of the sum of squares: to first order a finer network is described no better than that
@@ -56,10 +57,15 @@ def _near(last: Accepted, others: Sequence[Key], fit: Refit) -> dict[Entry, Entr
     def beside_them(one: Refit, own: Entry) -> bool:
         return [effect.key for effect in one.structure.effects] == [*others, own.candidate.key]
 
+    def decidable(entry: Entry) -> bool:
+        exchanged = set(entry.candidate.where) ^ set(last.best.candidate.where)
+        return (neighboring(fit.structure.base, entry.candidate, last.best.candidate)
+                and not faces_of(fit.structure.base) & exchanged)
+
     if not beside_them(fit, last.best):
         return {}
     return {entry: replace(entry, fit=coarsened(entry.fit)) for entry in last.contenders
-            if neighboring(fit.structure.base, entry.candidate, last.best.candidate) and beside_them(entry.fit, entry)}
+            if decidable(entry) and beside_them(entry.fit, entry)}
 
 
 def _beats(one: Refit, other: Refit, data: Sequence[DataSet]) -> bool:
