@@ -25,6 +25,7 @@ from robthermal.diagnosis.evidence import Evidence, Stability, Twin, score_candi
 from robthermal.diagnosis.fit import Refit, coarsened
 from robthermal.diagnosis.search import (
     Accepted,
+    _neighbors,
     _places,
     begin,
     decide,
@@ -163,6 +164,27 @@ def test_a_place_beats_another_only_where_both_kinds_of_records_say_so():
     data = validation_data(own, measured(18, seed=2, path=0.8), None)
     assert _places._beats(own, far, data)
     assert not _places._beats(far, own, data) and not _places._beats(own, own, data)
+
+
+def test_beside_the_face_of_a_module_a_lump_is_listed_that_does_less(monkeypatch):
+    """The face is told here: the other lump does less than 0.9 and more than 0.3 of what the first one does."""
+    one = replace(found(16), contenders=())
+    assert one.best.candidate.where[0] == "x1" and not with_neighbors(one).contenders
+    monkeypatch.setattr(_neighbors, "faces_of", lambda system: {"x1"})
+    rival, = with_neighbors(one).contenders
+    assert rival.candidate.where == ("x2", "x5")
+
+
+def test_faces_of_modules_are_no_places_to_decide_between(monkeypatch):
+    both = with_neighbors(found(16))
+    monkeypatch.setattr(_places, "_beats", lambda one, other, data: True)
+    monkeypatch.setattr(_places, "faces_of", lambda system: {"x2"})
+    assert resolve_places((both,), both.best.fit, []) == ((both,), both.best.fit)
+    module = {"hot": "x1", "cold": "x2", "seebeck": 0.01, "resistance": 1.0, "conductance": 0.5}
+    machine = rt.System(ambients={"room": {"temperature": ROOM}},
+                        links=[{"between": ("x1", "room"), "conductance": 1.0}],
+                        lumps={f"x{i}": {"capacity": 30.0} for i in (1, 2, 3)}, modules={"m1": module})
+    assert _neighbors.faces_of(machine) == {"x1", "x2"}
 
 
 def test_a_place_ruled_out_that_is_listed_again_is_not_said_to_be_ruled_out():
