@@ -29,8 +29,8 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
 
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
     was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there, and places
-    that training and validation records exclude together are dropped. A rival with
-    which the validation data keep their gap could not be named itself, and is none.
+    that training and validation records exclude together are dropped. A rival with which the validation data keep their
+    gap could not be named itself, and is none.
 
     Parameters
     ----------
@@ -53,14 +53,20 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
 
 
 def _at_one_place(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
-    """The state without the places that training and validation records exclude; a better one has to last as well."""
+    """The state without the places that training and validation records exclude.
+
+    A place that takes that of the first one has to last and to predict as that one had to; else all of them stay.
+    """
     if validation.data is None or not state.rounds:
         return state
     data = validation_data(state.fit, validation.data, validation.operating_point)
-    rounds, fit = resolve_places(state.rounds, state.fit, data)
-    named = rounds[-1].best.candidate.key
-    if named != state.rounds[-1].best.candidate.key and not evidence_of(rounds, fit, finer, validation)[-1].lasting:
+    try:
+        rounds, fit = resolve_places(state.rounds, state.fit, data)
+    except (Diverged, InputError):  # the model with one of them runs away: nothing is decided
         return state
+    if rounds[-1].best.candidate.key != state.rounds[-1].best.candidate.key:
+        if not (evidence_of(rounds, fit, finer, validation)[-1].lasting and predicts(fit, finer, validation)):
+            return state
     return replace(state, rounds=rounds, fit=fit)
 
 

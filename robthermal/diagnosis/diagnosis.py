@@ -148,7 +148,7 @@ class Diagnosis:
 
     @property
     def ruled_out(self) -> tuple[Candidate, ...]:
-        """Effects that training could not exclude, and the validation records could."""
+        """Effects that only training and validation records together exclude."""
         return ruled_out(self.rounds)
 
     def __str__(self) -> str:

@@ -13,9 +13,10 @@ from ..errors import InputError
 from ._checks import Array
 from ._source import refuse_large
 
-# What npTDMS raises where the bytes are not those of the format. OverflowError: a place in the file, or a date.
-_DAMAGED = (ValueError, KeyError, OverflowError, struct.error)
-_READING = (*_DAMAGED, OSError, NotImplementedError)  # also: the disk or the rights to it; data that npTDMS lacks
+# What npTDMS raises where it does not know the bytes. OverflowError: a place in the file, or a date.
+_UNKNOWN = (ValueError, KeyError, OverflowError, struct.error)
+_READING = (*_UNKNOWN, OSError, NotImplementedError)  # also: the disk or the rights to it; kinds of properties
+_EXPORT = "Export the channels to CSV."
 
 
 class TdmsSource:
@@ -30,7 +31,7 @@ class TdmsSource:
             self._group = {channel.name: group.name for group in described.groups() for channel in group.channels()}
             found = [channel for group in described.groups() for channel in group.channels()]
         except _READING as error:
-            raise _refusal(error, "this is no TDMS file", path) from error
+            raise _refusal(error, path) from error
         if not found:
             raise InputError("this is no TDMS file, or it holds no channels", where=f"{path}")
         refuse_large(path, 8.0 * sum(len(channel) for channel in found), "bytes unpacked", max_bytes)
@@ -51,7 +52,7 @@ class TdmsSource:
             with self._library.TdmsFile.open(self.path) as file:
                 raw = {name: np.asarray(file[group][name][:]) for name, group in self._group.items()}
         except _READING as error:
-            raise _refusal(error, "the file is damaged", self.path) from error
+            raise _refusal(error, self.path) from error
         columns = {name: np.asarray(column, np.float64) for name, column in raw.items() if column.dtype.kind in "fiu"}
         columns |= {name: column.astype("datetime64[ns]") for name, column in raw.items() if column.dtype.kind == "M"}
         left_out = {name: "text" for name in raw if name not in columns}
@@ -81,13 +82,14 @@ class TdmsSource:
         return offset + increment * rows
 
 
-def _refusal(error: Exception, damaged: str, path: Path) -> InputError:
-    """What stopped the reader: what is no damage is not called so."""
+def _refusal(error: Exception, path: Path) -> InputError:
+    """What stopped the reader. npTDMS raises the same for damage and for kinds of data it lacks: neither is claimed."""
     if isinstance(error, NotImplementedError):
-        return InputError(f"npTDMS does not read this kind of data ({error})", where=f"{path}",
-                          remedy="Export the channels to CSV.")
-    said = "the file cannot be read" if isinstance(error, OSError) else damaged
-    return InputError(f"{said} ({error})", where=f"{path}")
+        return InputError(f"npTDMS does not read this kind of data ({error})", where=f"{path}", remedy=_EXPORT)
+    if isinstance(error, OSError):
+        return InputError(f"the file cannot be read ({error})", where=f"{path}")
+    return InputError(f"this is no TDMS file that npTDMS reads: it has another format, is damaged, or holds a kind of "
+                      f"data that npTDMS lacks ({error})", where=f"{path}", remedy=_EXPORT)
 
 
 def _waveform(channel: Any, path: Path) -> tuple[float | None, float]:

@@ -13,11 +13,11 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
-from robthermal.diagnosis import Entry
+from robthermal.diagnosis import Entry, _rivals
 from robthermal.diagnosis._graded import chosen_again
 from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis._lasting import in_its_place
-from robthermal.diagnosis._rivals import predicts
+from robthermal.diagnosis._rivals import predicts, with_rivals
 from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift
@@ -35,6 +35,7 @@ from robthermal.diagnosis.search import (
     with_neighbors,
 )
 from robthermal.diagnosis.search._neighbors import neighboring
+from robthermal.errors import Diverged
 from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
 H, N, CELLS, LUMPS, ROOM = 10.0, 400, 60, 5, 296.0
@@ -153,17 +154,62 @@ def test_of_two_places_the_one_that_is_beaten_is_dropped(monkeypatch, beaten, be
     assert [entry.candidate.where[0] for entry in new.ruled_out] == out
 
 
+@cache
+def fits_at(cell: int, *lumps: str) -> list[Refit]:
+    """With a path of 0.8 W/K from a cell, fitted as one from each of some lumps beside a finer network."""
+    before = finer(cell, 0.8)
+    tried = [one for one in rt.diagnosis.candidates(bar(), ["missing_link"]) if "x5" in one.where]
+    return [coarsened(refit_short_list(before, score_candidates(before, [one for one in tried if lump in one.where])
+                                       ).entries[0].fit) for lump in lumps]
+
+
 @pytest.mark.exhaustive
-def test_a_place_beats_another_only_where_both_kinds_of_records_say_so():
-    """From the middle of the second lump: the third is beaten, by training and by validation records."""
-    before = finer(18, 0.8)
-    own, far = (refit_short_list(before, score_candidates(
-        before, [one for one in rt.diagnosis.candidates(bar(), ["missing_link"]) if set(one.where) == {lump, "x5"}])
-        ).entries[0].fit for lump in ("x2", "x3"))
-    own, far = coarsened(own), coarsened(far)
+def test_a_place_is_beaten_by_training_and_by_validation_records():
+    """From the middle of the second lump: the third is beaten."""
+    own, far = fits_at(18, "x2", "x3")
     data = validation_data(own, measured(18, seed=2, path=0.8), None)
     assert _places._beats(own, far, data)
     assert not _places._beats(far, own, data) and not _places._beats(own, own, data)
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize(("behind", "beaten"), [(20.0, True), (5.0, False), (-20.0, False)])
+def test_neither_training_nor_validation_records_decide_alone(monkeypatch, behind, beaten):
+    """What the validation records say is told here: the second of two is that much behind, or before."""
+    def told(fits, reference, data):
+        return [behind * (fit.structure.effects[-1].where[0] == "x3") for fit in fits]
+
+    own, far = fits_at(18, "x2", "x3")
+    monkeypatch.setattr(_places, "negative_log_predictive_density", told)
+    assert _places._beats(own, far, []) is beaten
+    assert not _places._beats(far, own, [])  # training says the reverse, whatever validation records say
+    assert not _places._beats(own, own, [])
+
+
+@pytest.mark.parametrize(("lasts", "predicts_too", "best"), [(1.0, True, "x2"), (0.0, True, "x1"), (1.0, False, "x1")])
+def test_a_place_that_takes_another_s_has_to_last_and_to_predict(monkeypatch, lasts, predicts_too, best):
+    both = with_neighbors(found(16))
+    rival, = both.contenders
+    better = replace(both, best=rival, contenders=(), ruled_out=(both.best,))
+    monkeypatch.setattr(_rivals, "validation_data", lambda *args: [])
+    monkeypatch.setattr(_rivals, "resolve_places", lambda rounds, fit, data: ((better,), rival.fit))
+    monkeypatch.setattr(_rivals, "evidence_of", lambda *args: (Evidence(0.9, lasts, Stability(6, 0.1), 0.9),))
+    monkeypatch.setattr(_rivals, "predicts", lambda *args: predicts_too)
+    state = replace(begin(both.before, ["missing_link"]), rounds=(both,), fit=both.best.fit)
+    kept = with_rivals(state, both.before, Validation(measured(16, seed=2)))
+    assert kept.rounds[0].best.candidate.where[0] == best and kept.fit is kept.rounds[0].best.fit
+    assert bool(kept.rounds[0].ruled_out) == (best == "x2")
+
+
+def test_where_the_model_at_a_place_runs_away_all_places_stay(monkeypatch):
+    def runs_away(rounds, fit, data):
+        raise Diverged("a model runs away", time=0.0)
+
+    both = with_neighbors(found(16))
+    monkeypatch.setattr(_rivals, "resolve_places", runs_away)
+    state = replace(begin(both.before, ["missing_link"]), rounds=(both,), fit=both.best.fit)
+    kept = with_rivals(state, both.before, Validation(measured(16, seed=2)))
+    assert names(kept.rounds[0]) == names(both)
 
 
 def test_beside_the_face_of_a_module_a_lump_is_listed_that_does_less(monkeypatch):
@@ -179,7 +225,9 @@ def test_faces_of_modules_are_no_places_to_decide_between(monkeypatch):
     both = with_neighbors(found(16))
     monkeypatch.setattr(_places, "_beats", lambda one, other, data: True)
     monkeypatch.setattr(_places, "faces_of", lambda system: {"x2"})
-    assert resolve_places((both,), both.best.fit, []) == ((both,), both.best.fit)
+    (same,), fit = resolve_places((both,), both.best.fit, [])
+    assert same.contenders == both.contenders and same.ruled_out == () and same.best.candidate is both.best.candidate
+    assert fit is both.best.fit
     module = {"hot": "x1", "cold": "x2", "seebeck": 0.01, "resistance": 1.0, "conductance": 0.5}
     machine = rt.System(ambients={"room": {"temperature": ROOM}},
                         links=[{"between": ("x1", "room"), "conductance": 1.0}],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import sys
 import warnings
 from pathlib import Path
@@ -300,6 +301,27 @@ def test_only_damage_of_a_tdms_file_is_called_damage(tmp_path: Path, monkeypatch
 
     monkeypatch.setattr(nptdms.TdmsFile, "read_metadata", refuse)
     with pytest.raises(InputError, match=message):
+        read(path)
+
+
+@pytest.mark.parametrize(("kind", "said"), [(11, "ExtendedFloat"), (0x4F, "Unrecognised data type")])
+def test_a_kind_of_data_that_the_library_lacks_is_not_called_damage_alone(tmp_path: Path, kind: int, said: str) -> None:
+    """The last channel of a sound file is said to hold numbers of 80 bits, or of fixed point."""
+    path = tmp_path / "run.tdms"
+    write_tdms(path, [("a", "time", TIME, {}), ("a", "u", U, {}), ("a", "T", T, {})])
+    raw, described = path.read_bytes(), struct.pack("<LLLQ", 20, 10, 1, N)  # index of 20 bytes, doubles, one dimension
+    at = raw.rindex(described)
+    path.write_bytes(raw[:at] + struct.pack("<LLLQ", 20, kind, 1, N) + raw[at + len(described):])
+    with pytest.raises(InputError, match=f"damaged, or holds a kind of data that npTDMS lacks .*{said}.* Export"):
+        read(path)
+
+
+def test_a_property_of_a_kind_that_the_library_lacks(tmp_path: Path) -> None:
+    path = tmp_path / "run.tdms"
+    write_tdms(path, [("a", "u", U, {"wf_increment": 0.5}), ("a", "T", T, {"wf_increment": 0.5})])
+    raw, double = path.read_bytes(), b"wf_increment" + struct.pack("<L", 10)
+    path.write_bytes(raw.replace(double, b"wf_increment" + struct.pack("<L", 11)))
+    with pytest.raises(InputError, match="npTDMS does not read this kind of data .*ExtendedFloat.* Export"):
         read(path)
 
 

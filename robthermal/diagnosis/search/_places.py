@@ -16,7 +16,8 @@ from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, coarsened, extended
 from ._decide import Accepted
 from ._neighbors import faces_of, neighboring
-from ._short_list import Entry, Key
+from ._resolve_alternatives import takes_the_place
+from ._short_list import Entry
 
 FIRST_ORDER = 0.04  # of the sum of squares: to first order a finer network is described no better than that
 
@@ -37,9 +38,8 @@ def resolve_places(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
         Validation data, which no fit has seen.
     """
     *others, last = rounds
-    near = _near(last, [one.best.candidate.key for one in others], fit)
-    if not near:
-        return rounds, fit
+    near = {entry: replace(entry, fit=coarsened(entry.fit)) for entry in last.contenders
+            if takes_the_place(entry, last, fit) and _decidable(entry, last, fit)}
     best = own = replace(last.best, fit=fit)
     for entry in near.values():
         if _beats(entry.fit, best.fit, data):
@@ -52,20 +52,11 @@ def resolve_places(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
     return (*others, new), best.fit
 
 
-def _near(last: Accepted, others: Sequence[Key], fit: Refit) -> dict[Entry, Entry]:
-    """The same path at neighboring lumps, fitted beside the others; refitted where a finer network stands then."""
-    def beside_them(one: Refit, own: Entry) -> bool:
-        return [effect.key for effect in one.structure.effects] == [*others, own.candidate.key]
-
-    def decidable(entry: Entry) -> bool:
-        exchanged = set(entry.candidate.where) ^ set(last.best.candidate.where)
-        return (neighboring(fit.structure.base, entry.candidate, last.best.candidate)
-                and not faces_of(fit.structure.base) & exchanged)
-
-    if not beside_them(fit, last.best):
-        return {}
-    return {entry: replace(entry, fit=coarsened(entry.fit)) for entry in last.contenders
-            if decidable(entry) and beside_them(entry.fit, entry)}
+def _decidable(entry: Entry, last: Accepted, fit: Refit) -> bool:
+    """Whether an entry is the same path at a neighboring lump, no face of a module exchanged."""
+    base = fit.structure.base
+    exchanged = set(entry.candidate.where) ^ set(last.best.candidate.where)
+    return neighboring(base, entry.candidate, last.best.candidate) and not faces_of(base) & exchanged
 
 
 def _beats(one: Refit, other: Refit, data: Sequence[DataSet]) -> bool:
@@ -79,4 +70,3 @@ def _beats(one: Refit, other: Refit, data: Sequence[DataSet]) -> bool:
 def _predicts_better(one: Refit, other: Refit, reference: Refit, data: Sequence[DataSet]) -> bool:
     own, rival = negative_log_predictive_density([one, other], reference, data)
     return rival > own + BIC_GAP
-

@@ -30,7 +30,7 @@ def resolve_alternatives(rounds: tuple[Accepted, ...], fit: Refit, data: Sequenc
         Validation data, which no fit has seen.
     """
     for round_ in rounds:
-        rivals = [entry for entry in round_.contenders if _takes_the_place(entry, round_, fit)]
+        rivals = [entry for entry in round_.contenders if takes_the_place(entry, round_, fit)]
         if rivals:
             decision, fit = _weighed(round_, rivals, fit, data)
             rounds = tuple(decision if one is round_ else one for one in rounds)
@@ -63,8 +63,18 @@ def _weighed(round_: Accepted, rivals: Sequence[Entry], fit: Refit, data: Sequen
     return replace(round_, best=first, contenders=(*alike[1:], *unweighed), ruled_out=worse), fit
 
 
-def _takes_the_place(entry: Entry, round_: Accepted, fit: Refit) -> bool:
-    """Whether the entry was fitted beside all the other accepted effects."""
+def takes_the_place(entry: Entry, round_: Accepted, fit: Refit) -> bool:
+    """Whether a rival was fitted beside all the other accepted effects.
+
+    Parameters
+    ----------
+    entry : Entry
+        Rival of an effect.
+    round_ : Accepted
+        Round that accepted the effect.
+    fit : Refit
+        Fit with all accepted effects.
+    """
     def others(one: Refit, name: Entry) -> set[Key]:
         return {candidate.key for candidate in one.structure.effects} - {name.candidate.key}
 

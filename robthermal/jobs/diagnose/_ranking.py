@@ -43,7 +43,7 @@ def _reason(found: Diagnosis, i: int) -> str:
         if candidate.key in others:
             return f"these records cannot tell it from {effect.label}"
     if any(other.key == candidate.key for other in found.ruled_out):
-        return "the records fitted could not tell it from an accepted one, the validation records could"
+        return "the records fitted alone do not exclude it; together with them, the validation records could"
     if any((effect.effect, effect.where) == candidate.key for effect in found.provisional):
         return "helps, but does not explain everything"
     if candidate.key in found.not_testable:
