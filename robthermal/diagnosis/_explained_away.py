@@ -34,8 +34,8 @@ def predicting_alone(state: SearchState, validation: Validation) -> SearchState 
     if validation.data is None or not state.rounds:
         return None
     nominal = state.nominal
-    kept, found = lasting(replace(state, misfit_left=False), nominal, validation)
-    if not found or not _closes(kept.fit, nominal, validation):
+    kept = lasting(replace(state, misfit_left=False), nominal, validation)
+    if not kept.rounds or not _closes(kept.fit, nominal, validation):
         return None
     listed = with_rivals(kept, nominal, validation)
     return at_neighboring_lumps(replace(listed, rounds=tuple(

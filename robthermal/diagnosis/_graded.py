@@ -70,12 +70,12 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             finer = state.nominal
         progress("testing over blocks, segments and validation data what may be named")
         tried = len(state.rounds)
-        state, found = lasting(state, finer, validation)
-        if 0 < len(found) < tried and finer.structure.n_coarse:  # what is dropped may have made up for a wrong place
-            state, found = lasting(chosen_again(state, finer), finer, validation)
-        elif len(found) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
-            state, found = lasting(revise(replace(state, misfit_left=False)), finer, validation)
-        if not found:
+        state = lasting(state, finer, validation)
+        if 0 < len(state.rounds) < tried and finer.structure.n_coarse:  # what is dropped may have hidden a wrong place
+            state = lasting(chosen_again(state, finer), finer, validation)
+        elif len(state.rounds) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
+            state = lasting(revise(replace(state, misfit_left=False)), finer, validation)
+        if not state.rounds:
             alone = predicting_alone(judged.state, validation) if finer.structure.n_coarse else None
             if alone is not None:
                 return saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
@@ -83,7 +83,7 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
         kept = validated(state, validation, progress)
         if len(kept.rounds) < len(state.rounds):  # what is left has been tested beside what is gone
-            kept, _ = lasting(kept, finer, validation)
+            kept = lasting(kept, finer, validation)
         state = _predicting(kept, finer, validation, progress)
         return _graded(judged, with_rivals(state, finer, validation), finer, validation)
     except (Diverged, InputError):  # a model that runs away is no explanation
@@ -114,8 +114,8 @@ def _predicting(state: SearchState, finer: Refit, validation: Validation, progre
         return state
     progress("choosing the others again beside a rival with which the validation data are predicted")
     for tried in (chosen_again(instead, finer), instead):
-        kept, found = lasting(tried, finer, validation)
-        if found and predicts(kept.fit, finer, validation):
+        kept = lasting(tried, finer, validation)
+        if kept.rounds and predicts(kept.fit, finer, validation):
             return kept
     return state
 

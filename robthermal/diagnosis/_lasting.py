@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ._judge import Validation
-from .evidence import NEEDED, Evidence, Stability, expected_rms, left, reproducible, stability
+from .evidence import NEEDED, SURE, Evidence, Stability, expected_rms, left, reproducible, stability
 from .fit import Refit, coarsened, exact
 from .search import Accepted, Entry, SearchState, without
 
@@ -28,22 +28,67 @@ def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validati
     if not rounds:
         return ()
     whole, bare = exact(fit), exact(nominal)
-    noise = expected_rms(whole) ** 2
-    excess = [max(bare.rms**2 - noise, 0.0)]
-    excess += [max(one.rms**2 - noise, 0.0) for one in _prefixes(whole, bare)]
-    out = []
-    for place, round_ in enumerate(rounds):
-        less = without(fit, place, nominal, round_.before)
-        plain = bare if len(rounds) == 1 else without(whole, place, bare)
-        before = max((whole if plain is None else plain).rms ** 2 - noise, 0.0)
-        needed = 1.0 - excess[-1] / before if before > 0 else 0.0
-        if needed < NEEDED and plain is not None and validation is not None:
-            needed = max(needed, _needed_held_out(whole, plain, validation))
-        out.append(Evidence(
-            share=(excess[place] - excess[place + 1]) / excess[0] if excess[0] > 0 else 0.0,
-            reproducible=0.0 if less is None else reproducible(fit, less),
-            stability=_stability(fit, place), needed=needed))
-    return tuple(out)
+    return tuple(Evidence(share=share, reproducible=_reproducible(rounds, fit, nominal, place),
+                          stability=_stability(fit, place), needed=_needed(whole, bare, place, validation))
+                 for place, share in enumerate(_shares(whole, bare)))
+
+
+def lasts(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int, validation: Validation | None = None
+          ) -> bool:
+    """Whether one effect of a fit holds over blocks and segments and is needed: the tests of `Evidence.lasting`.
+
+    Parameters
+    ----------
+    rounds, fit, nominal, validation
+        As in `evidence_of`.
+    place : int
+        Of the effect.
+    """
+    return _needed(exact(fit), exact(nominal), place, validation) >= NEEDED and _holds(rounds, fit, nominal, place)
+
+
+def _weakest(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validation: Validation | None) -> int | None:
+    """Place of the effect that is needed least of those that do not last; None if all do.
+
+    One that is needed too little does not last, whatever it does over blocks: those tests are not made then.
+    """
+    needs = [_needed(exact(fit), exact(nominal), place, validation) for place in range(len(rounds))]
+    if any(not need >= NEEDED for need in needs):
+        return needs.index(min(needs))
+    fleeting = [place for place in range(len(rounds)) if not _holds(rounds, fit, nominal, place)]
+    return min(fleeting, key=needs.__getitem__, default=None)
+
+
+def _holds(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int) -> bool:
+    """Whether an effect keeps its size over segments and is better than none in block after block."""
+    return _stability(fit, place).constant and _reproducible(rounds, fit, nominal, place) >= SURE
+
+
+def _reproducible(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int) -> float:
+    """Share of draws of blocks in which the fit is better with an effect than without it."""
+    less = without(fit, place, nominal, rounds[place].before)
+    return 0.0 if less is None else reproducible(fit, less)
+
+
+def _needed(whole: Refit, bare: Refit, place: int, validation: Validation | None) -> float:
+    """Part of the excess mean square left without an effect that it removes, of training or validation records."""
+    plain = bare if len(whole.structure.effects) == 1 else without(whole, place, bare)
+    before, after = _excess(whole if plain is None else plain, whole), _excess(whole, whole)
+    needed = 1.0 - after / before if before > 0 else 0.0
+    if needed < NEEDED and plain is not None and validation is not None:
+        needed = max(needed, _needed_held_out(whole, plain, validation))
+    return needed
+
+
+def _shares(whole: Refit, bare: Refit) -> list[float]:
+    """Parts of the excess mean square that the effects remove, in the order of their acceptance."""
+    excess = [_excess(one, whole) for one in (bare, *_prefixes(whole, bare))]
+    return [(excess[i] - excess[i + 1]) / excess[0] if excess[0] > 0 else 0.0 for i in range(len(excess) - 1)]
+
+
+def _excess(fit: Refit, whole: Refit) -> float:
+    """Mean square that a fit leaves beyond noise."""
+    return max(fit.rms**2 - expected_rms(whole) ** 2, 0.0)
 
 
 def _needed_held_out(whole: Refit, less: Refit, validation: Validation) -> float:
@@ -72,30 +117,26 @@ def _prefixes(whole: Refit, bare: Refit) -> list[Refit]:
     return out[::-1]
 
 
-def lasting(state: SearchState, finer: Refit, validation: Validation) -> tuple[SearchState, tuple[Evidence, ...]]:
+def lasting(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
     """The effects that hold over blocks and segments and are needed, the least needed one dropped first.
 
     What the records cannot tell from it is asked first: a rival that holds and is needed takes its place.
     """
     rounds, fit = state.rounds, state.fit
-    found = evidence_of(rounds, fit, finer, validation)
-    while not all(one.lasting for one in found):
-        worst = min(range(len(found)), key=lambda i: (found[i].lasting, found[i].needed))
+    while rounds and (worst := _weakest(rounds, fit, finer, validation)) is not None:
         instead = in_its_place(rounds, worst, finer, validation)
         if instead is not None:
             rounds, fit = instead
-            found = evidence_of(rounds, fit, finer, validation)
             continue
         less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
         if less is None:
-            return replace(state, rounds=(), fit=finer), ()
+            return replace(state, nominal=finer, rounds=(), fit=finer)
         rounds, fit = rounds[:worst] + rounds[worst + 1:], less
         if rounds and fit.structure.coarse:
             fit = coarsened(fit)
         if rounds:
             rounds = (*rounds[:-1], replace(rounds[-1], best=replace(rounds[-1].best, fit=fit)))
-        found = evidence_of(rounds, fit, finer, validation)
-    return replace(state, nominal=finer, rounds=rounds, fit=fit), found
+    return replace(state, nominal=finer, rounds=rounds, fit=fit)
 
 
 def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit, validation: Validation | None = None
@@ -116,23 +157,36 @@ def in_its_place(rounds: tuple[Accepted, ...], place: int, finer: Refit, validat
     validation : Validation, optional
         Data that no fit has seen.
     """
-    tried = filter(None, (_instead(rounds, place, entry) for entry in rounds[place].contenders))
-    lasting = [(new, at) for new, at in tried if evidence_of(new, new[at].best.fit, finer, validation)[at].lasting]
-    if not lasting:
+    beside = [round_.best.candidate.key for i, round_ in enumerate(rounds) if i != place]
+    tried = (_instead(rounds, place, entry) for entry in rounds[place].contenders
+             if _others(entry) == beside and _is_needed(entry, finer, validation))
+    kept = [(new, at) for new, at in tried if lasts(new, new[at].best.fit, finer, at, validation)]
+    if not kept:
         return None
-    (chosen, at), *others = lasting
+    (chosen, at), *others = kept
     own = replace(chosen[at], contenders=tuple(new[i].best for new, i in others))
     return (*chosen[:at], own, *chosen[at + 1:]), own.best.fit
 
 
-def _instead(rounds: tuple[Accepted, ...], place: int, rival: Entry) -> tuple[tuple[Accepted, ...], int] | None:
-    """The effects with a rival in one place, and where it stands; None if it was not fitted beside the others."""
-    others = [round_.best.candidate.key for i, round_ in enumerate(rounds) if i != place]
-    keys = [candidate.key for candidate in rival.fit.structure.effects]
-    if [key for key in keys if key != rival.candidate.key] != others:
-        return None
+def _others(entry: Entry) -> list[tuple[str, tuple[str, ...]]]:
+    """Keys of the effects beside which a rival was fitted."""
+    return [one.key for one in entry.fit.structure.effects if one.key != entry.candidate.key]
+
+
+def _is_needed(entry: Entry, finer: Refit, validation: Validation | None) -> bool:
+    """Whether a rival is needed with the network as it is: asked before all else, as it costs least and most fail."""
+    return _needed(exact(entry.fit), exact(finer), _place(entry), validation) >= NEEDED
+
+
+def _place(entry: Entry) -> int:
+    """Of the effect among those of its fit."""
+    return [one.key for one in entry.fit.structure.effects].index(entry.candidate.key)
+
+
+def _instead(rounds: tuple[Accepted, ...], place: int, rival: Entry) -> tuple[tuple[Accepted, ...], int]:
+    """The effects with a rival in one place, which was fitted beside the others, and where it stands."""
     fit = coarsened(rival.fit) if rival.fit.structure.coarse else rival.fit
-    at, out = keys.index(rival.candidate.key), [*rounds[:place], *rounds[place + 1:]]
+    at, out = _place(rival), [*rounds[:place], *rounds[place + 1:]]
     out.insert(at, replace(rounds[place], best=replace(rival, fit=fit), contenders=()))
     out[-1] = replace(out[-1], best=replace(out[-1].best, fit=fit))
     return tuple(out), at

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ._judge import Validation
-from ._lasting import evidence_of
+from ._lasting import lasts
 from .evidence import SURE, left, reproducible, score, validation_data
 from .fit import Refit, exact
 from .search import (
@@ -65,7 +65,7 @@ def _at_one_place(state: SearchState, finer: Refit, validation: Validation) -> S
     except (Diverged, InputError):  # the model with one of them runs away: nothing is decided
         return state
     if rounds[-1].best.candidate.key != state.rounds[-1].best.candidate.key:
-        if not (evidence_of(rounds, fit, finer, validation)[-1].lasting and predicts(fit, finer, validation)):
+        if not (lasts(rounds, fit, finer, len(rounds) - 1, validation) and predicts(fit, finer, validation)):
             return state
     return replace(state, rounds=rounds, fit=fit)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -30,7 +31,9 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating", "lead_resistance",
                 "initial"),
 }
+_WORDS = {field: tuple(field.split(".")) for fields in FIELDS.values() for field in fields}
 LISTED = ("links", "leads")  # tables that are lists of named parts
+_KEPT = 4096  # names whose places are remembered: a fit asks for the same ones thousands of times
 
 
 def parts_of(system: System, table: str) -> Mapping[str, Part]:
@@ -65,15 +68,25 @@ def present_effects(system: System) -> Iterator[str]:
 def locate(system: System, name: str) -> tuple[str, str, str]:
     """Split a parameter name into table, part and field; names may contain dots."""
     table, _, rest = name.partition(".")
-    for field in FIELDS.get(table, ()):
-        part = rest.removesuffix("." + field)
-        if part != rest and part in parts_of(system, table):
-            return table, part, field
+    if table in FIELDS:
+        found = _split(table, rest, tuple(parts_of(system, table)))
+        if found:
+            return table, *found
     known = list(dict(parameters(system)))
     close = difflib.get_close_matches(name, known, n=1)
     remedy = f"Did you mean {close[0]!r}?" if close else f"For example {known[0]!r}."
     raise InputError(f"there is no parameter {name!r}", where="parameter name",
                      expected="TABLE.NAME.KEY as in the system file", remedy=remedy)
+
+
+@lru_cache(_KEPT)
+def _split(table: str, rest: str, parts: tuple[str, ...]) -> tuple[str, str] | None:
+    """Part and field of a table's parameter."""
+    for field in FIELDS[table]:
+        part = rest.removesuffix("." + field)
+        if part != rest and part in parts:
+            return part, field
+    return None
 
 
 def read_parameter(system: System, name: str) -> float:
@@ -101,20 +114,20 @@ def replace_parameters(system: System, values: Mapping[str, float]) -> System:
 
 
 def _get(part: Any, field: str) -> float | None:
-    for word in field.split("."):
+    for word in _WORDS[field]:
         part = getattr(part, word) if part is not None else None
     return part
 
 
 def _changed(part: Part, fields: Mapping[str, float], where: str) -> Part:
-    data = part.model_dump(exclude_unset=True)
+    data = _given(part)
     if "name" in type(part).model_fields:
         data["name"] = getattr(part, "name")  # noqa: B009 - only links and leads have one
     for field, value in fields.items():
-        *outer, last = field.split(".")
+        *outer, last = _WORDS[field]
         target = data
         for word in outer:
-            target = target.setdefault(word, {})
+            target[word] = target = _given(target.get(word))
         target[last] = value
     try:
         return type(part)(**data)
@@ -122,3 +135,10 @@ def _changed(part: Part, fields: Mapping[str, float], where: str) -> Part:
         fault = error.errors(include_url=False)[0]
         raise InputError(f"{'.'.join(map(str, fault['loc']))} = {fault['input']!r}: {fault['msg']}",
                          where=f"parameter of {where}", remedy="Keep it within what the part accepts.") from None
+
+
+def _given(part: Any) -> dict[str, Any]:
+    """What was given of a part: no defaults, and nothing where there is no part."""
+    if part is None or isinstance(part, dict):
+        return dict(part or {})
+    return {key: getattr(part, key) for key in part.model_fields_set}

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 import robthermal as rt
 from robthermal.diagnosis import Entry, _rivals
@@ -21,11 +22,12 @@ from robthermal.diagnosis._rivals import predicts, with_rivals
 from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift
-from robthermal.diagnosis.evidence import Evidence, Stability, Twin, score_candidates, validation_data
+from robthermal.diagnosis.evidence import Twin, score_candidates, validation_data
 from robthermal.diagnosis.fit import Refit, coarsened
 from robthermal.diagnosis.search import (
     Accepted,
     _neighbors,
+    _other_end,
     _places,
     begin,
     decide,
@@ -33,6 +35,7 @@ from robthermal.diagnosis.search import (
     refit_short_list,
     resolve_places,
     with_neighbors,
+    with_other_end,
 )
 from robthermal.diagnosis.search._neighbors import neighboring
 from robthermal.errors import Diverged
@@ -154,6 +157,39 @@ def test_of_two_places_the_one_that_is_beaten_is_dropped(monkeypatch, beaten, be
     assert [entry.candidate.where[0] for entry in new.ruled_out] == out
 
 
+@pytest.mark.parametrize(("heater_first", "left"), [(False, ["T"]), (True, ["q", "T"])])
+def test_a_late_heater_is_dropped_where_the_records_say_so_and_a_late_thermometer_is_not(monkeypatch, heater_first,
+                                                                                        left):
+    """Bodies delay what other thermometers see, as a late heater does: preferred by the records, both stay."""
+    def late(entry: Entry) -> str:
+        return entry.candidate.where[0][0]
+
+    monkeypatch.setattr(_other_end, "_ALIKE", -1.0)  # the other lag does less here, and is listed whatever it does
+    both = with_other_end(late_thermometer(), set(), None)
+    assert [late(entry) for entry in (both.best, *both.contenders)] == ["T", "q"]
+    own, other = both.best, both.contenders[0]
+    better = other if heater_first else own
+    monkeypatch.setattr(_places, "_beats", lambda one, rival, data: one.structure.effects[-1].key
+                        == better.candidate.key != rival.structure.effects[-1].key)
+    if heater_first:
+        both = replace(both, best=other, contenders=(own,))
+    (new,), fit = resolve_places((both,), both.best.fit, [])
+    assert [late(entry) for entry in (new.best, *new.contenders)] == left and fit is new.best.fit
+    assert [late(entry) for entry in new.ruled_out] == ([] if heater_first else ["q"])
+
+
+@cache
+def late_thermometer() -> Accepted:
+    """The bar with a thermometer of its heated lump that follows with 30 s."""
+    run = measured(18, path=1e-6)
+    y, a = run.outputs.copy(), np.exp(-H / 30.0)
+    y[:, 0] = ROOM + lfilter([(1.0 - a) / 2.0, (1.0 - a) / 2.0], [1.0, -a], y[:, 0] - ROOM)
+    before = coarsened(rt.diagnosis.refit(bar(), run.with_outputs(y)))
+    decision = decide(refit_short_list(before, rt.diagnosis.score(before, ["sensor_lag"])))
+    assert isinstance(decision, Accepted)
+    return decision
+
+
 @cache
 def fits_at(cell: int, *lumps: str) -> list[Refit]:
     """With a path of 0.8 W/K from a cell, fitted as one from each of some lumps beside a finer network."""
@@ -186,14 +222,15 @@ def test_neither_training_nor_validation_records_decide_alone(monkeypatch, behin
     assert not _places._beats(own, own, [])
 
 
-@pytest.mark.parametrize(("lasts", "predicts_too", "best"), [(1.0, True, "x2"), (0.0, True, "x1"), (1.0, False, "x1")])
-def test_a_place_that_takes_another_s_has_to_last_and_to_predict(monkeypatch, lasts, predicts_too, best):
+@pytest.mark.parametrize(("holds", "predicts_too", "best"), [
+    (True, True, "x2"), (False, True, "x1"), (True, False, "x1")])
+def test_a_place_that_takes_another_s_has_to_last_and_to_predict(monkeypatch, holds, predicts_too, best):
     both = with_neighbors(found(16))
     rival, = both.contenders
     better = replace(both, best=rival, contenders=(), ruled_out=(both.best,))
     monkeypatch.setattr(_rivals, "validation_data", lambda *args: [])
     monkeypatch.setattr(_rivals, "resolve_places", lambda rounds, fit, data: ((better,), rival.fit))
-    monkeypatch.setattr(_rivals, "evidence_of", lambda *args: (Evidence(0.9, lasts, Stability(6, 0.1), 0.9),))
+    monkeypatch.setattr(_rivals, "lasts", lambda *args: holds)
     monkeypatch.setattr(_rivals, "predicts", lambda *args: predicts_too)
     state = replace(begin(both.before, ["missing_link"]), rounds=(both,), fit=both.best.fit)
     kept = with_rivals(state, both.before, Validation(measured(16, seed=2)))
@@ -271,15 +308,14 @@ def test_what_is_left_after_a_drop_is_chosen_again():
     ("x1", "x1", []), ("x2", "x2", []), ("x1 x2", "x1", ["x2"]), ("", None, [])])
 def test_of_an_effect_that_does_not_last_only_rivals_that_do_take_the_place(monkeypatch, lasting, best, rivals):
     """The path has two names, from x1 and from x2; which of them lasts is told here, that of the lag does not."""
-    good, bad = Evidence(0.9, 1.0, Stability(6, 0.1), 0.9), Evidence(0.0, 1.0, Stability(6, 0.1), 0.0)
-
-    def told(rounds, fit, nominal, validation=None):
-        return tuple(good if set(lasting.split()) & set(one.best.candidate.where) else bad for one in rounds)
+    def told(rounds, fit, nominal, place, validation=None):
+        return bool(set(lasting.split()) & set(rounds[place].best.candidate.where))
 
     one = found(16)
     entries = tuple(sorted((one.best, *one.contenders), key=lambda entry: sorted(entry.candidate.where)))
     wrong = replace(one, best=replace(one.best, candidate=other_effect(one).candidate), contenders=entries)
-    monkeypatch.setattr("robthermal.diagnosis._lasting.evidence_of", told)
+    monkeypatch.setattr("robthermal.diagnosis._lasting._is_needed", lambda *rival: True)
+    monkeypatch.setattr("robthermal.diagnosis._lasting.lasts", told)
     monkeypatch.setattr("robthermal.diagnosis._lasting.coarsened", lambda fit: fit)
     answer = in_its_place((wrong,), 0, one.before)
     if best is None:

@@ -35,10 +35,9 @@ def test_what_is_left_is_tested_again(monkeypatch: pytest.MonkeyPatch, kept: tup
     """A heat that holds beside a step of a conductance, and not without it (a water-cooled stage of 130 cells)."""
     asked: list[tuple[str, ...]] = []
 
-    def lasting(state: State, finer: object, validation: object) -> tuple[State, tuple[str, ...]]:
+    def lasting(state: State, finer: object, validation: object) -> State:
         asked.append(state.rounds)
-        rounds = state.rounds if "step" in state.rounds else ("path",)
-        return State(rounds, state.nominal), rounds
+        return State(state.rounds if "step" in state.rounds else ("path",), state.nominal)
 
     nominal = SimpleNamespace(records=(0,))
     begun = State(("path", "step", "heat"), nominal)

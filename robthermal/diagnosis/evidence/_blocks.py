@@ -40,6 +40,11 @@ class Stability:
     segments: int
     spread: float
 
+    @property
+    def constant(self) -> bool:
+        """Whether the size shows in several parts of the records, and is the same in them."""
+        return self.segments >= 2 and self.spread <= WIDEST
+
 
 @dataclass(frozen=True)
 class Wandering:

@@ -124,13 +124,13 @@ def refined(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: Noi
     """Most likely factors within the limits, one after the other, once round."""
     residuals = _residuals(paths)
     cost = partial(_cost, paths, residuals, floor)
-    tried = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
+    factors = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
     heated = any(floor.disturbance.values())
     if not heated and not levels.share:
         return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
-        levels = _best([replace(levels, noise={**levels.noise, name: factor}) for factor in tried], cost)
-    return _best([replace(levels, disturbance=factor) for factor in tried], cost) if heated else levels
+        levels = _lowest([replace(levels, noise={**levels.noise, name: factor}) for factor in factors], cost)
+    return _lowest([replace(levels, disturbance=factor) for factor in factors], cost) if heated else levels
 
 
 def with_slow_part(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling
@@ -186,3 +186,12 @@ def _by_spread(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], fl
 
 def _best(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float]) -> NoiseScaling:
     return min(tried, key=cost)
+
+
+def _lowest(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float]) -> NoiseScaling:
+    """As `_best` along a cost with one minimum, such as that of a single level: half of it is dropped at every step."""
+    low, high = 0, len(tried) - 1
+    while low < high:
+        middle = (low + high) // 2
+        low, high = (low, middle) if cost(tried[middle]) <= cost(tried[middle + 1]) else (middle + 1, high)
+    return tried[low]

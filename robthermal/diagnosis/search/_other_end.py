@@ -2,6 +2,7 @@
 
 Every other sensor sees a lag of the heater and none of the thermometer. That difference is of the size of what the
 lump's inside does to it, and the refit of the other lag, which starts where there is none, may end far from its best.
+Validation records may then exclude the heater: `_places`.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def with_other_end(round_: Accepted, named: Set[Key], names: Sequence[str] | Non
     asked = [lag for lag in _LAGS if names is None or lag in names]
     known = named | {entry.candidate.key for entry in round_.contenders}
     others = [one for one in before.testable(candidates(before.structure.base, asked))
-              if one.key not in known and _ends_of_a_lump(before.structure.base, one, best.candidate)]
+              if one.key not in known and ends_of_a_lump(before.structure.base, one, best.candidate)]
     try:
         own = _refitted(best, best.candidate, before) if others else before
         fits = [(one, _refitted(best, one, before)) for one in others]
@@ -61,8 +62,16 @@ def _refitted(best: Entry, candidate: Candidate, before: Refit) -> Refit:
     return extended(before, structure, structure.carried(found, best.fit.v, at))
 
 
-def _ends_of_a_lump(system: System, one: Candidate, other: Candidate) -> bool:
-    """Whether one of two lags is of a heater, the other of a thermometer, of the same lump."""
+def ends_of_a_lump(system: System, one: Candidate, other: Candidate) -> bool:
+    """Whether one of two lags is of a heater, the other of a thermometer, of the same lump.
+
+    Parameters
+    ----------
+    system : System
+        Network with its heaters and sensors.
+    one, other : Candidate
+        Two candidates, of whatever effects.
+    """
     ends = {candidate.effect.name: candidate.where[0] for candidate in (one, other)}
     heater, sensor = system.inputs.get(ends.get("input_lag", "")), system.sensors.get(ends.get("sensor_lag", ""))
     return heater is not None and sensor is not None and heater.lump == sensor.lump

@@ -4,6 +4,9 @@ Beside a finer network a path from one lump looks much like one from the next, a
 right one. What a finer network changes is known to first order only: a difference in the sum of squares counts from the
 same few percent on from which an effect may be accepted beside it, and with the filters of either place. Faces of
 modules are left out: the legs have no inside in a finer network either, and a face takes over what they would do.
+
+Of the lags of a lump's heater and of its thermometer only that of the heater can be dropped. The insides of all bodies
+on the way delay what the thermometers of other lumps see, as a late heater does; nothing makes these faster.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from ..evidence import BIC_GAP, negative_log_predictive_density
 from ..fit import Refit, coarsened, extended
 from ._decide import Accepted
 from ._neighbors import faces_of, neighboring
+from ._other_end import ends_of_a_lump
 from ._resolve_alternatives import takes_the_place
 from ._short_list import Entry
 
@@ -42,10 +46,10 @@ def resolve_places(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
             if takes_the_place(entry, last, fit) and _decidable(entry, last, fit)}
     best = own = replace(last.best, fit=fit)
     for entry in near.values():
-        if _beats(entry.fit, best.fit, data):
+        if _excludes(entry, best, data):
             best = entry
     left = [entry for entry in (own, *near.values()) if entry is not best]
-    worse = tuple(entry for entry in left if _beats(best.fit, entry.fit, data))
+    worse = tuple(entry for entry in left if _excludes(best, entry, data))
     alike = [entry for entry in left if entry not in worse]
     others_left = [entry for entry in last.contenders if entry not in near]
     new = replace(last, best=best, contenders=(*alike, *others_left), ruled_out=(*last.ruled_out, *worse))
@@ -53,10 +57,16 @@ def resolve_places(rounds: tuple[Accepted, ...], fit: Refit, data: Sequence[Data
 
 
 def _decidable(entry: Entry, last: Accepted, fit: Refit) -> bool:
-    """Whether an entry is the same path at a neighboring lump, no face of a module exchanged."""
-    base = fit.structure.base
-    exchanged = set(entry.candidate.where) ^ set(last.best.candidate.where)
-    return neighboring(base, entry.candidate, last.best.candidate) and not faces_of(base) & exchanged
+    """Whether an entry is the lag of a lump's other end, or the path at a neighboring lump, no face exchanged."""
+    base, one, other = fit.structure.base, entry.candidate, last.best.candidate
+    if ends_of_a_lump(base, one, other):
+        return True
+    return neighboring(base, one, other) and not faces_of(base) & (set(one.where) ^ set(other.where))
+
+
+def _excludes(one: Entry, other: Entry, data: Sequence[DataSet]) -> bool:
+    """Whether records that prefer one of two say that it is not the other; of a late heater they do not."""
+    return one.candidate.effect.name != "input_lag" and _beats(one.fit, other.fit, data)
 
 
 def _beats(one: Refit, other: Refit, data: Sequence[DataSet]) -> bool:
