@@ -16,7 +16,7 @@ from .evidence import Gap, expected_rms, left
 from .fit import Refit, exact
 from .search import SearchState
 
-_CLOSED = 0.95  # of the excess mean square, that an effect removes which needs no finer network
+_CLOSED = 0.92  # of the excess mean square, that an effect removes which needs no finer network
 
 
 def predicting_alone(state: SearchState, validation: Validation) -> SearchState | None:
