@@ -18,9 +18,11 @@ from ._outcomes import DiagnosisCode
 from .change import (
     NAME,
     SIZE,
+    Convection,
     Excess,
     Reference,
     Search,
+    convection_of,
     excess_of,
     held,
     pinned,
@@ -32,7 +34,7 @@ from .change import (
 )
 from .data import DataSet, Measured, as_measured, noise_floor, records_of, refuse_constant, without_outliers
 from .evidence import Gap, adequacy, expected_rms, left
-from .fit import Refit, SessionGain, exact, too_warm
+from .fit import Refit, SessionGain, exact, refit, too_warm
 from .search import SearchState, ShortList
 
 _NOISE_ONLY = 1.5  # whitened variance
@@ -62,6 +64,8 @@ class Compared:
         Where nothing has changed: the smallest relative decrease ("lower") and increase ("higher") of every parameter
         of the fit, and of the gain of every heater and module, that the new records would have shown with a chance of
         0.9 [-]; infinite where not even a large one.
+    convection : Convection or None
+        Losses taken as natural convection, as the reference records ask for; None where conductances are constant.
 
     Examples
     --------
@@ -78,6 +82,7 @@ class Compared:
     scatter: dict[str, float]
     deviation: dict[str, float]
     visible: dict[str, dict[str, float]] = field(default_factory=dict)
+    convection: Convection | None = None
 
     @property
     def caveats(self) -> tuple[str, ...]:
@@ -99,8 +104,9 @@ class Compared:
         """
         visible = {name: {way: size if math.isfinite(size) else None for way, size in sizes.items()}
                    for name, sizes in self.visible.items()}
-        return {**vars(self), "visible": visible} if visible else {
-            key: value for key, value in vars(self).items() if key != "visible"}
+        law = {} if self.convection is None else {"convection": self.convection.to_dict()}
+        known = {key: value for key, value in vars(self).items() if key not in ("visible", "convection")}
+        return {**known, **({"visible": visible} if visible else {}), **law}
 
 
 def changed(system: System, records: Measured | Sequence[Measured], reference: Measured | Sequence[Measured], *,
@@ -129,15 +135,24 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
 
+    def healthy_of(system: System, warmest: bool) -> Reference:
+        return reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
+                            noise=noise, session_gain=session_gain, warmest=warmest)
+
     def compared(warmest: bool) -> tuple[Judged, Compared]:
         progress("fitting the reference records, and measuring how they differ")
-        healthy = reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
-                               noise=noise, session_gain=session_gain, warmest=warmest)
+        healthy, law = healthy_of(system, warmest), None
+        if parameters is None and system.fit:
+            progress("asking them whether losses are by natural convection")
+            old = noise_floor(system, reference, noise=noise)
+            law = convection_of(system, lambda other: refit(other, reference, old, session_gain=session_gain))
+        if law is not None:
+            healthy = healthy_of(law.system, warmest)
         progress("comparing the new records with them")
         new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
         progress("trying every change of a parameter, and every effect of the catalog")
         found = searched(new, healthy, names)
-        judged, said = _judged(found, new, healthy, validation), _compared(healthy, found.fit)
+        judged, said = _judged(found, new, healthy, validation), replace(_compared(healthy, found.fit), convection=law)
         if judged.verdict != "consistent":
             return judged, said
         seen = visible_changes(new, healthy, found)

@@ -29,7 +29,7 @@ def doubts(system: System, remainder: bool) -> list[str]:
     """
     if not system.modules or not remainder:
         return []
-    return ["A module has no inside of its own in this test. Of 52 simulated stacks with a module that got a name, two "
+    return ["A module has no inside of its own in this test. Of 69 simulated stacks with a module that got a name, three "
             "got a wrong one, which does not exclude one in eight: confirm this name on the machine."]
 
 

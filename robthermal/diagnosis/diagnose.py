@@ -218,6 +218,7 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
 def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
     """With what the reference records say: how large a change would have been seen, or how good the model is."""
     said = visible_in_words(compared.visible) if found.verdict == "consistent" else compared.caveats
+    said = said if compared.convection is None else (str(compared.convection), *said)
     return replace(found, reference=compared, caveats=(*found.caveats, *said),
                    outcome=replace(found.outcome, text=" ".join([found.outcome.text, *said])))
 

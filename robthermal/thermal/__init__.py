@@ -30,6 +30,9 @@ from ._module_point import ModulePoint as ModulePoint
 from ._module_point import SinkSize as SinkSize
 from ._module_point import module_point as module_point
 from ._module_point import size_sink as size_sink
+from ._natural_losses import LAMINAR as LAMINAR
+from ._natural_losses import constant_losses as constant_losses
+from ._natural_losses import natural_losses as natural_losses
 from ._outcomes import ThermalCode as ThermalCode
 from ._parameter_words import parameter_in_words as parameter_in_words
 from ._parameter_words import parameter_label as parameter_label
@@ -84,13 +87,13 @@ from .effects import effects as effects
 
 __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "DrivableRange", "Drive",
            "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
-           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
+           "LAMINAR", "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
            "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
            "PwmRipple", "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState",
-           "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "drivable_range",
-           "effects", "exchange_faces", "fit_in_kelvin", "fold", "format_modelica", "format_system", "hinf_error",
-           "invert_datasheet", "linearize", "load_curve", "materials", "module_from_datasheet",
-           "module_from_polynomials", "module_point", "parameter_in_words", "parameter_label", "parse_system",
-           "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink", "split_lump",
-           "state_matrices", "steady_state", "system_from_matrices", "time_constants", "trajectory", "voltage_slopes",
-           "ways_to_split", "write_modelica", "write_system"]
+           "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "constant_losses",
+           "drivable_range", "effects", "exchange_faces", "fit_in_kelvin", "fold", "format_modelica", "format_system",
+           "hinf_error", "invert_datasheet", "linearize", "load_curve", "materials", "module_from_datasheet",
+           "module_from_polynomials", "module_point", "natural_losses", "parameter_in_words", "parameter_label",
+           "parse_system", "pwm_ripple", "read_matrices", "read_system", "reduce", "simulate", "size_sink",
+           "split_lump", "state_matrices", "steady_state", "system_from_matrices", "time_constants", "trajectory",
+           "voltage_slopes", "ways_to_split", "write_modelica", "write_system"]

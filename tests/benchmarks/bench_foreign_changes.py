@@ -20,7 +20,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[_name] = "1"  # before numpy is loaded: one core a case
 
 from _timing import header  # noqa: E402
-from foreign.days import CHANGES, OUTSIDE, Change, days  # noqa: E402
+from foreign.days import CHANGES, HEALTHY, OUTSIDE, Change, days  # noqa: E402
 from foreign.judge import NAMED, rate  # noqa: E402
 from joblib import Parallel, delayed  # noqa: E402
 
@@ -61,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", nargs="*", type=int, default=[1, 2, 3])
     parser.add_argument("--machines", nargs="*", default=["bar", "plate", "stack", "housing"])
-    parser.add_argument("--kinds", nargs="*", default=["healthy", *CHANGES, *OUTSIDE])
+    parser.add_argument("--kinds", nargs="*", default=[*HEALTHY, *CHANGES, *OUTSIDE])
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="rows as JSON")
     chosen = parser.parse_args()
@@ -76,11 +76,11 @@ def main() -> None:
     for title, kinds, said in (("changes named alone", CHANGES, ("unique",)),
                                ("  alone or among others", CHANGES, ("unique", "in the set")),
                                ("  without the truth", CHANGES, ("WRONG", "set without")),
-                               ("healthy days called changed", ("healthy",), ANSWERS[1:]),
+                               ("healthy days called changed", HEALTHY, ANSWERS[1:]),
                                ("outside: a name", OUTSIDE, ("WRONG", "set without"))):
         print(f"{title:<28} {rate([row for row in rows if row['kind'] in kinds], lambda r: answer(r) in said)}")  # noqa: B023
     for row in rows:
-        if answer(row) != {"healthy": "healthy"}.get(row["kind"], "refused" if row["kind"] in OUTSIDE else "unique"):
+        if answer(row) != ("healthy" if row["kind"] in HEALTHY else "refused" if row["kind"] in OUTSIDE else "unique"):
             names = "; ".join(" or ".join(names) for names in row["names"]) or row["text"][:250]
             print(f"  {row['key']} {row['truth'][:1]} {row['size']:.2f}: {answer(row)}, {row['gap']['before']:.3g} to "
                   f"{row['gap']['after']:.3g} K: {names}")

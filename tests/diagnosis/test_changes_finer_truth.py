@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 import robthermal as rt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from foreign.days import CHANGES, CONVECTION, OUTSIDE, Change, days  # noqa: E402 - beside the benchmarks
+from foreign.days import CHANGES, CONVECTION, HEALTHY, OUTSIDE, Change, days  # noqa: E402 - beside the benchmarks
 from foreign.machines import MACHINES  # noqa: E402
 
 
-@pytest.mark.parametrize("kind", ["healthy", *CHANGES, *OUTSIDE])
+@pytest.mark.parametrize("kind", [*HEALTHY, *CHANGES, *OUTSIDE])
 def test_days_are_of_one_machine_and_differ(kind: str) -> None:
     one = days(Change("plate", kind, 1), n_healthy=2)
     assert len(one.healthy) == 2 and bool(one.truth) == (kind in CHANGES)

@@ -1,5 +1,7 @@
 """What changed between two days: the scatter of healthy records, changes of parameters, and their yardstick."""
 
+from ._convective import Convection as Convection
+from ._convective import convection_of as convection_of
 from ._excess import Excess as Excess
 from ._excess import excess_of as excess_of
 from ._held import Held as Held
@@ -20,6 +22,6 @@ from ._visible import Visible as Visible
 from ._visible import visible_changes as visible_changes
 from ._yardstick import effective_number as effective_number
 
-__all__ = ["Excess", "Held", "NAME", "Reference", "SIZE", "Search", "Visible", "effective_number", "excess_of",
-           "held", "parameter_changes", "pinned", "place_of", "random_effects", "reference_of", "relative", "searched",
-           "unsteady", "visible_changes"]
+__all__ = ["Convection", "Excess", "Held", "NAME", "Reference", "SIZE", "Search", "Visible", "convection_of",
+           "effective_number", "excess_of", "held", "parameter_changes", "pinned", "place_of", "random_effects",
+           "reference_of", "relative", "searched", "unsteady", "visible_changes"]

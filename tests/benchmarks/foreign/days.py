@@ -17,8 +17,10 @@ from .march import march
 
 N, SCATTER = 900, 0.03
 CONVECTION = ", convection"  # all losses depend on the temperature difference, on all days: no network has that
-CHANGES = ("ambient", "contact", "heater", "offset", "fan", "fan" + CONVECTION, "contact" + CONVECTION)
-OUTSIDE = ("sensor drifts", "gusts", "sensor drifts" + CONVECTION)
+CHANGES = ("ambient", "contact", "heater", "offset", "fan",
+           *(kind + CONVECTION for kind in ("ambient", "contact", "heater", "fan")))
+OUTSIDE = ("sensor drifts", "gusts", "sensor drifts" + CONVECTION, "gusts" + CONVECTION)
+HEALTHY = ("healthy", "healthy" + CONVECTION)
 
 
 @dataclass(frozen=True, order=True)
@@ -58,8 +60,10 @@ def days(change: Change, n_healthy: int = 3) -> Days:
     network = machine().network(noise, np.random.default_rng(told))
     convection = change.kind.endswith(CONVECTION)
     truth, size, act = _drawn(change.kind.removesuffix(CONVECTION), machine(), rng)
-    healthy = [_record(machine(), noise, rng, _nothing, convection) for _ in range(n_healthy)]
-    return Days(network, healthy, _record(machine(), noise, rng, act, convection), truth, size)
+    by_itself = () if not convection else tuple(
+        lump for lump in machine().plant.zones if not (change.kind.startswith("fan") and lump == _cooled(machine())[0]))
+    healthy = [_record(machine(), noise, rng, _nothing, by_itself) for _ in range(n_healthy)]
+    return Days(network, healthy, _record(machine(), noise, rng, act, by_itself), truth, size)
 
 
 @dataclass
@@ -85,7 +89,7 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator
     if kind == "healthy":
         return (), 0.0, _nothing
     if kind in ("ambient", "fan"):  # the path that takes most of the heat; of air that no fan moves: a law of its own
-        pair = max((pair for pair in machine.links if pair[1] in ambients), key=lambda pair: machine.links[pair])
+        pair = _cooled(machine)
         f = float(rng.uniform(0.3, 0.6))
 
         def less(m: Machine, day: _Day) -> None:
@@ -93,7 +97,8 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator
             if kind == "fan":
                 day.heats.append(_lifting(m, (pair[0],)))
 
-        return ((_name(pair),), pair)[:1 + (kind == "fan")], f - 1.0, less  # the law of the air is a name, too
+        gain = (_name(pair).replace(".conductance", ".natural.gain"),)  # where the losses are fitted as convection
+        return ((_name(pair),), gain, pair)[:2 + (kind == "fan")], f - 1.0, less  # the law of the air is a name, too
     if kind == "contact":
         inner = [pair for pair in machine.links if not ambients & set(pair) and _joins(machine, pair)]
         pair = inner[int(rng.integers(len(inner)))]
@@ -120,9 +125,14 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator
     return (), heat, lambda m, day: day.heats.append(gusts)
 
 
-def _record(machine: Machine, noise: float, rng: np.random.Generator, act: Act = _nothing, convection: bool = False
-            ) -> rt.Record:
-    """One day: inputs and numbers of its own."""
+def _cooled(machine: Machine) -> tuple[str, str]:
+    """The path to an ambient that takes most of the heat."""
+    return max((pair for pair in machine.links if pair[1] in machine.ambients), key=lambda pair: machine.links[pair])
+
+
+def _record(machine: Machine, noise: float, rng: np.random.Generator, act: Act = _nothing,
+            by_itself: tuple[str, ...] = ()) -> rt.Record:
+    """One day: inputs and numbers of its own; air that moves by itself takes the losses of some lumps."""
     plant, day = machine.plant, _Day({}, [], {})
     U = np.column_stack([*(staircase(N, machine.limits[name], rng) for name in plant.columns if name in machine.limits),
                          *(drift(N, T, rng) for T in machine.ambients.values())])
@@ -134,9 +144,9 @@ def _record(machine: Machine, noise: float, rng: np.random.Generator, act: Act =
         off = float(np.exp(SCATTER * rng.standard_normal()))
         for cell in cells:
             plant.capacity[cell] *= off
-    if convection:
-        day.heats.append(_lifting(machine, tuple(plant.zones)))
     act(machine, day)
+    if by_itself:  # of the conductances as they are on that day
+        day.heats.append(_lifting(machine, by_itself))
     driven = U.copy()
     for name, gain in day.power.items():
         driven[:, plant.columns.index(name)] *= gain

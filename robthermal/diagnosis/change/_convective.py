@@ -1,0 +1,99 @@
+"""Losses of a healthy machine by natural convection, where its records say that no conductance is constant.
+
+Most machines without a fan lose their heat by air that moves by itself, and most networks give them constant
+conductances. What that leaves of healthy records hides small changes and stands in for large ones. One law for all
+losses has no unknown more than constant conductances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from ...errors import Diverged, InputError
+from ...thermal import LAMINAR, System, constant_losses, natural_losses
+from ..evidence import expected_rms
+from ..fit import Refit
+
+_CLEARLY = 0.5  # of the mean square beyond noise, that natural convection may leave at most
+_CONSTANT = 0.9  # of it, with a single conductance constant again: a fan blows on that part
+_LARGE = 0.2  # of the conductance of all losses: a part that a fan cools has that much
+
+
+@dataclass(frozen=True)
+class Convection:
+    """Losses taken as natural convection, and what that does to the healthy records.
+
+    Parameters
+    ----------
+    links : tuple of str
+        Names of the links to ambients.
+    without, rms : float
+        Free-run residual of the fit to the reference records with constant conductances, and as they are taken [K].
+    system : System
+        Nominal system with these losses.
+    """
+
+    links: tuple[str, ...]
+    without: float
+    rms: float
+    system: System
+
+    def __str__(self) -> str:
+        several = len(self.links) > 1
+        return (f"The loss{'es' * several} along {', '.join(self.links)} {'are' if several else 'is'} taken as natural "
+                f"convection, G (|ΔT| / 10 K)^{LAMINAR:g} ΔT, here and in the system of the answer: with constant "
+                f"conductances the model leaves {self.without:.2g} K of the reference records, so {self.rms:.2g} K.")
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds under "convection" of "reference".
+
+        Returns
+        -------
+        dict
+        """
+        return {"links": list(self.links), "exponent": LAMINAR, "rms_without": self.without, "rms": self.rms}
+
+
+def convection_of(system: System, fitted: Callable[[System], Refit]) -> Convection | None:
+    """Natural convection of all losses that are not constant; None where constant conductances do about as well.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system with constant conductances.
+    fitted : callable
+        Fits a system to the reference records.
+    """
+    plain = fitted(system)
+    if not _beyond(plain) > expected_rms(plain) ** 2:  # nothing to speak of is left
+        return None
+    links, best = constant_losses(system), _or_none(system, constant_losses(system), fitted)
+    if best is None or not _beyond(best) < _CLEARLY * _beyond(plain):
+        return None
+    for name in _large(plain.system, links):
+        fewer = tuple(one for one in links if one != name)
+        fit = _or_none(system, fewer, fitted)
+        if fit is not None and _beyond(fit) < _CONSTANT * _beyond(best):
+            links, best = fewer, fit
+    return Convection(links, plain.rms, best.rms, natural_losses(system, links))
+
+
+def _large(system: System, links: tuple[str, ...]) -> list[str]:
+    """Links that take much of the losses, the largest conductance first."""
+    G = {name: system.parameter(f"links.{name}.conductance") for name in links}
+    return sorted((name for name in links if G[name] >= _LARGE * sum(G.values())), key=lambda name: -G[name])
+
+
+def _or_none(system: System, links: tuple[str, ...], fitted: Callable[[System], Refit]) -> Refit | None:
+    """The fit with these losses by natural convection; None without any, or where it runs away."""
+    try:
+        return fitted(natural_losses(system, links)) if links else None
+    except (Diverged, InputError):
+        return None
+
+
+def _beyond(fit: Refit) -> float:
+    """Mean square of the free-run residual beyond noise [K²]."""
+    return max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
