@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .._digits import downwards
-from ..errors import InputError, Outcome
+from ..errors import Diverged, InputError, Outcome
 from ..fitting import Choice
 from ..thermal import System
 from ._judge import Judged, Progress, Validation, Verdict, alternatives
@@ -135,19 +135,16 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
 
-    def healthy_of(system: System, warmest: bool) -> Reference:
-        return reference_of(system, reference, [one.record for one in records_of(later)], parameters=parameters,
-                            noise=noise, session_gain=session_gain, warmest=warmest)
+    law = None
+    if parameters is None and system.fit:
+        progress("asking the reference records whether losses are by natural convection")
+        law = _losses(system, reference, noise, session_gain)
 
     def compared(warmest: bool) -> tuple[Judged, Compared]:
         progress("fitting the reference records, and measuring how they differ")
-        healthy, law = healthy_of(system, warmest), None
-        if parameters is None and system.fit:
-            progress("asking them whether losses are by natural convection")
-            old = noise_floor(system, reference, noise=noise)
-            law = convection_of(system, lambda other: refit(other, reference, old, session_gain=session_gain))
-        if law is not None:
-            healthy = healthy_of(law.system, warmest)
+        healthy = reference_of(system if law is None else law.system, reference,
+                               [one.record for one in records_of(later)], parameters=parameters, noise=noise,
+                               session_gain=session_gain, warmest=warmest)
         progress("comparing the new records with them")
         new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
         progress("trying every change of a parameter, and every effect of the catalog")
@@ -163,6 +160,16 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
         return answer
     progress("once more, with rooms no warmer than beside a machine that is only heated")
     return compared(warmest=True)
+
+
+def _losses(system: System, reference: Measured | Sequence[Measured], noise: Mapping[str, float] | float | None,
+            session_gain: SessionGain) -> Convection | None:
+    """Losses by natural convection, where the reference records ask for them and can be fitted at all."""
+    try:
+        floor = noise_floor(system, reference, noise=noise)
+        return convection_of(system, lambda other: refit(other, reference, floor, session_gain=session_gain))
+    except (Diverged, InputError):  # what is wrong with the records is said where they are compared
+        return None
 
 
 def _compared(healthy: Reference, new: Refit) -> Compared:

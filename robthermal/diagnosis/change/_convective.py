@@ -66,10 +66,13 @@ def convection_of(system: System, fitted: Callable[[System], Refit]) -> Convecti
     fitted : callable
         Fits a system to the reference records.
     """
+    links = constant_losses(system)
+    if not links:
+        return None
     plain = fitted(system)
     if not _beyond(plain) > expected_rms(plain) ** 2:  # nothing to speak of is left
         return None
-    links, best = constant_losses(system), _or_none(system, constant_losses(system), fitted)
+    best = _or_none(system, links, fitted)
     if best is None or not _beyond(best) < _CLEARLY * _beyond(plain):
         return None
     for name in _large(plain.system, links):
