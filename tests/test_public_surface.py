@@ -124,7 +124,7 @@ SURFACE = {
         parameter_in_words parameter_label parse_system read_matrices read_system reduce
         simulate size_sink split_lump state_matrices steady_state system_from_matrices time_constants trajectory
         voltage_slopes
-        ways_to_split write_modelica write_system
+        ways_to_split write_modelica write_system constant_losses natural_losses
     """,
     "verification": """
         Certificate Verdict claim_sentence establish machine_hash not_certified same_system verify

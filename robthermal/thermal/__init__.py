@@ -30,7 +30,6 @@ from ._module_point import ModulePoint as ModulePoint
 from ._module_point import SinkSize as SinkSize
 from ._module_point import module_point as module_point
 from ._module_point import size_sink as size_sink
-from ._natural_losses import LAMINAR as LAMINAR
 from ._natural_losses import constant_losses as constant_losses
 from ._natural_losses import natural_losses as natural_losses
 from ._outcomes import ThermalCode as ThermalCode
@@ -87,7 +86,7 @@ from .effects import effects as effects
 
 __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "DrivableRange", "Drive",
            "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
-           "LAMINAR", "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
+           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
            "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
            "PwmRipple", "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState",
            "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "constant_losses",

@@ -8,8 +8,8 @@ from ..errors import InputError
 from ._parts import FitRange, Link, Natural
 from ._system import System
 
-DIFFERENCE = 10.0  # K, at which the conductance holds
-LAMINAR = 0.25  # power of the difference
+_DIFFERENCE = 10.0  # K, at which the conductance holds
+_LAMINAR = 0.25  # power of the difference
 
 
 def constant_losses(system: System) -> tuple[str, ...]:
@@ -36,7 +36,7 @@ def constant_losses(system: System) -> tuple[str, ...]:
                  and not (link.natural or link.radiation or link.step or link.follow))
 
 
-def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = LAMINAR) -> System:
+def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = _LAMINAR) -> System:
     """Take conductances G to an ambient as natural convection: the heat is G (|ΔT| / 10 K)^exponent ΔT.
 
     A conductance holds at a difference of 10 K; its range in the fit table becomes one of the gain.
@@ -74,7 +74,7 @@ def natural_losses(system: System, links: Collection[str] | None = None, *, expo
         raise InputError(f"link {unknown[0]!r} is no constant conductance to an ambient", where="argument links",
                          expected="some of " + (", ".join(possible) or "none: there are no such links"),
                          remedy="Name links between a lump and an ambient that have a conductance alone.")
-    scale = DIFFERENCE**-exponent
+    scale = _DIFFERENCE**-exponent
     changed = [_convective(link, scale, exponent) if link.name in chosen else link for link in system.links]
     moved = {f"links.{name}.conductance": f"links.{name}.natural.gain" for name in chosen}
     fit = {moved.get(name, name): _scaled(one, scale) if name in moved else one for name, one in system.fit.items()}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...errors import Diverged, InputError
-from ...thermal import LAMINAR, System, constant_losses, natural_losses
+from ...thermal import System, constant_losses, natural_losses
 from ..evidence import expected_rms
 from ..fit import Refit
 
@@ -40,10 +40,15 @@ class Convection:
     rms: float
     system: System
 
+    @property
+    def exponent(self) -> float:
+        """Power of the difference to which the losses per kelvin grow [-]."""
+        return self.system.parameter(f"links.{self.links[0]}.natural.exponent")
+
     def __str__(self) -> str:
         several = len(self.links) > 1
         return (f"The loss{'es' * several} along {', '.join(self.links)} {'are' if several else 'is'} taken as natural "
-                f"convection, G (|ΔT| / 10 K)^{LAMINAR:g} ΔT, here and in the system of the answer: with constant "
+                f"convection, G (|ΔT| / 10 K)^{self.exponent:g} ΔT, here and in the system of the answer: with constant "
                 f"conductances the model leaves {self.without:.2g} K of the reference records, so {self.rms:.2g} K.")
 
     def to_dict(self) -> dict[str, Any]:
@@ -53,7 +58,7 @@ class Convection:
         -------
         dict
         """
-        return {"links": list(self.links), "exponent": LAMINAR, "rms_without": self.without, "rms": self.rms}
+        return {"links": list(self.links), "exponent": self.exponent, "rms_without": self.without, "rms": self.rms}
 
 
 def convection_of(system: System, fitted: Callable[[System], Refit]) -> Convection | None:
