@@ -49,7 +49,8 @@ class Convection:
         several = len(self.links) > 1
         return (f"The loss{'es' * several} along {', '.join(self.links)} {'are' if several else 'is'} taken as natural "
                 f"convection, G (|ΔT| / 10 K)^{self.exponent:g} ΔT, here and in the system of the answer: with "
-                f"constant conductances the model leaves {self.without:.2g} K of the reference records, so {self.rms:.2g} K.")
+                f"constant conductances the model leaves {self.without:.2g} K of the reference records, so "
+                f"{self.rms:.2g} K.")
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "convection" of "reference".
