@@ -168,7 +168,7 @@ def _losses(system: System, reference: Measured | Sequence[Measured], noise: Map
     try:
         floor = noise_floor(system, reference, noise=noise)
         return convection_of(system, lambda other: refit(other, reference, floor, session_gain=session_gain))
-    except (Diverged, InputError):  # what is wrong with the records is said where they are compared
+    except (Diverged, InputError):  # conductances stay; records that cannot be compared, either, are refused there
         return None
 
 

@@ -29,6 +29,7 @@ from ._judge import Judged, Name, Progress, Validation, alternatives, judge, rec
 from ._lasting import evidence_of
 from ._means import asked_of_means
 from ._nearest import nearest
+from ._own_names import in_own_names
 from ._refine import refine as refined
 from ._searching import searched
 from ._visible_words import visible_in_words
@@ -218,9 +219,11 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
 def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
     """With what the reference records say: how large a change would have been seen, or how good the model is."""
     said = visible_in_words(compared.visible) if found.verdict == "consistent" else compared.caveats
-    said = said if compared.convection is None else (str(compared.convection), *said)
-    return replace(found, reference=compared, caveats=(*found.caveats, *said),
-                   outcome=replace(found.outcome, text=" ".join([found.outcome.text, *said])))
+    law = compared.convection
+    said = said if law is None else (str(law), *said)
+    answer = replace(found, reference=compared, caveats=(*found.caveats, *said),
+                     outcome=replace(found.outcome, text=" ".join([found.outcome.text, *said])))
+    return answer if law is None else in_own_names(answer, law)
 
 
 def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:

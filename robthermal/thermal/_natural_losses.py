@@ -8,9 +8,6 @@ from ..errors import InputError
 from ._parts import FitRange, Link, Natural
 from ._system import System
 
-_DIFFERENCE = 10.0  # K, at which the conductance holds
-_LAMINAR = 0.25  # power of the difference
-
 
 def constant_losses(system: System) -> tuple[str, ...]:
     """Links to an ambient that have a constant conductance and nothing else.
@@ -36,7 +33,7 @@ def constant_losses(system: System) -> tuple[str, ...]:
                  and not (link.natural or link.radiation or link.step or link.follow))
 
 
-def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = _LAMINAR) -> System:
+def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = 0.25) -> System:
     """Take conductances G to an ambient as natural convection: the heat is G (|ΔT| / 10 K)^exponent ΔT.
 
     A conductance holds at a difference of 10 K; its range in the fit table becomes one of the gain.
@@ -74,16 +71,15 @@ def natural_losses(system: System, links: Collection[str] | None = None, *, expo
         raise InputError(f"link {unknown[0]!r} is no constant conductance to an ambient", where="argument links",
                          expected="some of " + (", ".join(possible) or "none: there are no such links"),
                          remedy="Name links between a lump and an ambient that have a conductance alone.")
-    scale = _DIFFERENCE**-exponent
-    changed = [_convective(link, scale, exponent) if link.name in chosen else link for link in system.links]
+    scale = Natural.as_much_as(1.0, exponent).gain
+    changed = [_convective(link, exponent) if link.name in chosen else link for link in system.links]
     moved = {f"links.{name}.conductance": f"links.{name}.natural.gain" for name in chosen}
     fit = {moved.get(name, name): _scaled(one, scale) if name in moved else one for name, one in system.fit.items()}
     return system.model_copy(update={"links": tuple(changed), "fit": fit})
 
 
-def _convective(link: Link, scale: float, exponent: float) -> Link:
-    return Link(between=link.between, name=link.name,
-                natural=Natural(gain=link.conductance * scale, exponent=exponent))
+def _convective(link: Link, exponent: float) -> Link:
+    return Link(between=link.between, name=link.name, natural=Natural.as_much_as(link.conductance, exponent))
 
 
 def _scaled(one: FitRange, scale: float) -> FitRange:

@@ -19,6 +19,8 @@ from ._part import Name as Name
 from ._part import Part as Part
 from ._supply import Supply as Supply
 
+_DIFFERENCE = 10.0  # K, at which a conductance and natural convection take the same heat
+
 
 class Ambient(Part):
     """Surroundings at a prescribed temperature.
@@ -75,6 +77,29 @@ class Natural(Part):
 
     gain: NonNegative
     exponent: NonNegative = 0.25
+
+    @classmethod
+    def as_much_as(cls, conductance: float, exponent: float = 0.25) -> Natural:
+        """Natural convection that takes as much heat as a conductance at a difference of 10 K.
+
+        Parameters
+        ----------
+        conductance : float
+            Thermal conductance at that difference [W/K].
+        exponent : float
+            Power of the difference [-].
+
+        Returns
+        -------
+        Natural
+
+        Examples
+        --------
+        >>> import robthermal as rt
+        >>> round(rt.thermal.Natural.as_much_as(0.5).gain * 10.0**0.25, 12)
+        0.5
+        """
+        return cls(gain=conductance / _DIFFERENCE**exponent, exponent=exponent)
 
 
 class Link(Part):

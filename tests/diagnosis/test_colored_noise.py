@@ -126,6 +126,26 @@ def test_the_slow_part_is_never_more_than_the_declared_noise(bar: rt.System) -> 
     assert slow.pole == pytest.approx(np.exp(-3.0 / 9.0))
 
 
+@pytest.mark.parametrize(("noise", "heat"), [(0.005, 0.0), (0.02, 0.05), (0.03, 0.2), (0.08, 0.5)])
+def test_of_every_level_the_most_likely_is_taken(bar: rt.System, noise: float, heat: float) -> None:
+    """The search halves the list; here every factor is tried."""
+    path = at_rest(bar, 600)
+    rng = np.random.default_rng(7)
+    walk = lfilter([heat], [1.0, -0.97], 0.01 * rng.standard_normal((600, 1)), axis=0)
+    one = path.one.record.with_outputs(path.readings + walk + noise * rng.standard_normal((600, 1)))
+    path = replace(path, one=as_measured(bar, one, "records")[0])
+    floor = replace(rt.diagnosis.noise_floor(bar, one, noise=0.02), disturbance={"bar": 0.05})
+    first = NoiseScaling(1.0, {"T": 1.0})
+    factors = np.geomspace(1.0 / first.limit, first.limit, 15)
+
+    def least(levels: list[NoiseScaling]) -> NoiseScaling:
+        return min(levels, key=lambda one: settled_cost(path, path.residual, *one.of(path, floor)))
+
+    best = least([replace(first, noise={"T": float(f)}) for f in factors])
+    best = least([replace(best, disturbance=float(f)) for f in factors])
+    assert refined([path], floor, first) == best
+
+
 @pytest.mark.exhaustive
 def test_colored_noise_of_three_sensors_is_consistent() -> None:
     given, _ = made(Case("C", "noise", "colored", 2))

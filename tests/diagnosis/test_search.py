@@ -14,6 +14,7 @@ import robthermal as rt
 from robthermal.diagnosis.effects import Candidate
 from robthermal.diagnosis.evidence import Scores, explains
 from robthermal.diagnosis.fit import Point, Refit, descend, extended
+from robthermal.diagnosis.fit._descent import _solve
 from robthermal.diagnosis.search import _revise, _short_list
 from robthermal.diagnosis.search._stages import too_much_left
 
@@ -48,6 +49,18 @@ def labels(scores: Scores) -> list[str]:
 
 
 # Steps
+
+
+@pytest.mark.parametrize("rank", [5, 3])
+def test_steps_are_the_shortest_of_least_squares(rank: int) -> None:
+    """A descent on a linear problem, beside the pseudoinverse; with directions that change nothing, too."""
+    rng = np.random.default_rng(rank)
+    J = rng.standard_normal((12, rank)) @ rng.standard_normal((rank, 5)) * np.geomspace(1e-3, 1e3, 5)
+    z = rng.standard_normal(12)
+    scale = np.linalg.norm(J, axis=0)
+    step = _solve(J, z)
+    assert step * scale == pytest.approx(np.linalg.pinv(J / scale, rcond=1e-10) @ z, rel=1e-9, abs=1e-9)
+
 
 
 @pytest.mark.parametrize(("steep", "p"), [(30.0, 4.0), (100.0, 2.0)])

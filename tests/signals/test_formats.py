@@ -287,19 +287,23 @@ def test_tdms_refuses(tmp_path: Path) -> None:
         read(path)
 
 
-@pytest.mark.parametrize(("error", "message"), [(NotImplementedError("DAQmx"), "does not read this kind of data"),
-                                               (PermissionError("denied"), "cannot be read"),
-                                               (KeyError("T"), "no TDMS file")])
-def test_only_damage_of_a_tdms_file_is_called_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("step", ["read_metadata", "open"])
+@pytest.mark.parametrize(("error", "message"), [
+    (NotImplementedError("ExtendedFloat"), r"npTDMS does not read this kind of data \(ExtendedFloat\).* Export"),
+    (PermissionError("denied"), r"the file cannot be read \(denied\)"),
+    (KeyError("T"), "this is no TDMS file that npTDMS reads: .* damaged, or holds a kind of data .* Export")])
+def test_only_damage_of_a_tdms_file_is_called_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str,
                                                      error: Exception, message: str) -> None:
+    """Of its list of channels, or of the channels themselves; without the error the same file is read."""
     nptdms = pytest.importorskip("nptdms", reason="optional extra robthermal[tdms]")
     path = tmp_path / "run.tdms"
-    path.write_bytes(b"TDSm")
+    write_tdms(path, [("a", "Time [s]", TIME, {}), ("b", "u", U, {}), ("b", "T [K]", T, {})])
+    check(read(path))
 
     def refuse(*args: object) -> None:
         raise error
 
-    monkeypatch.setattr(nptdms.TdmsFile, "read_metadata", refuse)
+    monkeypatch.setattr(nptdms.TdmsFile, step, refuse)
     with pytest.raises(InputError, match=message):
         read(path)
 

@@ -45,12 +45,17 @@ class Convection:
         """Power of the difference to which the losses per kelvin grow [-]."""
         return self.system.parameter(f"links.{self.links[0]}.natural.exponent")
 
+    @property
+    def own_names(self) -> dict[str, str]:
+        """Gains of these losses, and the conductances that the nominal system has in their place."""
+        return {f"links.{name}.natural.gain": f"links.{name}.conductance" for name in self.links}
+
     def __str__(self) -> str:
         several = len(self.links) > 1
         return (f"The loss{'es' * several} along {', '.join(self.links)} {'are' if several else 'is'} taken as natural "
                 f"convection, G (|ΔT| / 10 K)^{self.exponent:g} ΔT, here and in the system of the answer: with "
                 f"constant conductances the model leaves {self.without:.2g} K of the reference records, so "
-                f"{self.rms:.2g} K.")
+                f"{self.rms:.2g} K. Radiation, or anything else by which losses grow, may be the reason.")
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "convection" of "reference".

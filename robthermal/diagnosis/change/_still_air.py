@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ...errors import Diverged, InputError
-from ...thermal import Link, Natural, System
+from ...thermal import Link, Natural, System, constant_losses
 from ..effects import Quantity
 from ..evidence import BIC_GAP
 from ..fit import Refit, extended
@@ -15,7 +15,6 @@ from ..search import Entry
 from ._parameter_change import NAME, SIZE, changed_by
 
 EXPONENT = "exponent"
-DIFFERENCE = 10.0  # K, at which the relative change is meant
 _LAMINAR, _STEEPEST = 0.25, 0.5  # power of the difference: where it starts, and the largest (turbulent: 1/3)
 _WHOLE = 0.2  # of the logarithm of the factor: at twice that 2 % of the former law are left
 _MOST = 1.0 - 1e-6  # share of the new law: a conductance stays above zero
@@ -34,7 +33,7 @@ def with_still_air(entry: Entry) -> Entry:
     place = len(structure.effects) - 1
     system = structure.system(entry.fit.v)
     if candidate.effect.name != NAME or _size(entry.fit) > _FALLS or not any(
-            _plain(link, system) for link in _links_of(system, candidate.where)):
+            link.name in constant_losses(system) for link in _links_of(system, candidate.where)):
         return entry
     form = replace(candidate, shape={EXPONENT: _LAMINAR}, effect=replace(
         candidate.effect, add=_add, quantities=(
@@ -60,18 +59,11 @@ def _links_of(system: System, where: tuple[str, ...]) -> list[Link]:
     return [link for link in system.links if where == (f"links.{link.name}.conductance",)]
 
 
-def _plain(link: Link, system: System) -> bool:
-    """Whether a link joins an ambient, and nothing else takes heat along it."""
-    return any(end in system.ambients for end in link.between) and not (
-        link.natural or link.radiation or link.step or link.follow)
-
-
 def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) -> System:
     """Conductance G e^s (|dT| / 10 K)^n, with a share of the former law that is gone for s < -0.4."""
     (link,) = _links_of(system, where)
     share = _MOST * -math.expm1(-(min(values[SIZE], 0.0) / _WHOLE) ** 2)
     changed = changed_by(system, where, values[SIZE] + math.log1p(-share))
-    gain = link.conductance * math.exp(values[SIZE]) * share / DIFFERENCE**values[EXPONENT]
-    natural = Natural(gain=gain, exponent=values[EXPONENT])
+    natural = Natural.as_much_as(link.conductance * math.exp(values[SIZE]) * share, values[EXPONENT])
     return changed.model_copy(update={"links": tuple(
         one.model_copy(update={"natural": natural}) if one.name == link.name else one for one in changed.links)})

@@ -254,5 +254,5 @@ def _solve(J: Array, z: Array) -> Array:
 
 
 def _least_squares(J: Array, z: Array) -> Array:
-    """The shortest of the solutions of least squares, by QR with pivoting: a fifth of the time of singular values."""
+    """The shortest of the solutions of least squares, by QR with pivoting: faster than by singular values."""
     return np.asarray(scipy.linalg.lstsq(J, z, cond=_FLAT, lapack_driver="gelsy")[0], np.float64)

@@ -97,8 +97,7 @@ def _drawn(kind: str, machine: Machine, rng: np.random.Generator
             if kind == "fan":
                 day.heats.append(_lifting(m, (pair[0],)))
 
-        gain = (_name(pair).replace(".conductance", ".natural.gain"),)  # where the losses are fitted as convection
-        return ((_name(pair),), gain, pair)[:2 + (kind == "fan")], f - 1.0, less  # the law of the air is a name, too
+        return ((_name(pair),), pair)[:1 + (kind == "fan")], f - 1.0, less  # the law of the air is a name, too
     if kind == "contact":
         inner = [pair for pair in machine.links if not ambients & set(pair) and _joins(machine, pair)]
         pair = inner[int(rng.integers(len(inner)))]
