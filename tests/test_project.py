@@ -18,6 +18,8 @@ from types import ModuleType
 import grimp
 import numpy as np
 import pytest
+from docutils.core import publish_doctree
+from docutils.nodes import problematic
 from importlinter import cli as import_linter
 from numpydoc.docscrape import NumpyDocString
 from packaging.requirements import Requirement
@@ -283,6 +285,19 @@ def test_every_public_function_has_an_example_that_runs() -> None:
     top = [(name, value) for name, value in public_callables() if name.count(".") == 1 and inspect.isroutine(value)]
     assert top
     assert not [name for name, value in top if ">>>" not in (inspect.getdoc(value) or "")]
+
+
+def badly_marked(text: str) -> list[str]:
+    """What docutils takes for the name of a substitution in a docstring, such as |x| for an absolute value."""
+    settings = {"report_level": 5, "halt_level": 5, "file_insertion_enabled": False}
+    tree = publish_doctree(text, settings_overrides=settings)
+    return [node.astext() for node in tree.findall(problematic) if node.astext().startswith("|")]
+
+
+def test_no_docstring_refers_to_nothing() -> None:
+    found = {name: badly_marked(inspect.getdoc(value) or "") for name, value in public_callables()}
+    assert not {name: marked for name, marked in found.items() if marked}
+    assert badly_marked("G (|x| / 10 K) x.") and not badly_marked("``G (|x| / 10 K)`` x.")
 
 
 def exists(dotted: str) -> bool:

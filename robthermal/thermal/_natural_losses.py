@@ -34,7 +34,7 @@ def constant_losses(system: System) -> tuple[str, ...]:
 
 
 def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = 0.25) -> System:
-    """Take conductances G to an ambient as natural convection: the heat is G (|ΔT| / 10 K)^exponent ΔT.
+    """Take conductances G to an ambient as natural convection: the heat is ``G (|ΔT| / 10 K)^exponent ΔT``.
 
     A conductance holds at a difference of 10 K; its range in the fit table becomes one of the gain.
 
