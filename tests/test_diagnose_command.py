@@ -291,6 +291,33 @@ def test_days_with_a_gain_of_their_own(files: Any, run: Run, tmp_path: Path, mon
     assert (with_gain[0], json.loads(with_gain[1])["verdict"]) == (0, "consistent")
 
 
+def test_what_healthy_days_name_is_added_before_days_are_compared(files: Any, run: Run, tmp_path: Path,
+                                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+    few = partial(rt.diagnose, effects=["missing_ambient_link", "sensor_lag"])
+    monkeypatch.setattr("robthermal.jobs.diagnose._diagnose.diagnose", few)
+    system, healthy, _ = files(across)
+    other, new = (measure(tmp_path / f"day{seed}.csv", across, seed, 400, False) for seed in (3, 4))
+    words = ("diagnose", system, new, "--reference", healthy, other, "--out")
+    assert run(*words, tmp_path / "plain", "--json")[0] in (0, 1)
+    status, said, _ = run(*words, tmp_path / "more", "--augment", "--json")
+    found = json.loads(said)
+    assert (status, found["verdict"]) == (0, "consistent")
+    added = found["reference"]["augmented"]
+    assert [(one["effect"], one["where"]) for one in added["effects"]] == [("missing_ambient_link", ["block", "room"])]
+    augmented = rt.read_system(tmp_path / "more" / "augmented.toml")
+    assert any(set(link.between) == {"block", "room"} for link in augmented.links)
+    assert "a heat path from block to room" in (tmp_path / "more" / "report.html").read_text(encoding="utf-8")
+    plain = json.loads((tmp_path / "plain" / "diagnosis.json").read_text(encoding="utf-8"))["reference"]
+    assert "augmented" not in plain and plain["rms"] > 2.0 * found["reference"]["rms"]
+
+
+def test_augment_without_reference_is_refused_in_the_words_of_the_command(files: Any, run: Run, tmp_path: Path
+                                                                          ) -> None:
+    system, train, _ = files(nothing)
+    status, _, said = run("diagnose", system, train, "--augment", "--out", tmp_path / "out")
+    assert status == 2 and "--augment" in said and "reference" in said and not (tmp_path / "out").exists()
+
+
 def test_a_bad_operating_point_is_refused(files: Any, run: Run, tmp_path: Path) -> None:
     system, train, _ = files(nothing)
     status, _, said = run("diagnose", system, train, "--operating-point", "room=298.15 K", "--out", tmp_path / "out")

@@ -57,13 +57,13 @@ SURFACE = {
         uncertainty_weight
     """,
     "diagnosis": """
-        Adequacy Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence Found FoundAmbient
-        Gap HoldOut
+        Adequacy Augmented Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence
+        Found FoundAmbient Gap HoldOut
         JointCheck JointSelection Left Refinement Resolving Split
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder
         Response Scores ShortList Stability UnknownHeat ValidationResiduals adequacy candidates decide diagnose effects
         forget_effect hold_out locate next_experiment noise_floor refit refit_short_list register_effect score
-        select_jointly unknown_heat
+        select_jointly unknown_heat with_named_effects
     """,
     "errors": """
         Diverged InputError Outcome OutcomeCode RobthermalError

@@ -37,6 +37,9 @@ def diagnose(system: SystemFile,
              reference: Annotated[list[Path] | None, typer.Option(
                  "--reference", help="Records of the healthy machine: what has changed since? Takes all files up to "
                  "the next option, may repeat.", metavar="OLD.csv...")] = None,
+             augment: Annotated[bool, typer.Option(
+                 "--augment", help="With --reference: compare with a model that has what the records of the healthy "
+                 "machine name by themselves.")] = False,
              session_gain: Annotated[bool, typer.Option(
                  "--session-gain", help="Every record may have a gain of its own of every heater and module.")] = False,
              refine: Annotated[bool, typer.Option(
@@ -58,7 +61,7 @@ def diagnose(system: SystemFile,
                                     for paths in (records, validation or [], reference or []))
         files = (system, *records, *(validation or []), *(reference or []))
         result = rt.jobs.diagnose_records(found, files, train, held_out, stage, operating_point=point,
-                                          session_gain=session_gain, reference=healthy, refine=refine)
+                                          session_gain=session_gain, reference=healthy, augment=augment, refine=refine)
         stage("writing the report")
         rt.jobs.write_diagnosis(result, out)
     summary = {**json.loads((out / "diagnosis.json").read_text(encoding="utf-8")), "out": str(out),

@@ -1,14 +1,16 @@
 """Where model and data differ: locate it, name the missing effect, add it, and validate."""
 
+from ._augment import Augmented as Augmented
 from ._changed import Compared as Compared
+from ._found import Found as Found
 from ._outcomes import DiagnosisCode as DiagnosisCode
 from ._refinement import Refinement as Refinement
 from ._refinement import Split as Split
+from ._with_names import with_named_effects as with_named_effects
 from .data import NoiseEstimate as NoiseEstimate
 from .data import noise_floor as noise_floor
 from .diagnose import diagnose as diagnose
 from .diagnosis import Diagnosis as Diagnosis
-from .diagnosis import Found as Found
 from .effects import Candidate as Candidate
 from .effects import Effect as Effect
 from .effects import Quantity as Quantity
@@ -52,10 +54,10 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect", "EffectSet",
-           "Entry", "Evidence", "Found", "FoundAmbient", "Gap", "HoldOut", "JointCheck", "JointSelection", "Left",
-           "LinearizedRecord", "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling", "Quantity",
-           "Refinement", "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split", "Stability",
-           "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
+__all__ = ["Adequacy", "Augmented", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect",
+           "EffectSet", "Entry", "Evidence", "Found", "FoundAmbient", "Gap", "HoldOut", "JointCheck", "JointSelection",
+           "Left", "LinearizedRecord", "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling",
+           "Quantity", "Refinement", "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split",
+           "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
            "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list",
-           "register_effect", "score", "select_jointly", "unknown_heat"]
+           "register_effect", "score", "select_jointly", "unknown_heat", "with_named_effects"]

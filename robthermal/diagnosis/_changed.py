@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,6 +13,7 @@ from .._digits import downwards
 from ..errors import Diverged, InputError, Outcome
 from ..fitting import Choice
 from ..thermal import System
+from ._augment import Augmented
 from ._judge import Judged, Progress, Validation, Verdict, alternatives
 from ._outcomes import DiagnosisCode
 from .change import (
@@ -37,6 +38,7 @@ from .evidence import Gap, adequacy, expected_rms, left
 from .fit import Refit, SessionGain, exact, refit, too_warm
 from .search import SearchState, ShortList
 
+Augment = Callable[[System], Augmented]
 _NOISE_ONLY = 1.5  # whitened variance
 _MOST = 0.95  # of what is outside the scatter, that changes must remove where they leave some of it
 _NAMING: tuple[Verdict, ...] = ("named", "named_with_remainder", "ambiguous")
@@ -66,6 +68,8 @@ class Compared:
         0.9 [-]; infinite where not even a large one.
     convection : Convection or None
         Losses taken as natural convection, as the reference records ask for; None where conductances are constant.
+    augmented : Augmented or None
+        What the reference records alone have added to the model, if that was asked for.
 
     Examples
     --------
@@ -83,6 +87,7 @@ class Compared:
     deviation: dict[str, float]
     visible: dict[str, dict[str, float]] = field(default_factory=dict)
     convection: Convection | None = None
+    augmented: Augmented | None = None
 
     @property
     def caveats(self) -> tuple[str, ...]:
@@ -104,15 +109,16 @@ class Compared:
         """
         visible = {name: {way: size if math.isfinite(size) else None for way, size in sizes.items()}
                    for name, sizes in self.visible.items()}
-        law = {} if self.convection is None else {"convection": self.convection.to_dict()}
-        known = {key: value for key, value in vars(self).items() if key not in ("visible", "convection")}
-        return {**known, **({"visible": visible} if visible else {}), **law}
+        model = {key: one.to_dict() for key, one in (("convection", self.convection), ("augmented", self.augmented))
+                 if one is not None}
+        known = {key: value for key, value in vars(self).items() if key not in ("visible", "convection", "augmented")}
+        return {**known, **({"visible": visible} if visible else {}), **model}
 
 
 def changed(system: System, records: Measured | Sequence[Measured], reference: Measured | Sequence[Measured], *,
             validation: Validation, parameters: Choice, names: Iterable[str] | None,
-            noise: Mapping[str, float] | float | None, session_gain: SessionGain, progress: Progress
-            ) -> tuple[Judged, Compared]:
+            noise: Mapping[str, float] | float | None, session_gain: SessionGain, augment: Augment | None,
+            progress: Progress) -> tuple[Judged, Compared]:
     """Compare new records with those of a healthy machine.
 
     Parameters
@@ -127,6 +133,8 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
         As in `rt.diagnose`.
     names : iterable of str, optional
         Effects of the catalog to try; default all.
+    augment : callable, optional
+        ``augment(system)`` adds what the reference records alone name.
     progress : callable
         Called with a sentence before every stage.
     """
@@ -135,21 +143,30 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
 
-    law = None
-    if parameters is None and system.fit:
+    def losses(of: System) -> Convection | None:
+        if parameters is not None or not system.fit:
+            return None
         progress("asking the reference records whether losses are by natural convection")
-        law = _losses(system, reference, noise, session_gain)
+        return _losses(of, reference, noise, session_gain)
+
+    law = losses(system)
+    model, added, chosen = system if law is None else law.system, None, parameters
+    if augment is not None:
+        added = augment(model)
+        model, chosen = added.system, added.parameters
+        if law is None and added.effects and (law := losses(model)) is not None:
+            model = law.system
 
     def compared(warmest: bool) -> tuple[Judged, Compared]:
         progress("fitting the reference records, and measuring how they differ")
-        healthy = reference_of(system if law is None else law.system, reference,
-                               [one.record for one in records_of(later)], parameters=parameters, noise=noise,
-                               session_gain=session_gain, warmest=warmest)
+        healthy = reference_of(model, reference, [one.record for one in records_of(later)], parameters=chosen,
+                               noise=noise, session_gain=session_gain, warmest=warmest)
         progress("comparing the new records with them")
         new = held(healthy.fit, healthy.scatter, without_outliers(system, later, floor.noise), floor)
         progress("trying every change of a parameter, and every effect of the catalog")
         found = searched(new, healthy, names)
-        judged, said = _judged(found, new, healthy, validation), replace(_compared(healthy, found.fit), convection=law)
+        judged = _judged(found, new, healthy, validation)
+        said = replace(_compared(healthy, found.fit), convection=law, augmented=added)
         if judged.verdict != "consistent":
             return judged, said
         seen = visible_changes(new, healthy, found)

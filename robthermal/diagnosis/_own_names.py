@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ._changed import Compared
+from ._found import Found
 from .change import NAME, Convection
-from .diagnosis import Diagnosis, Found
+from .diagnosis import Diagnosis
 from .effects import Candidate
 
 Value = TypeVar("Value")

@@ -8,8 +8,9 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
-from ..fitting import Choice
+from ..fitting import Choice, measured_of
 from ..thermal import System
+from ._augment import Augmented, augmented
 from ._changed import Compared, changed
 from ._doubts import (
     ambients_in_words,
@@ -24,6 +25,7 @@ from ._doubts import (
     within_the_body,
 )
 from ._finer_network import unless_finer
+from ._found import Found
 from ._graded import graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
@@ -35,7 +37,7 @@ from ._searching import searched
 from ._visible_words import visible_in_words
 from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor, refuse_constant
-from .diagnosis import Diagnosis, Found
+from .diagnosis import Diagnosis
 from .effects import candidates
 from .evidence import (
     Evidence,
@@ -60,7 +62,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
              parameters: Choice = None, effects: Iterable[str] | None = None,
              noise: Mapping[str, float] | float | None = None, operating_point: Mapping[str, float] | None = None,
              session_gain: SessionGain = False, reference: Measured | Sequence[Measured] | None = None,
-             refine: bool = False, progress: Progress = lambda stage: None) -> Diagnosis:
+             augment: bool = False, refine: bool = False, progress: Progress = lambda stage: None) -> Diagnosis:
     """Find where records and simulation part, name the missing effect, add it, and test it on validation records.
 
     Parameters
@@ -88,6 +90,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         Of the healthy machine, on days of their own. Then the question is what has changed since: every parameter of
         the fit table may have another value (`parameter_change`), and a change counts beyond the scatter among these
         records.
+    augment : bool
+        With `reference`: diagnose the reference records alone first, and compare with the model that has what they
+        name: the first is fitted, the others are held out. Takes about twice as long.
     refine : bool
         Where something is left beyond the noise, split the lump in which it sits in two, and diagnose again: what that
         does is `refinement`. Takes about twice as long, and some seconds for every way to split.
@@ -125,6 +130,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     checked = Validation(validation, operating_point)
     if validation is not None:
         refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
+    if augment and reference is None:
+        raise InputError("augment is given without reference records", where="argument augment",
+                         remedy="Leave it out: a diagnosis adds what it names to its system anyway.")
     if reference is not None:
         if refine:
             raise InputError("refine is given with reference records", where="argument refine",
@@ -132,8 +140,18 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         if operating_point is not None:
             raise InputError("operating_point is given with reference records", where="argument operating_point",
                              remedy="Leave it out: a record brings its own inputs.")
+        healthy, _ = measured_of(reference, "reference")
+
+        def alone(model: System, fitted: Sequence[Measured], held_out: Sequence[Measured]) -> Diagnosis:
+            return diagnose(model, fitted, validation=list(held_out) or None, parameters=parameters, effects=names,
+                            noise=noise, session_gain=session_gain, progress=progress)
+
+        def added(model: System) -> Augmented:
+            return augmented(model, healthy, parameters, alone)
+
         judged, compared = changed(system, records, reference, validation=checked, parameters=parameters, names=names,
-                                   noise=noise, session_gain=session_gain, progress=progress)
+                                   noise=noise, session_gain=session_gain, augment=added if augment else None,
+                                   progress=progress)
         return _with_reference(concluded(judged, "new records"), compared)
     progress("reading the noise off the records")
     floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
@@ -220,7 +238,7 @@ def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
     """With what the reference records say: how large a change would have been seen, or how good the model is."""
     said = visible_in_words(compared.visible) if found.verdict == "consistent" else compared.caveats
     law = compared.convection
-    said = said if law is None else (str(law), *said)
+    said = (*(str(one) for one in (compared.augmented, law) if one is not None), *said)
     answer = replace(found, reference=compared, caveats=(*found.caveats, *said),
                      outcome=replace(found.outcome, text=" ".join([found.outcome.text, *said])))
     return answer if law is None else in_own_names(answer, law)

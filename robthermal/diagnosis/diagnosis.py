@@ -16,52 +16,15 @@ from ..errors import Outcome
 from ..thermal import System
 from ._changed import Compared
 from ._file import write_json
+from ._found import Found
 from ._judge import Name, Verdict
 from ._refinement import Refinement
 from .data import NoiseEstimate
 from .effects import Candidate
-from .evidence import Adequacy, Evidence, Gap, HoldOut, Location, Remainder, Scores, UnknownHeat
+from .evidence import Adequacy, Gap, HoldOut, Location, Remainder, Scores, UnknownHeat
 from .fit import FoundAmbient, Refit
 from .plan import NextExperiment, Resolving
 from .search import Accepted, JointCheck, ruled_out
-
-
-@dataclass(frozen=True)
-class Found:
-    """An accepted effect.
-
-    Parameters
-    ----------
-    effect : str
-        Name in the catalog.
-    where : tuple of str
-        Parts of the system it acts on.
-    values : dict
-        Quantity to (value, standard deviation, unit).
-    p_value : float
-        Family-wise p-value of its score.
-    delta_bic : float
-        Against the model without it; above 10 is very strong.
-    evidence : Evidence, optional
-        Share of the gap, blocks and segments; None for a provisional effect.
-    """
-
-    effect: str
-    where: tuple[str, ...]
-    values: dict[str, tuple[float, float, str]]
-    p_value: float
-    delta_bic: float
-    evidence: Evidence | None = None
-
-    @property
-    def key(self) -> Name:
-        """Name and place, as in `Diagnosis.alternatives`."""
-        return self.effect, self.where
-
-    @property
-    def label(self) -> str:
-        """For tables: ``sensor_lag(T6)``."""
-        return f"{self.effect}({', '.join(self.where)})"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -202,7 +165,7 @@ class Diagnosis:
         return {
             "format": "robthermal-diagnosis/2",
             "verdict": self.verdict,
-            "effects": [_plain(found) for found in self.effects],
+            "effects": [found.to_dict() for found in self.effects],
             "alternatives": [[{"effect": effect, "where": list(where)} for effect, where in others]
                              for others in self.alternatives],
             "located": {"lumps": self.located.lumps, "sensors": self.located.sensors,
@@ -215,7 +178,7 @@ class Diagnosis:
                 "sample_time": plan.record.sample_time,
                 **({} if plan.measurement is None else {"measure": vars(plan.measurement)}),
                 "inputs": {name: plan.record[name].tolist() for name in plan.record.input_names}},
-            "provisional": [_plain(found) for found in self.provisional],
+            "provisional": [found.to_dict() for found in self.provisional],
             "remainder": None if self.remainder is None else self.remainder.to_dict(),
             "resolving": None if self.resolving is None else self.resolving.to_dict(),
             "ambients": list(map(_with_unit, self.ambients)),
@@ -238,13 +201,3 @@ class Diagnosis:
 
 def _with_unit(one: FoundAmbient) -> dict[str, Any]:
     return {**vars(one), "warmest": one.warmest if math.isfinite(one.warmest) else None, "unit": "K"}
-
-
-def _plain(found: Found) -> dict[str, Any]:
-    one = found.evidence
-    graded = {} if one is None else {"share": one.share, "reproducible": one.reproducible,
-                                     "stability": vars(one.stability)}
-    return {"effect": found.effect, "where": list(found.where), "p_value": found.p_value, "delta_bic": found.delta_bic,
-            **graded,
-            "parameters": {name: {"value": value, "std": std, "unit": unit}
-                           for name, (value, std, unit) in found.values.items()}}

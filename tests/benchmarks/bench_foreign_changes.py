@@ -1,8 +1,8 @@
 """What changed between two days, where the truth is finer than the network.
 
 Run: python tests/benchmarks/bench_foreign_changes.py [--seeds 1 2 3] [--machines bar ...] [--kinds ambient ...]
-[--jobs 2]. Fields of 150 cells and more, integrated by the code beside this file; every number of every day is off by
-3 %; three healthy days, one new. Wilson intervals of 95 %.
+[--augment] [--jobs 2]. Fields of 150 cells and more, integrated by the code beside this file; every number of every
+day is off by 3 %; three healthy days, one new. Wilson intervals of 95 %.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from joblib import Parallel, delayed  # noqa: E402
 import robthermal as rt  # noqa: E402
 
 
-def compared(change: Change) -> dict[str, Any]:
+def compared(change: Change, augment: bool) -> dict[str, Any]:
     """Verdict, what is named, and whether the truth is among it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         one = days(change)
         start = time.process_time()
-        found = rt.diagnose(one.system, one.new, reference=one.healthy)
+        found = rt.diagnose(one.system, one.new, reference=one.healthy, augment=augment)
         seconds = time.process_time() - start
     sets = [[(effect.effect, effect.where), *others]
             for effect, others in zip(found.effects, found.alternatives, strict=True)]
@@ -41,7 +41,16 @@ def compared(change: Change) -> dict[str, Any]:
     return {"key": change.key, "kind": change.kind, "verdict": found.verdict, "truth": one.truth, "size": one.size,
             "names": [[f"{name}({', '.join(where)})" for name, where in names] for names in sets],
             "right": bool(sets) and all(holds), "alone": bool(sets) and all(len(names) == 1 for names in sets),
-            "gap": found.to_dict()["gap"]["train"], "text": found.outcome.text, "seconds": seconds}
+            "gap": found.to_dict()["gap"]["train"], "text": found.outcome.text, "seconds": seconds, "path": one.path,
+            "added": found.to_dict()["reference"].get("augmented")}
+
+
+def added(row: dict[str, Any]) -> str:
+    """Whether the path that no network has was added to the model of the comparison."""
+    names = [(one["effect"], set(one["where"])) for one in row["added"]["effects"]]
+    if not names:
+        return "nothing added"
+    return "the path alone" if names == [("missing_link", set(row["path"]))] else "something else"
 
 
 ANSWERS = ("healthy", "refused", "unique", "in the set", "set without", "WRONG")
@@ -62,11 +71,12 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=[1, 2, 3])
     parser.add_argument("--machines", nargs="*", default=["bar", "plate", "stack", "housing"])
     parser.add_argument("--kinds", nargs="*", default=[*HEALTHY, *CHANGES, *OUTSIDE])
+    parser.add_argument("--augment", action="store_true", help="with what the healthy days name by themselves")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", type=Path, help="rows as JSON")
     chosen = parser.parse_args()
     header("what changed, finer truth: three healthy days of 900 samples, scatter 3 %")
-    rows = list(Parallel(n_jobs=chosen.jobs)(delayed(compared)(Change(machine, kind, seed))
+    rows = list(Parallel(n_jobs=chosen.jobs)(delayed(compared)(Change(machine, kind, seed), chosen.augment)
                 for kind in chosen.kinds for seed in chosen.seeds for machine in chosen.machines))
     if chosen.out:
         chosen.out.write_text(json.dumps(rows, indent=1))
@@ -79,6 +89,10 @@ def main() -> None:
                                ("healthy days called changed", HEALTHY, ANSWERS[1:]),
                                ("outside: a name", OUTSIDE, ("WRONG", "set without"))):
         print(f"{title:<28} {rate([row for row in rows if row['kind'] in kinds], lambda r: answer(r) in said)}")  # noqa: B023
+    paths = [added(row) for row in rows if row["path"] and row["added"]]
+    if paths:
+        print(f"{'hidden path, added before':<28} " + "; ".join(
+            f"{said} {paths.count(said)}" for said in ("the path alone", "nothing added", "something else")))
     for row in rows:
         if answer(row) != ("healthy" if row["kind"] in HEALTHY else "refused" if row["kind"] in OUTSIDE else "unique"):
             names = "; ".join(" or ".join(names) for names in row["names"]) or row["text"][:250]

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..._pandas import pd
-from ...diagnosis import Diagnosis
+from ...diagnosis import Diagnosis, with_named_effects
 from ...report import Report, Section, Table
-from ...thermal import FitRange, System
-from ...thermal.effects import add_effect, effects
 from ..diagnose import Diagnosed, diagnose_records, diagnosis_claims, diagnosis_report, save_diagnosis
 from ..request import Project
 from ..run import calibrated, diagnosis_facts
@@ -67,28 +65,11 @@ def _tests(result: Diagnosed) -> Section:
 def _adopted(context: Context, found: Diagnosis, data: Data, folder: Path) -> Report:
     """The system with the named effects, calibrated again: augmented.toml, augmented.json."""
     context.progress("calibrating again with the effects that were named")
-    system = _with_ranges(context.project.system, found)
+    system = with_named_effects(context.project.system, found.effects)
     done = calibrated(context.project, system, data.train, data.validation, context.progress,
                       responses=data.responses, held_out=data.held_out)
     write_calibration(done, data, folder, "augmented.toml", AUGMENTED)
     return calibration_part("diagnose", done, data, context.project)
 
 
-def _with_ranges(system: System, found: Diagnosis) -> System:
-    """The nominal system with the named effects, whose numbers the calibration may change around what was found."""
-    known, fit = effects(), dict(system.fit)
-    for one in found.effects:
-        values = {name: value for name, (value, _, _) in one.values.items()}
-        added = add_effect(system, one.effect, one.where, values)
-        system = added.system
-        quantities = {quantity.name: quantity for form in known[one.effect].all_forms for quantity in form.quantities}
-        for name, parameter in added.parameters.items():
-            quantity, value = quantities.get(name), system.parameter(parameter)
-            if value and quantity is not None and quantity.lower < quantity.upper:
-                fit[parameter] = FitRange(lower=min(value / _FACTOR, value * _FACTOR) if quantity.lower >= 0.0 else
-                                          value - _FACTOR * abs(value), upper=value + _FACTOR * abs(value))
-    return System(**{**dict(system), "fit": fit})
-
-
-_FACTOR = 10.0  # of the value that the diagnosis found: wide enough never to bind, where its effect is needed at all
 DIAGNOSE = StageJob("diagnose", _absent, _after, _depends, _run)

@@ -115,7 +115,8 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
                      validation: Sequence[Record | FrequencyResponse] = (),
                      progress: Callable[[str], None] = lambda stage: None, *,
                      operating_point: Mapping[str, float] | None = None, session_gain: bool = False,
-                     reference: Sequence[Record | FrequencyResponse] = (), refine: bool = False) -> Diagnosed:
+                     reference: Sequence[Record | FrequencyResponse] = (), augment: bool = False,
+                     refine: bool = False) -> Diagnosed:
     """Diagnose a system on records and frequency responses.
 
     Parameters
@@ -132,6 +133,8 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
         As in `rt.diagnose`.
     reference : sequence of Record
         Records of the healthy machine; then the question is what has changed since.
+    augment : bool
+        Whether the new records are compared with a model that has what the reference records alone name.
     refine : bool
         Whether the lump in which something is left is split in two, as in `rt.diagnose`.
 
@@ -163,10 +166,11 @@ def diagnose_records(system: System, files: tuple[Path, ...], train: Sequence[Re
     try:
         found = diagnose(system, list(train), validation=list(validation) or None, progress=progress,
                          operating_point=operating_point or None, session_gain=session_gain,
-                         reference=list(reference) or None, refine=refine)
+                         reference=list(reference) or None, augment=augment, refine=refine)
     except InputError as error:
         where = error.where.replace("argument records", "new records" if reference else "training records")
         where = where.replace("argument reference", "--reference").replace("argument refine", "--refine")
+        where = where.replace("argument augment", "--augment")
         where = where.replace("argument validation", "--validation").replace("argument system", f"system {system.name}")
         raise InputError(error.what, where=where, expected=error.expected, remedy=error.remedy) from None
     progress("running both models freely")

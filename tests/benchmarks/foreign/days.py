@@ -1,4 +1,7 @@
-"""Days of a machine: every number of its field is a few per cent off, and on one day something has changed."""
+"""Days of a machine: every number of its field is a few per cent off, and on one day something has changed.
+
+Some machines have a path, on all days, that no network has.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,18 @@ import robthermal as rt
 
 from .cases import SUB, H, drift, staircase
 from .field import Array, Heat
+from .hidden import CATALOG, missing_link
 from .machines import MACHINES, Machine
 from .march import march
 
 N, SCATTER = 900, 0.03
 CONVECTION = ", convection"  # all losses depend on the temperature difference, on all days: no network has that
+PATH = ", hidden path"  # between two lumps, on all days: no network has that, either
 CHANGES = ("ambient", "contact", "heater", "offset", "fan",
-           *(kind + CONVECTION for kind in ("ambient", "contact", "heater", "fan")))
-OUTSIDE = ("sensor drifts", "gusts", "sensor drifts" + CONVECTION, "gusts" + CONVECTION)
-HEALTHY = ("healthy", "healthy" + CONVECTION)
+           *(kind + CONVECTION for kind in ("ambient", "contact", "heater", "fan")),
+           *(kind + PATH for kind in ("ambient", "contact", "heater", "fan")))
+OUTSIDE = tuple(kind + more for more in ("", CONVECTION, PATH) for kind in ("sensor drifts", "gusts"))
+HEALTHY = tuple("healthy" + more for more in ("", CONVECTION, PATH))
 
 
 @dataclass(frozen=True, order=True)
@@ -46,6 +52,7 @@ class Days:
     new: rt.Record
     truth: tuple[tuple[str, ...], ...]
     size: float  # relative; of an offset or drift [K], of gusts [W]
+    path: tuple[str, ...] = ()  # lumps that a path joins on all days, of which the network knows nothing
 
 
 def days(change: Change, n_healthy: int = 3) -> Days:
@@ -54,16 +61,23 @@ def days(change: Change, n_healthy: int = 3) -> Days:
     seed, told = (int(rng.integers(2**31)) for _ in range(2))
     noise = float(np.exp(rng.uniform(*np.log((0.01, 0.05)))))
 
-    def machine() -> Machine:
-        return MACHINES[change.machine](np.random.default_rng(seed))
+    network = MACHINES[change.machine](np.random.default_rng(seed)).network(noise, np.random.default_rng(told))
+    convection, path = change.kind.endswith(CONVECTION), ()
+    if change.kind.endswith(PATH):
+        places, usual = CATALOG[change.machine]["missing_link"]
+        path, conductance = places[int(rng.integers(len(places)))], usual * float(rng.uniform(1.0, 3.0))
 
-    network = machine().network(noise, np.random.default_rng(told))
-    convection = change.kind.endswith(CONVECTION)
-    truth, size, act = _drawn(change.kind.removesuffix(CONVECTION), machine(), rng)
+    def machine() -> Machine:
+        made = MACHINES[change.machine](np.random.default_rng(seed))
+        if path:
+            missing_link(made, path, conductance)
+        return made
+
+    truth, size, act = _drawn(change.kind.removesuffix(CONVECTION).removesuffix(PATH), machine(), rng)
     by_itself = () if not convection else tuple(
         lump for lump in machine().plant.zones if not (change.kind.startswith("fan") and lump == _cooled(machine())[0]))
     healthy = [_record(machine(), noise, rng, _nothing, by_itself) for _ in range(n_healthy)]
-    return Days(network, healthy, _record(machine(), noise, rng, act, by_itself), truth, size)
+    return Days(network, healthy, _record(machine(), noise, rng, act, by_itself), truth, size, path)
 
 
 @dataclass

@@ -1,0 +1,133 @@
+"""What the reference records of a comparison name is added to the model first, where that is asked for.
+
+A remainder of the healthy machine hides small changes and stands in for large ones; an effect that its records name by
+themselves takes it away. One day is diagnosed and predicts the others: a common fit to several days leaves what
+conductances differ by from day to day, and no effect of the catalog explains that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..fitting import Choice, chosen_ranges
+from ..thermal import FitRange, System
+from ._found import Found
+from ._judge import Verdict
+from ._with_names import with_named_effects
+from .data import Measured
+from .evidence import Gap
+
+
+class Answer(Protocol):
+    """The part of a diagnosis that is looked at here."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """How it ended."""
+
+    @property
+    def effects(self) -> tuple[Found, ...]:
+        """What it names."""
+
+    @property
+    def gap(self) -> dict[str, Gap]:
+        """Before and after."""
+
+
+Diagnosed = Callable[[System, Sequence[Measured], Sequence[Measured]], Answer]
+
+
+@dataclass(frozen=True, eq=False)
+class Augmented:
+    """What a diagnosis of the reference records alone has added to the model of a comparison.
+
+    Parameters
+    ----------
+    verdict : str
+        Of that diagnosis.
+    effects : tuple of Found
+        What it added: all that it names, unless the records cannot tell it from something else.
+    without, rms : float
+        Free-run residual of the first reference record, to which it was fitted, without and with these effects [K].
+    system : System
+        Nominal system with these effects.
+    parameters : iterable or mapping, optional
+        What is fitted in it, as in `rt.diagnose`.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> late = rt.diagnosis.Found("sensor_lag", ("T3",), {"time_constant": (30.0, 1.0, "s")}, 1e-9, 400.0)
+    >>> nominal = rt.systems.two_module()
+    >>> print(rt.diagnosis.Augmented("named", (late,), 0.42, 0.05, rt.diagnosis.with_named_effects(nominal, [late])))
+    The reference records alone name sensor_lag(T3): it is in the model of this comparison and in the system of the \
+answer; what it leaves of the first one falls from 0.42 to 0.05 K.
+    """
+
+    verdict: Verdict
+    effects: tuple[Found, ...]
+    without: float
+    rms: float
+    system: System
+    parameters: Choice = None
+
+    def __str__(self) -> str:
+        if self.effects:
+            names = " and ".join(one.label for one in self.effects)
+            several = len(self.effects) > 1
+            return (f"The reference records alone name {names}: {'they are' if several else 'it is'} in the model of "
+                    f"this comparison and in the system of the answer; what it leaves of the first one falls from "
+                    f"{self.without:.2g} to {self.rms:.2g} K.")
+        why = {"consistent": "lack nothing that they could show",
+               "ambiguous": "cannot tell what is missing from something else",
+               }.get(self.verdict, "do not say what is missing")
+        return f"The reference records alone {why}: the model of this comparison has no effect added."
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds under "augmented" of "reference".
+
+        Returns
+        -------
+        dict
+        """
+        return {"verdict": self.verdict, "effects": [one.to_dict() for one in self.effects],
+                "rms_without": self.without, "rms": self.rms}
+
+
+def augmented(system: System, reference: Sequence[Measured], parameters: Choice, diagnosed: Diagnosed) -> Augmented:
+    """Diagnose the reference records alone, and add to the model what they name.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system, which gets what is named.
+    reference : sequence of Record
+        Of the healthy machine.
+    parameters : iterable or mapping, optional
+        Nominal parameters that are fitted.
+    diagnosed : callable
+        ``diagnosed(system, records, validation)`` diagnoses.
+    """
+    found = diagnosed(system, reference[:1], reference[1:])
+    gap = found.gap["train"]
+    if found.verdict not in ("named", "named_with_remainder"):
+        return Augmented(found.verdict, (), gap.before, gap.before, system, parameters)
+    more = with_named_effects(system, found.effects)
+    return Augmented(found.verdict, found.effects, gap.before, gap.after, *_fitted(system, more, parameters))
+
+
+def _fitted(system: System, more: System, parameters: Choice) -> tuple[System, Choice]:
+    """The system with effects and what is fitted in it: the numbers of effects beside those that were."""
+    if parameters is None:
+        return (more if system.fit else System(**{**dict(more), "fit": {}})), None
+    ranges = chosen_ranges(system, parameters)
+    chosen: dict[str | tuple[str, ...], FitRange] = {
+        group if len(group) > 1 else group[0]: FitRange(lower=lower, upper=upper,
+                                                        sigma=sigma if math.isfinite(sigma) else None)
+        for group, lower, upper, sigma in zip(ranges.members, map(float, ranges.lower), map(float, ranges.upper),
+                                              map(float, ranges.sigma), strict=True)}
+    chosen.update((name, limits) for name, limits in more.fit.items() if name not in system.fit)
+    return more, chosen

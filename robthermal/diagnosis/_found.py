@@ -1,0 +1,62 @@
+"""An accepted effect, as an answer has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ._judge import Name
+from .evidence import Evidence
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect.
+
+    Parameters
+    ----------
+    effect : str
+        Name in the catalog.
+    where : tuple of str
+        Parts of the system it acts on.
+    values : dict
+        Quantity to (value, standard deviation, unit).
+    p_value : float
+        Family-wise p-value of its score.
+    delta_bic : float
+        Against the model without it; above 10 is very strong.
+    evidence : Evidence, optional
+        Share of the gap, blocks and segments; None for a provisional effect.
+    """
+
+    effect: str
+    where: tuple[str, ...]
+    values: dict[str, tuple[float, float, str]]
+    p_value: float
+    delta_bic: float
+    evidence: Evidence | None = None
+
+    @property
+    def key(self) -> Name:
+        """Name and place, as in `Diagnosis.alternatives`."""
+        return self.effect, self.where
+
+    @property
+    def label(self) -> str:
+        """For tables: ``sensor_lag(T6)``."""
+        return f"{self.effect}({', '.join(self.where)})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``diagnosis.json`` holds of an effect.
+
+        Returns
+        -------
+        dict
+        """
+        one = self.evidence
+        graded = {} if one is None else {"share": one.share, "reproducible": one.reproducible,
+                                         "stability": vars(one.stability)}
+        return {"effect": self.effect, "where": list(self.where), "p_value": self.p_value, "delta_bic": self.delta_bic,
+                **graded,
+                "parameters": {name: {"value": value, "std": std, "unit": unit}
+                               for name, (value, std, unit) in self.values.items()}}

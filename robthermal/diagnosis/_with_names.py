@@ -1,0 +1,54 @@
+"""A nominal system with the effects that a diagnosis has named, ready to be fitted again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..thermal import FitRange, System, add_effect
+from ._found import Found
+from .effects import effects
+
+_FACTOR = 10.0  # of the value that the diagnosis found: wide enough never to bind, where its effect is needed at all
+
+
+def with_named_effects(system: System, named: Iterable[Found]) -> System:
+    """Add effects to a nominal system, their numbers with a range in its fit table.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system of the diagnosis; it is not changed.
+    named : iterable of Found
+        `Diagnosis.effects`. Numbers that were found may change by a factor of 10 in a fit.
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    InputError
+        If the system has one of the effects already.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> bar = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"bar": {"capacity": 100.0}},
+    ...                 links=[{"between": ("bar", "room"), "conductance": 0.5}], sensors={"T": {"lump": "bar"}})
+    >>> late = rt.diagnosis.Found("sensor_lag", ("T",), {"time_constant": (30.0, 1.0, "s")}, 1e-9, 400.0)
+    >>> augmented = rt.diagnosis.with_named_effects(bar, [late])
+    >>> augmented.sensors["T"].time_constant, augmented.fit["sensors.T.time_constant"].upper
+    (30.0, 330.0)
+    """
+    known, fit = effects(), dict(system.fit)
+    for one in named:
+        values = {name: value for name, (value, _, _) in one.values.items()}
+        added = add_effect(system, one.effect, one.where, values)
+        system = added.system
+        quantities = {quantity.name: quantity for form in known[one.effect].all_forms for quantity in form.quantities}
+        for name, parameter in added.parameters.items():
+            quantity, value = quantities.get(name), system.parameter(parameter)
+            if value and quantity is not None and quantity.lower < quantity.upper:
+                fit[parameter] = FitRange(lower=min(value / _FACTOR, value * _FACTOR) if quantity.lower >= 0.0 else
+                                          value - _FACTOR * abs(value), upper=value + _FACTOR * abs(value))
+    return System(**{**dict(system), "fit": fit})
