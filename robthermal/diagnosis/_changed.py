@@ -95,10 +95,11 @@ class Compared:
         noise = math.sqrt(max(self.rms**2 - self.remainder**2, 0.0))
         if not self.remainder > _COARSE * noise:
             return ()
-        return (f"The model leaves {self.remainder:.2g} K of the reference records, noise would leave {noise:.2g} K. "
-                "Until it is better, effects at the same lump may stand for each other, a heat into it for a weaker "
-                "path out of it: diagnose the reference records alone first, and compare with the system that this "
-                "gives.",)
+        first = "" if self.augmented else (
+            ": compare with the model that has what they name by themselves (augment), or diagnose one of them alone")
+        return (f"The model leaves {self.remainder:.2g} K of the reference records together, noise would leave "
+                f"{noise:.2g} K. Until it is better, effects at the same lump may stand for each other, a heat into it "
+                f"for a weaker path out of it{first}.",)
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "reference"; null for a change that is not seen at all.

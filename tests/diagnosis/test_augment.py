@@ -73,6 +73,7 @@ def test_the_path_is_added_and_the_contact_that_came_loose_is_named_with_its_siz
     assert any({"a", "sink"} == set(link.between) for link in found.system.links)
     plain = compared(contact=0.5, augment=False)
     assert plain.reference is not None and plain.reference.augmented is None
+    assert "augment" in plain.outcome.text and "(augment)" not in found.outcome.text
     assert found.reference is not None and found.reference.remainder < 0.5 * plain.reference.remainder
 
 

@@ -47,7 +47,7 @@ def test_the_link_is_named_that_came_loose_and_not_the_next_one(seed: int) -> No
     one = days(Change("bar", "contact" + CONVECTION, seed))
     found = rt.diagnose(one.system, one.new, reference=one.healthy)
     assert [effect.where for effect in found.effects] == list(one.truth) and found.alternatives == ((),)
-    assert "diagnose the reference records alone first" in found.outcome.text
+    assert "compare with the model that has what they name by themselves" in found.outcome.text
 
 
 def test_a_change_beyond_the_range_of_the_fit_table(tmp_path: Path) -> None:
