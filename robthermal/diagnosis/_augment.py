@@ -7,16 +7,15 @@ conductances differ by from day to day, and no effect of the catalog explains th
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..fitting import Choice, chosen_ranges
-from ..thermal import FitRange, System
+from ..fitting import Choice
+from ..thermal import System
 from ._found import Found
 from ._judge import Verdict
-from ._with_names import with_named_effects
+from ._with_names import with_fitted
 from .data import Measured
 from .evidence import Gap
 
@@ -37,7 +36,12 @@ class Answer(Protocol):
         """Before and after."""
 
 
-Diagnosed = Callable[[System, Sequence[Measured], Sequence[Measured]], Answer]
+class Diagnosed(Protocol):
+    """Diagnoses a system."""
+
+    def __call__(self, system: System, records: Sequence[Measured], /, *, validation: Sequence[Measured] | None
+                 ) -> Answer:
+        """Names what records lack, tested on validation records."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,25 +113,11 @@ def augmented(system: System, reference: Sequence[Measured], parameters: Choice,
     parameters : iterable or mapping, optional
         Nominal parameters that are fitted.
     diagnosed : callable
-        ``diagnosed(system, records, validation)`` diagnoses.
+        ``diagnosed(system, records, validation=...)`` diagnoses.
     """
-    found = diagnosed(system, reference[:1], reference[1:])
+    found = diagnosed(system, reference[:1], validation=reference[1:] or None)
     gap = found.gap["train"]
     if found.verdict not in ("named", "named_with_remainder"):
         return Augmented(found.verdict, (), gap.before, gap.before, system, parameters)
-    more = with_named_effects(system, found.effects)
-    return Augmented(found.verdict, found.effects, gap.before, gap.after, *_fitted(system, more, parameters))
-
-
-def _fitted(system: System, more: System, parameters: Choice) -> tuple[System, Choice]:
-    """The system with effects and what is fitted in it: the numbers of effects beside those that were."""
-    if parameters is None:
-        return (more if system.fit else System(**{**dict(more), "fit": {}})), None
-    ranges = chosen_ranges(system, parameters)
-    chosen: dict[str | tuple[str, ...], FitRange] = {
-        group if len(group) > 1 else group[0]: FitRange(lower=lower, upper=upper,
-                                                        sigma=sigma if math.isfinite(sigma) else None)
-        for group, lower, upper, sigma in zip(ranges.members, map(float, ranges.lower), map(float, ranges.upper),
-                                              map(float, ranges.sigma), strict=True)}
-    chosen.update((name, limits) for name, limits in more.fit.items() if name not in system.fit)
-    return more, chosen
+    return Augmented(found.verdict, found.effects, gap.before, gap.after,
+                     *with_fitted(system, found.effects, parameters))

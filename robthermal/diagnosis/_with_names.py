@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
+from ..fitting import Choice, chosen_ranges
 from ..thermal import FitRange, System, add_effect
 from ._found import Found
 from .effects import effects
@@ -52,3 +54,30 @@ def with_named_effects(system: System, named: Iterable[Found]) -> System:
                 fit[parameter] = FitRange(lower=min(value / _FACTOR, value * _FACTOR) if quantity.lower >= 0.0 else
                                           value - _FACTOR * abs(value), upper=value + _FACTOR * abs(value))
     return System(**{**dict(system), "fit": fit})
+
+
+def with_fitted(system: System, named: Iterable[Found], parameters: Choice) -> tuple[System, Choice]:
+    """The system with effects and what is fitted in it: the numbers of effects beside those that were.
+
+    Without a fit table and without `parameters` all numbers are taken as right, those of effects as they were found.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system, which gets the effects.
+    named : iterable of Found
+        Effects of a diagnosis.
+    parameters : iterable or mapping, optional
+        Nominal parameters that were refitted in it.
+    """
+    more = with_named_effects(system, named)
+    if parameters is None:
+        return (more if system.fit else System(**{**dict(more), "fit": {}})), None
+    ranges = chosen_ranges(system, parameters)
+    chosen: dict[str | tuple[str, ...], FitRange] = {
+        group if len(group) > 1 else group[0]: FitRange(lower=lower, upper=upper,
+                                                        sigma=sigma if math.isfinite(sigma) else None)
+        for group, lower, upper, sigma in zip(ranges.members, map(float, ranges.lower), map(float, ranges.upper),
+                                              map(float, ranges.sigma), strict=True)}
+    chosen.update((name, limits) for name, limits in more.fit.items() if name not in system.fit)
+    return more, chosen

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
 from ..fitting import Choice, measured_of
 from ..thermal import System
-from ._augment import Augmented, augmented
+from ._augment import augmented
 from ._changed import Compared, changed
 from ._doubts import (
     ambients_in_words,
@@ -24,6 +25,7 @@ from ._doubts import (
     place_undecided,
     within_the_body,
 )
+from ._each_record import asked_of_each
 from ._finer_network import unless_finer
 from ._found import Found
 from ._graded import graded, lasting_beyond_steps
@@ -130,28 +132,14 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     checked = Validation(validation, operating_point)
     if validation is not None:
         refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
-    if augment and reference is None:
-        raise InputError("augment is given without reference records", where="argument augment",
-                         remedy="Leave it out: a diagnosis adds what it names to its system anyway.")
+    again = partial(diagnose, parameters=parameters, effects=names, noise=noise, progress=progress)
+    _refuse_mixed(reference, augment=augment, refine=refine, operating_point=operating_point)
     if reference is not None:
-        if refine:
-            raise InputError("refine is given with reference records", where="argument refine",
-                             remedy="Refine the network on the reference records alone first.")
-        if operating_point is not None:
-            raise InputError("operating_point is given with reference records", where="argument operating_point",
-                             remedy="Leave it out: a record brings its own inputs.")
         healthy, _ = measured_of(reference, "reference")
-
-        def alone(model: System, fitted: Sequence[Measured], held_out: Sequence[Measured]) -> Diagnosis:
-            return diagnose(model, fitted, validation=list(held_out) or None, parameters=parameters, effects=names,
-                            noise=noise, session_gain=session_gain, progress=progress)
-
-        def added(model: System) -> Augmented:
-            return augmented(model, healthy, parameters, alone)
-
-        judged, compared = changed(system, records, reference, validation=checked, parameters=parameters, names=names,
-                                   noise=noise, session_gain=session_gain, augment=added if augment else None,
-                                   progress=progress)
+        judged, compared = changed(
+            system, records, reference, validation=checked, parameters=parameters, names=names, noise=noise,
+            session_gain=session_gain, progress=progress, augment=None if not augment else lambda model: augmented(
+                model, healthy, parameters, partial(again, session_gain=session_gain)))
         return _with_reference(concluded(judged, "new records"), compared)
     progress("reading the noise off the records")
     floor = noise_floor(system, records, noise=noise, operating_point=operating_point)
@@ -166,17 +154,49 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     judged = asked_of_means(judged, lambda others: refit(system, others, floor, parameters=parameters,
                                                          session_gain=session_gain), checked)
     progress("locating the misfit and planning the next experiment")
-    found = concluded(judged)
+    found, fitted_to, held_out = concluded(judged), records, validation
+    every, responses = measured_of(records, "records")
+    if len(every) > 1 and not responses:
+        progress("asking whether the records differ from each other")
+        first, others = every[:1], [*every[1:], *_listed(validation)]
+        found = asked_of_each(
+            judged, found, concluded, system, parameters, alone=lambda: again(system, first, validation=others),
+            fits=lambda model, chosen: [refit(model, one, floor, parameters=chosen) for one in every])
+        if len(found.nominal.records) == 1:
+            fitted_to, held_out = first, others
     if not refine:
         return found
     progress("splitting the lump in which the remainder sits")
     return replace(found, refinement=refined(
         found, system, parameters,
-        fitted=lambda split, chosen: refit(split, records, floor, parameters=chosen, operating_point=operating_point,
+        fitted=lambda split, chosen: refit(split, fitted_to, floor, parameters=chosen, operating_point=operating_point,
                                            session_gain=session_gain),
-        again=lambda split, chosen: diagnose(split, records, validation=validation, parameters=chosen, effects=names,
-                                             noise=noise, operating_point=operating_point, session_gain=session_gain,
-                                             progress=progress)))
+        again=lambda split, chosen: again(split, fitted_to, validation=held_out, parameters=chosen,
+                                          operating_point=operating_point, session_gain=session_gain)))
+
+
+def _refuse_mixed(reference: Measured | Sequence[Measured] | None, *, augment: bool, refine: bool,
+                  operating_point: Mapping[str, float] | None) -> None:
+    """Refuse what is asked of a comparison of days, or of a diagnosis, and belongs to the other."""
+    if reference is None:
+        if augment:
+            raise InputError("augment is given without reference records", where="argument augment",
+                             remedy="Leave it out: a diagnosis adds what it names to its system anyway.")
+        return
+    if refine:
+        raise InputError("refine is given with reference records", where="argument refine",
+                         remedy="Refine the network on the reference records alone first.")
+    if operating_point is not None:
+        raise InputError("operating_point is given with reference records", where="argument operating_point",
+                         remedy="Leave it out: a record brings its own inputs.")
+
+
+def _listed(data: Measured | Sequence[Measured] | None) -> list[Measured]:
+    """Data of an argument as a list."""
+    if data is None:
+        return []
+    records, responses = measured_of(data, "validation")
+    return [*records, *responses]
 
 
 def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> Judged:

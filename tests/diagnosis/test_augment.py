@@ -1,6 +1,6 @@
 """A comparison with a model that has what the records of the healthy machine name by themselves.
 
-The truth is a plate of two bodies and a sink with a path that the network has not, integrated exactly by scipy.
+The truth is three bodies in a row with a path that the network has not, and days that differ.
 """
 
 from __future__ import annotations
@@ -10,44 +10,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
+from differing_days import CONTACT, FEW, PATH, SYSTEM, day
 
 import robthermal as rt
 from robthermal.diagnosis._augment import augmented
 from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
-
-H, N, ROOM, NOISE, PATH = 20.0, 500, 295.0, 0.02, 0.2
-BODIES, C = ("a", "b", "sink"), np.array([60.0, 90.0, 200.0])
-G = {("a", "b"): 0.8, ("b", "sink"): 1.1, ("a", "room"): 0.05, ("b", "room"): 0.08, ("sink", "room"): 0.5}
-SYSTEM = rt.System(
-    ambients={"room": {"temperature": ROOM}}, lumps={name: {"capacity": c} for name, c in zip(BODIES, C, strict=True)},
-    links=[{"between": pair, "conductance": value} for pair, value in G.items()],
-    inputs={"q_a": {"lump": "a"}, "q_b": {"lump": "b"}},
-    sensors={f"T_{name}": {"lump": name, "noise": NOISE} for name in BODIES},
-    fit={f"links.{'-'.join(pair)}.conductance": {"lower": value / 4.0, "upper": 4.0 * value, "sigma": 0.2 * value}
-         for pair, value in G.items()})
-FEW = ("heat_source", "missing_link", "missing_ambient_link", "sensor_offset", "sensor_lag")
-CONTACT = "links.b-sink.conductance"
-
-
-@cache
-def day(seed: int, path: float = PATH, contact: float = 1.0) -> rt.Record:
-    """Every conductance of the day is off by 2 %; that from b to the sink has a factor."""
-    rng = np.random.default_rng(seed)
-    q = np.repeat(rng.choice([0.0, 6.0, 15.0, 25.0], (N // 20, 2)), 20, axis=0)
-    K = np.zeros((4, 4))
-    for (one, other), value in {**G, ("a", "sink"): path}.items():
-        i, j = ((*BODIES, "room").index(end) for end in (one, other))
-        value *= np.exp(0.02 * rng.standard_normal()) * (contact if (one, other) == ("b", "sink") else 1.0)
-        K[[i, j], [j, i]] += value
-        K[[i, j], [i, j]] -= value
-    step = expm(H * np.block([[K[:3] / C[:, None], np.eye(3)[:, :2] / C[:2]], [np.zeros((3, 6))]]))
-    x, rows = np.r_[np.full(4, ROOM), 0.0, 0.0], []
-    for power in q:
-        rows.append(x[:3])
-        x = step @ np.r_[x[:4], power]
-    return rt.Record(sample_time=H, inputs=q, outputs=np.array(rows) + NOISE * rng.standard_normal((N, 3)),
-                     input_names=["q_a", "q_b"], output_names=[f"T_{name}" for name in BODIES], start_time=1e5 * seed)
 
 
 @cache
@@ -118,7 +85,7 @@ class Answer:
 
 @pytest.mark.parametrize("verdict", ["named", "named_with_remainder", "ambiguous", "unexplained", "consistent"])
 def test_only_what_stands_alone_is_added(verdict: str) -> None:
-    one = augmented(SYSTEM, [day(1)], None, lambda *given: Answer(verdict))
+    one = augmented(SYSTEM, [day(1)], None, lambda *given, **held_out: Answer(verdict))
     assert bool(one.effects) == verdict.startswith("named")
     assert (one.system.sensors["T_b"].time_constant or 0.0) == (40.0 if one.effects else 0.0)
     assert ("sensors.T_b.time_constant" in one.system.fit) == bool(one.effects)
@@ -127,8 +94,8 @@ def test_only_what_stands_alone_is_added(verdict: str) -> None:
 def test_one_day_is_fitted_and_predicts_the_others() -> None:
     seen = []
 
-    def diagnosed(system: rt.System, training: list[rt.Record], unseen: list[rt.Record]) -> Answer:
-        seen.append((len(training), len(unseen)))
+    def diagnosed(system: rt.System, training: list[rt.Record], validation: list[rt.Record] | None) -> Answer:
+        seen.append((len(training), len(validation or [])))
         return Answer("consistent")
 
     for n in (1, 2, 3):
@@ -138,7 +105,7 @@ def test_one_day_is_fitted_and_predicts_the_others() -> None:
 
 def test_numbers_of_the_effect_are_fitted_beside_those_that_were_chosen() -> None:
     def fitted(system: rt.System, parameters: object) -> tuple[rt.System, object]:
-        one = augmented(system, [day(1)], parameters, lambda *given: Answer("named"))
+        one = augmented(system, [day(1)], parameters, lambda *given, **held_out: Answer("named"))
         return one.system, one.parameters
 
     system, chosen = fitted(SYSTEM, {CONTACT: (0.3, 3.0)})

@@ -1,0 +1,143 @@
+"""Whether records differ from each other in the numbers of the machine, where a common fit to all does not reach noise.
+
+No effect of the catalog is what conductances do from day to day; a common fit leaves it, and one effect or another may
+take some of it away. What is not needed in any record by itself is no name; what a record by itself names, and the
+others predict, is one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from ..errors import Diverged, InputError
+from ..fitting import Choice
+from ..thermal import System
+from ._judge import Judged
+from ._outcomes import DiagnosisCode
+from ._with_names import with_fitted
+from .diagnosis import Diagnosis
+from .evidence import expected_rms
+from .fit import Refit
+
+Fits = Callable[[System, Choice], Sequence[Refit]]
+_HALF = 0.5  # of the error beyond noise that the common fit leaves: more of it, and records hardly differ
+
+
+@dataclass(frozen=True)
+class Differing:
+    """What records leave by themselves and together.
+
+    Parameters
+    ----------
+    text : str
+        Both, in a sentence.
+    needed : bool
+        Whether the effects found are needed for that within a record.
+    """
+
+    text: str
+    needed: bool
+
+
+def asked_of_each(judged: Judged, found: Diagnosis, concluded: Callable[[Judged], Diagnosis], system: System,
+                  parameters: Choice, fits: Fits, alone: Callable[[], Diagnosis]) -> Diagnosis:
+    """The answer; where the common fit does not end in noise, records are asked by themselves.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer for the common fit.
+    found : Diagnosis
+        The same in words.
+    concluded : callable
+        ``concluded(judged)`` puts an answer into words.
+    system, parameters, fits
+        As of `differing`.
+    alone : callable
+        ``alone()`` diagnoses the first record, with all others as validation.
+    """
+    differ = None if found.verdict in ("consistent", "named") else differing(found, system, parameters, fits)
+    if differ is None:
+        return found
+    if not differ.needed:
+        found = concluded(without_names(judged))
+    return by_itself(found, differ, alone()) if found.verdict == "unexplained" else found
+
+
+def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) -> Differing | None:
+    """How much less every record leaves by itself than all of them together; None if a common fit is about as good.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        Answer for the common fit, with what it names, or what came nearest.
+    system : System
+        Nominal system that was diagnosed.
+    parameters : iterable or mapping, optional
+        Nominal parameters that were refitted.
+    fits : callable
+        ``fits(system, parameters)`` fits a system to every record by itself.
+    """
+    together = math.sqrt(_beyond(found.fit))
+    tried = [(system, parameters, "without any effect")]
+    if found.provisional:
+        beside = f"beside {' and '.join(one.label for one in found.provisional)}"
+        tried.append((*with_fitted(system, found.provisional, parameters), beside))
+    for model, chosen, how in tried:
+        alone = _pooled(model, chosen, fits)
+        if alone < _HALF * together:
+            return Differing(f"Each record by itself leaves {alone:.2g} K beyond the noise {how}, all together leave "
+                             f"{together:.2g} K: numbers of the machine differ from record to record.",
+                             needed=model is not system)
+    return None
+
+
+def without_names(judged: Judged) -> Judged:
+    """The answer "unexplained" in the place of names that no record by itself needs.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer for the common fit.
+    """
+    return replace(judged, verdict="unexplained", evidence=(), plain=None, why="no record by itself needs it",
+                   outcome=DiagnosisCode.UNEXPLAINED.outcome(
+                       "No name: what all records together do not explain, each by itself does without any effect.",
+                       remedy="Diagnose days against each other with reference records."))
+
+
+def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis) -> Diagnosis:
+    """The answer of the first record, which the others test, if it has a name; else the one for all records.
+
+    Parameters
+    ----------
+    found : Diagnosis
+        Answer for the common fit.
+    differ : Differing
+        How records differ.
+    alone : Diagnosis
+        Answer for the first record, with all others as validation.
+    """
+    if alone.verdict in ("named", "named_with_remainder"):
+        text = f"{differ.text} So the first record is diagnosed by itself, and the others test what it names."
+        return replace(alone, caveats=(*alone.caveats, text),
+                       outcome=replace(alone.outcome, text=f"{alone.outcome.text} {text}"))
+    text = f"{differ.text} The first record by itself names nothing that predicts the others."
+    return replace(found, nearest=f"{found.nearest} {text}".strip(),
+                   outcome=replace(found.outcome, text=f"{found.outcome.text} {text}"))
+
+
+def _pooled(system: System, parameters: Choice, fits: Fits) -> float:
+    """Error beyond noise of fits to every record by itself [K]; infinite where one cannot be fitted."""
+    try:
+        each = fits(system, parameters)
+    except (Diverged, InputError):
+        return math.inf
+    return math.sqrt(sum(_beyond(fit) * fit.n_readings for fit in each) / sum(fit.n_readings for fit in each))
+
+
+def _beyond(fit: Refit) -> float:
+    """Mean square of the free-run residual beyond noise [K²]."""
+    return max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
