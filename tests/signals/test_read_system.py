@@ -58,6 +58,11 @@ def test_the_argument_overrules_the_unit_of_the_system(plant: Plant, write: Writ
 
 FAULTS: dict[str, tuple[str, str]] = {
     "heater missing": (text(HEADER.replace("heater", "pump")), "no column 'heater'.*--column 'heater=pump'.*Zeros if"),
+    "no unit of a heater": (text(HEADER.replace("heater", "I [mA]")), "--column 'heater=HEADER' .* one of: 'I .mA.'"),
+    "a unit of a heater": (
+        text(HEADER.replace("heater", "I [mA],fan,P [W]"), ROWS.replace("\n", ",0,0\n")),
+        "--column 'heater=P .W.' .* with one of: 'P .W.', 'fan', 'I .mA.'",
+    ),
     "module missing": (text(HEADER.replace("m1", "valve")), r"no column 'm1' \(module current\)"),
     "blank": (text(HEADER.replace("T6", "T 6")), "no column 'T6' \\(sensor\\), but 'T 6'.*--column 'T6=T 6'"),
     "typing error": (text(HEADER.replace("heater", "haeter")), "no column 'heater' \\(heater\\), but 'haeter'"),

@@ -12,7 +12,7 @@ from .._thermistor import Thermistor
 from ._options import ColumnChoice, Declared
 from ._table import Table
 from ._tokens import short
-from ._units import Unit, split_header, unit_of
+from ._units import Unit, likely_first, split_header, unit_of
 
 Limits = tuple[float, float] | None
 _LISTED = 200  # characters of a list of headers in a message
@@ -24,6 +24,8 @@ _KINDS = {
     "sensor": "sensor",
     "voltage": "module voltage",
 }
+_QUANTITIES = {"input": ("power", "percent"), "current": ("current",), "voltage": ("voltage",),
+               "ambient": ("temperature",), "sensor": ("temperature",)}
 
 
 class SystemLike(Protocol):
@@ -371,10 +373,11 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
     names = {split_header(header)[0]: header for header in unknown}
     near = suggestion(name, tuple(names)).split(" Known:")[0] if unknown else ""
     near = near if near.startswith("Did") else ""
-    listed = ", ".join(map(repr, unknown))
+    ordered, likely = likely_first(unknown, _QUANTITIES.get(role, ()))
+    listed = ", ".join(map(repr, ordered))
     listed = listed if len(listed) <= _LISTED else listed[:_LISTED] + " …"
     alike = next((header for own, header in names.items() if f"{own!r}" in near), None)
-    example = alike or (unknown[0] if unknown else "HEADER")
+    example = alike or (ordered[0] if likely else "HEADER")
     remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
     if role in ("input", "current"):
         remedy += f" Zeros if {name!r} was off."
