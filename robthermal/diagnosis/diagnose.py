@@ -160,8 +160,10 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         progress("asking whether the records differ from each other")
         first, others = every[:1], [*every[1:], *_listed(validation)]
         found = asked_of_each(
-            judged, found, concluded, system, parameters, alone=lambda: again(system, first, validation=others),
-            fits=lambda model, chosen: [refit(model, one, floor, parameters=chosen) for one in every])
+            judged, found, concluded, system, parameters,
+            fits=lambda model, chosen: [refit(model, one, floor, parameters=chosen, session_gain=session_gain)
+                                        for one in every],
+            alone=lambda: again(system, first, validation=others, session_gain=session_gain))
         if len(found.nominal.records) == 1:
             fitted_to, held_out = first, others
     if not refine:
