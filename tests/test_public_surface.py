@@ -57,7 +57,7 @@ SURFACE = {
         uncertainty_weight
     """,
     "diagnosis": """
-        Adequacy Augmented Candidate Compared Decision Diagnosis DiagnosisCode Effect EffectSet Entry Evidence
+        Adequacy Augmented Candidate Compared Decision Diagnosis DiagnosisCode Differing Effect EffectSet Entry Evidence
         Found FoundAmbient Gap HoldOut
         JointCheck JointSelection Left Refinement Resolving Split
         LinearizedRecord Location Measurement NextExperiment NoiseEstimate NoiseScaling Quantity Refit Remainder

@@ -2,6 +2,7 @@
 
 from ._augment import Augmented as Augmented
 from ._changed import Compared as Compared
+from ._differing import Differing as Differing
 from ._found import Found as Found
 from ._outcomes import DiagnosisCode as DiagnosisCode
 from ._refinement import Refinement as Refinement
@@ -54,10 +55,10 @@ from .search import decide as decide
 from .search import refit_short_list as refit_short_list
 from .search import select_jointly as select_jointly
 
-__all__ = ["Adequacy", "Augmented", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Effect",
-           "EffectSet", "Entry", "Evidence", "Found", "FoundAmbient", "Gap", "HoldOut", "JointCheck", "JointSelection",
-           "Left", "LinearizedRecord", "Location", "Measurement", "NextExperiment", "NoiseEstimate", "NoiseScaling",
-           "Quantity", "Refinement", "Refit", "Remainder", "Resolving", "Response", "Scores", "ShortList", "Split",
-           "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide", "diagnose", "effects",
-           "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit", "refit_short_list",
-           "register_effect", "score", "select_jointly", "unknown_heat", "with_named_effects"]
+__all__ = ["Adequacy", "Augmented", "Candidate", "Compared", "Decision", "Diagnosis", "DiagnosisCode", "Differing",
+           "Effect", "EffectSet", "Entry", "Evidence", "Found", "FoundAmbient", "Gap", "HoldOut", "JointCheck",
+           "JointSelection", "Left", "LinearizedRecord", "Location", "Measurement", "NextExperiment", "NoiseEstimate",
+           "NoiseScaling", "Quantity", "Refinement", "Refit", "Remainder", "Resolving", "Response", "Scores",
+           "ShortList", "Split", "Stability", "UnknownHeat", "ValidationResiduals", "adequacy", "candidates", "decide",
+           "diagnose", "effects", "forget_effect", "hold_out", "locate", "next_experiment", "noise_floor", "refit",
+           "refit_short_list", "register_effect", "score", "select_jointly", "unknown_heat", "with_named_effects"]

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ..fitting import Choice
 from ..thermal import System
+from ._differing import Differing
 from ._judge import Judged
 from ._outcomes import DiagnosisCode
 from ._with_names import with_fitted
@@ -23,22 +24,6 @@ from .fit import Refit
 
 Fits = Callable[[System, Choice], Sequence[Refit]]
 _HALF = 0.5  # of the error beyond noise that the common fit leaves: more of it, and records hardly differ
-
-
-@dataclass(frozen=True)
-class Differing:
-    """What records leave by themselves and together.
-
-    Parameters
-    ----------
-    text : str
-        Both, in a sentence.
-    needed : bool
-        Whether the effects found are needed for that within a record.
-    """
-
-    text: str
-    needed: bool
 
 
 def asked_of_each(judged: Judged, found: Diagnosis, concluded: Callable[[Judged], Diagnosis], system: System,
@@ -69,6 +54,8 @@ def asked_of_each(judged: Judged, found: Diagnosis, concluded: Callable[[Judged]
 def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) -> Differing | None:
     """How much less every record leaves by itself than all of them together; None if a common fit is about as good.
 
+    What all together leave must be more than noise, too.
+
     Parameters
     ----------
     found : Diagnosis
@@ -80,17 +67,13 @@ def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) 
     fits : callable
         ``fits(system, parameters)`` fits a system to every record by itself.
     """
+    if not _beyond(found.fit) > expected_rms(found.fit) ** 2:  # nothing to speak of is left
+        return None
     together = math.sqrt(_beyond(found.fit))
-    tried = [(system, parameters, "without any effect")]
-    if found.provisional:
-        beside = f"beside {' and '.join(one.label for one in found.provisional)}"
-        tried.append((*with_fitted(system, found.provisional, parameters), beside))
-    for model, chosen, how in tried:
-        alone = _pooled(model, chosen, fits)
+    for effects in ((), found.provisional)[:1 + bool(found.provisional)]:
+        alone = _pooled(*with_fitted(system, effects, parameters), fits)
         if alone < _HALF * together:
-            return Differing(f"Each record by itself leaves {alone:.2g} K beyond the noise {how}, all together leave "
-                             f"{together:.2g} K: numbers of the machine differ from record to record.",
-                             needed=model is not system)
+            return Differing(alone, together, needed=bool(effects))
     return None
 
 
@@ -121,12 +104,11 @@ def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis) -> Diagnosi
         Answer for the first record, with all others as validation.
     """
     if alone.verdict in ("named", "named_with_remainder"):
-        text = f"{differ.text} So the first record is diagnosed by itself, and the others test what it names."
-        return replace(alone, caveats=(*alone.caveats, text),
+        text = f"{differ} So the first record is diagnosed by itself, and the others test what it names."
+        return replace(alone, differing=differ, caveats=(*alone.caveats, text),
                        outcome=replace(alone.outcome, text=f"{alone.outcome.text} {text}"))
-    text = f"{differ.text} The first record by itself names nothing that predicts the others."
-    return replace(found, nearest=f"{found.nearest} {text}".strip(),
-                   outcome=replace(found.outcome, text=f"{found.outcome.text} {text}"))
+    text = f"{differ} The first record by itself names nothing that predicts the others."
+    return replace(found, differing=differ, outcome=replace(found.outcome, text=f"{found.outcome.text} {text}"))
 
 
 def _pooled(system: System, parameters: Choice, fits: Fits) -> float:

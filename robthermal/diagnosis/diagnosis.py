@@ -15,6 +15,7 @@ from .._html import short_table
 from ..errors import Outcome
 from ..thermal import System
 from ._changed import Compared
+from ._differing import Differing
 from ._file import write_json
 from ._found import Found
 from ._judge import Name, Verdict
@@ -77,6 +78,9 @@ class Diagnosis:
     nearest : str
         Where nothing is named: what came nearest, what it takes off the error, and why it is no name; empty if nothing
         did. The outcome's text has it, too.
+    differing : Differing or None
+        That a common fit does not reach noise because numbers of the machine differ from record to record; with a name,
+        the answer is that of the first record, which all others test. None where a common fit is about as good.
     ambients : tuple of FoundAmbient
         Ambients that a training record does not hold, as its readings say them; `system` keeps its own.
     """
@@ -107,6 +111,7 @@ class Diagnosis:
     means: str = ""
     caveats: tuple[str, ...] = ()
     nearest: str = ""
+    differing: Differing | None = None
     ambients: tuple[FoundAmbient, ...] = ()
 
     @property
@@ -183,9 +188,9 @@ class Diagnosis:
             "resolving": None if self.resolving is None else self.resolving.to_dict(),
             "ambients": list(map(_with_unit, self.ambients)),
             "outcome": vars(self.outcome),
-            **({} if self.reference is None else {"reference": self.reference.to_dict()}),
-            **({} if self.refinement is None else {"refinement": self.refinement.to_dict()}),
-            **({} if self.unknown_heat is None else {"unknown_heat": self.unknown_heat.to_dict()}),
+            **{key: one.to_dict() for key, one in
+               (("reference", self.reference), ("differing", self.differing), ("refinement", self.refinement),
+                ("unknown_heat", self.unknown_heat)) if one is not None},
         }
 
     def save(self, path: str | Path) -> None:

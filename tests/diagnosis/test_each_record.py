@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from differing_days import FEW, PATH, SYSTEM, day
 
 import robthermal as rt
 from robthermal.diagnosis._each_record import differing
+from robthermal.jobs.diagnose._answer import answer_sentence
 
 
 @pytest.mark.parametrize("held_out", [True, False])
@@ -20,8 +22,11 @@ def test_a_path_is_named_although_conductances_differ_from_day_to_day(held_out: 
     value, std, _ = found.effects[0].values["conductance"]
     assert value == pytest.approx(PATH, abs=3.0 * std)
     assert found.gap["validation"].after < 0.7 * found.gap["validation"].before
-    assert "numbers of the machine differ from record to record. So the first record" in found.caveats[-1]
+    assert found.caveats[-1].startswith("Numbers of the machine differ from record to record: with what came nearest")
     assert found.caveats[-1] in found.outcome.text
+    assert found.differing is not None and found.to_dict()["differing"] == {
+        "alone": pytest.approx(0.0, abs=0.01), "together": pytest.approx(0.15, abs=0.01), "needed": True}
+    assert answer_sentence(found).startswith("The model lacks a heat path between a and sink.")
 
 
 def test_a_difference_between_days_is_no_step_of_a_conductance() -> None:
@@ -29,15 +34,19 @@ def test_a_difference_between_days_is_no_step_of_a_conductance() -> None:
     found = rt.diagnose(SYSTEM, [day(seed, 0.0) for seed in (1, 2, 3)], effects=["sensor_offset", "conductance_step"])
     assert found.verdict == "unexplained" and not found.effects
     assert found.provisional and "No name, because no record by itself needs it." in found.nearest
-    assert "Each record by itself leaves 0 K beyond the noise without any effect" in found.outcome.text
     assert "names nothing that predicts the others" in found.outcome.text
+    assert found.differing is not None and not found.differing.needed and str(found.differing) in found.outcome.text
+    assert answer_sentence(found).startswith("Numbers of the machine differ from record to record: without any effect "
+                                             "each by itself leaves ")
+    assert json.loads(json.dumps(found.to_dict()))["differing"]["together"] == pytest.approx(found.differing.together)
 
 
 def test_the_same_days_with_the_same_numbers_are_consistent() -> None:
     same = [rt.thermal.simulate(SYSTEM, day(seed)) for seed in (1, 2)]
     rng = np.random.default_rng(1)
     records = [one.with_outputs(one.outputs + 0.02 * rng.standard_normal(one.outputs.shape)) for one in same]
-    assert rt.diagnose(SYSTEM, records, effects=FEW).verdict == "consistent"
+    found = rt.diagnose(SYSTEM, records, effects=FEW)
+    assert found.verdict == "consistent" and found.differing is None and "differing" not in found.to_dict()
 
 
 def test_a_contact_that_came_loose_between_two_records_keeps_its_name() -> None:

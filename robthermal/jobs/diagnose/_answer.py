@@ -36,9 +36,13 @@ def answer_sentence(found: Diagnosis) -> str:
             "Something is missing in the model that no effect of the catalog explains")
     untried = "No change of a parameter was tried, for none is fitted: put what may have changed under [fit]." if (
         found.reference) else "Every number of the system was taken as right, for none is under [fit]."
-    return " ".join([f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give "
-                     f"{gap.noise:.2g} {gap.unit}.", *([untried] if unfitted else []), *remarks,
-                     *filter(None, [found.means, labels_in_words(found.nearest)])])
+    differ = found.differing
+    first = str(differ) if differ is not None and not differ.needed else (
+        f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "
+        f"{gap.unit}.")
+    last = str(differ) if differ is not None and differ.needed else ""
+    return " ".join([first, *([untried] if unfitted else []), *remarks,
+                     *filter(None, [found.means, labels_in_words(found.nearest), last])])
 
 
 def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
