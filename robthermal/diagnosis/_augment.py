@@ -8,9 +8,11 @@ conductances differ by from day to day, and no effect of the catalog explains th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._found import Found
@@ -85,9 +87,9 @@ answer; what it leaves of the first one falls from 0.42 to 0.05 K.
             return (f"The reference records alone name {names}: {'they are' if several else 'it is'} in the model of "
                     f"this comparison and in the system of the answer; what it leaves of the first one falls from "
                     f"{self.without:.2g} to {self.rms:.2g} K.")
-        why = {"consistent": "lack nothing that they could show",
+        why = {"consistent": "lack nothing that they could show", "unexplained": "do not say what is missing",
                "ambiguous": "cannot tell what is missing from something else",
-               }.get(self.verdict, "do not say what is missing")
+               }.get(self.verdict, "name what no system can have")
         return f"The reference records alone {why}: the model of this comparison has no effect added."
 
     def to_dict(self) -> dict[str, Any]:
@@ -117,7 +119,8 @@ def augmented(system: System, reference: Sequence[Measured], parameters: Choice,
     """
     found = diagnosed(system, reference[:1], validation=reference[1:] or None)
     gap = found.gap["train"]
-    if found.verdict not in ("named", "named_with_remainder"):
-        return Augmented(found.verdict, (), gap.before, gap.before, system, parameters)
-    return Augmented(found.verdict, found.effects, gap.before, gap.after,
-                     *with_fitted(system, found.effects, parameters))
+    if found.verdict in ("named", "named_with_remainder"):
+        with suppress(InputError):  # a drift of an ambient, which no system has
+            return Augmented(found.verdict, found.effects, gap.before, gap.after,
+                             *with_fitted(system, found.effects, parameters))
+    return Augmented(found.verdict, (), gap.before, gap.before, system, parameters)

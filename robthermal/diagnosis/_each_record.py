@@ -15,6 +15,7 @@ from ..errors import Diverged, InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._differing import Differing
+from ._found import Found
 from ._judge import Judged
 from ._outcomes import DiagnosisCode
 from ._with_names import with_fitted
@@ -48,7 +49,12 @@ def asked_of_each(judged: Judged, found: Diagnosis, concluded: Callable[[Judged]
         return found
     if not differ.needed:
         found = concluded(without_names(judged))
-    return by_itself(found, differ, alone()) if found.verdict == "unexplained" else found
+    if found.verdict != "unexplained":
+        return found
+    try:
+        return by_itself(found, differ, alone())
+    except (Diverged, InputError):  # the first record by itself cannot be diagnosed: too quiet, or one of the others
+        return by_itself(found, differ, None)
 
 
 def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) -> Differing | None:
@@ -71,7 +77,7 @@ def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) 
         return None
     together = math.sqrt(_beyond(found.fit))
     for effects in ((), found.provisional)[:1 + bool(found.provisional)]:
-        alone = _pooled(*with_fitted(system, effects, parameters), fits)
+        alone = _pooled(system, effects, parameters, fits)
         if alone < _HALF * together:
             return Differing(alone, together, needed=bool(effects))
     return None
@@ -91,7 +97,7 @@ def without_names(judged: Judged) -> Judged:
                        remedy="Diagnose days against each other with reference records."))
 
 
-def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis) -> Diagnosis:
+def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis | None) -> Diagnosis:
     """The answer of the first record, which the others test, if it has a name; else the one for all records.
 
     Parameters
@@ -100,10 +106,10 @@ def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis) -> Diagnosi
         Answer for the common fit.
     differ : Differing
         How records differ.
-    alone : Diagnosis
-        Answer for the first record, with all others as validation.
+    alone : Diagnosis or None
+        Answer for the first record, with all others as validation; None if it cannot be diagnosed.
     """
-    if alone.verdict in ("named", "named_with_remainder"):
+    if alone is not None and alone.verdict in ("named", "named_with_remainder"):
         text = f"{differ} So the first record is diagnosed by itself, and the others test what it names."
         return replace(alone, differing=differ, caveats=(*alone.caveats, text),
                        outcome=replace(alone.outcome, text=f"{alone.outcome.text} {text}"))
@@ -111,11 +117,11 @@ def by_itself(found: Diagnosis, differ: Differing, alone: Diagnosis) -> Diagnosi
     return replace(found, differing=differ, outcome=replace(found.outcome, text=f"{found.outcome.text} {text}"))
 
 
-def _pooled(system: System, parameters: Choice, fits: Fits) -> float:
+def _pooled(system: System, effects: Sequence[Found], parameters: Choice, fits: Fits) -> float:
     """Error beyond noise of fits to every record by itself [K]; infinite where one cannot be fitted."""
     try:
-        each = fits(system, parameters)
-    except (Diverged, InputError):
+        each = fits(*with_fitted(system, effects, parameters))
+    except (Diverged, InputError):  # also of a drift of an ambient, which no system has
         return math.inf
     return math.sqrt(sum(_beyond(fit) * fit.n_readings for fit in each) / sum(fit.n_readings for fit in each))
 

@@ -91,6 +91,13 @@ def test_only_what_stands_alone_is_added(verdict: str) -> None:
     assert ("sensors.T_b.time_constant" in one.system.fit) == bool(one.effects)
 
 
+def test_what_no_system_can_have_is_not_added() -> None:
+    answer = Answer("named")
+    answer.effects = (rt.diagnosis.Found("ambient_drift", ("room",), {"difference": (2.0, 0.1, "K")}, 1e-9, 50.0),)
+    one = augmented(SYSTEM, [day(1)], None, lambda *given, **held_out: answer)
+    assert not one.effects and one.system is SYSTEM and "no system can have" in str(one)
+
+
 def test_one_day_is_fitted_and_predicts_the_others() -> None:
     seen = []
 

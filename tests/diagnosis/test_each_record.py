@@ -70,6 +70,15 @@ def test_what_a_single_record_cannot_be_fitted_with_says_nothing() -> None:
 
     assert differing(found, SYSTEM, None, away) is None
     assert differing(found, SYSTEM, None, lambda *given: [found.fit, found.fit]) is None
+    drift = rt.diagnosis.Found("ambient_drift", ("room",), {"difference": (2.0, 0.1, "K")}, 1e-9, 50.0)
+    assert differing(replace(found, provisional=(drift,)), SYSTEM, None, lambda *given: [found.fit]) is None
     alone = [rt.diagnosis.refit(SYSTEM, day(seed, 0.0)) for seed in (1, 2)]
     answer = differing(found, SYSTEM, None, lambda *given: alone)
     assert answer is not None and not answer.needed
+
+
+def test_a_first_record_that_cannot_be_diagnosed_by_itself_is_no_error() -> None:
+    """The same record twice: what tests the names of the first would be the first."""
+    found = rt.diagnose(SYSTEM, [day(1, 0.0), day(1, 0.0), day(2, 0.0)], effects=["sensor_offset"])
+    assert found.verdict == "unexplained" and found.differing is not None
+    assert "names nothing that predicts the others" in found.outcome.text
