@@ -14,6 +14,7 @@ from heated_bar import NOISE, PROJECT, write_bar
 
 import robthermal as rt
 from robthermal.jobs.chain import _run as chain
+from robthermal.jobs.chain._cache import staging
 
 pytestmark = pytest.mark.usefixtures("sketched")
 STAGES = ("identify", "calibrate", "diagnose", "certify", "design", "couple")
@@ -175,6 +176,21 @@ def test_a_stage_that_is_not_asked_for_any_more_leaves_nothing(folder: Path) -> 
 
 def interrupt(*arguments: object, **options: object) -> object:
     raise KeyboardInterrupt
+
+
+def test_an_interrupt_while_a_folder_is_removed_leaves_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    removed, interrupts = shutil.rmtree, [True]
+
+    def interrupted(folder: Path, **options: bool) -> None:
+        if interrupts:
+            raise KeyboardInterrupt(interrupts.pop())
+        removed(folder, **options)
+
+    monkeypatch.setattr("robthermal.jobs.chain._cache.shutil.rmtree", interrupted)
+    out = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt), staging(out) as folder:
+        (folder / "half.json").write_text("{")
+    assert not interrupts and not out.exists()
 
 
 def test_an_interrupt_keeps_the_finished_stages(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -74,9 +74,18 @@ def staging(out: Path) -> Iterator[Path]:
     try:
         yield folder
     finally:  # also on Ctrl-C
-        shutil.rmtree(folder, ignore_errors=True)
-        if made and not any((out / CACHE).iterdir()):
-            shutil.rmtree(out, ignore_errors=True)
+        try:
+            _remove(folder, out, made)
+        except KeyboardInterrupt:  # while it was being removed
+            _remove(folder, out, made)
+            raise
+
+
+def _remove(folder: Path, out: Path, made: bool) -> None:
+    """Remove the folder of a stage, and a results folder that was made for it and holds nothing."""
+    shutil.rmtree(folder, ignore_errors=True)
+    if made and out.exists() and not any((out / CACHE).iterdir()):
+        shutil.rmtree(out, ignore_errors=True)
 
 
 def commit(out: Path, stage: str, folder: Path, report: Report, key: str, seconds: float) -> Finished:
