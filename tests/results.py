@@ -25,7 +25,7 @@ coupling.MatrixFilters
 coupling.MuBound coupling.Simulation coupling.Spectra coupling.destabilizing coupling.normalized coupling.worst_case
 design.constant_gain design.disturbance_observer design.feed_forward design.linear_controller design.load_controller
 design.place_sensors design.reachable design.simulate_loop design.state_feedback design.step_response_linearity
-diagnosis.Compared diagnosis.Refinement diagnosis.Resolving
+diagnosis.Augmented diagnosis.Compared diagnosis.Differing diagnosis.Refinement diagnosis.Resolving
 diagnosis.Effect diagnosis.diagnose diagnosis.next_experiment diagnosis.refit_short_list
 diagnosis.select_jointly
 diagnosis.score diagnosis.unknown_heat identify.lpm jobs.DesignRequest jobs.run_job jobs.certify_system

@@ -68,7 +68,9 @@ class Augmented:
     >>> import robthermal as rt
     >>> late = rt.diagnosis.Found("sensor_lag", ("T3",), {"time_constant": (30.0, 1.0, "s")}, 1e-9, 400.0)
     >>> nominal = rt.systems.two_module()
-    >>> print(rt.diagnosis.Augmented("named", (late,), 0.42, 0.05, rt.diagnosis.with_named_effects(nominal, [late])))
+    >>> more = rt.diagnosis.with_named_effects(nominal, [late])
+    >>> added = rt.diagnosis.Augmented("named", (late,), 0.42, 0.05, more)
+    >>> print(added)
     The reference records alone name sensor_lag(T3): it is in the model of this comparison and in the system of the \
 answer; what it leaves of the first one falls from 0.42 to 0.05 K.
     """

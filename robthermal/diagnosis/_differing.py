@@ -22,7 +22,8 @@ class Differing:
     Examples
     --------
     >>> import robthermal as rt
-    >>> print(rt.diagnosis.Differing(0.002, 0.15, needed=True))
+    >>> differing = rt.diagnosis.Differing(0.002, 0.15, needed=True)
+    >>> print(differing)
     Numbers of the machine differ from record to record: with what came nearest each by itself leaves 0.002 K beyond \
 the noise, all together leave 0.15 K.
     """
