@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..fitting import Choice
 from ..thermal import System
 from ._found import Found
-from ._judge import Verdict
+from ._judge import Name, Verdict
 from ._with_names import with_fitted
 from .data import Measured
 from .evidence import Gap
@@ -32,6 +32,10 @@ class Answer(Protocol):
     @property
     def effects(self) -> tuple[Found, ...]:
         """What it names."""
+
+    @property
+    def alternatives(self) -> tuple[tuple[Name, ...], ...]:
+        """The same at neighboring places."""
 
     @property
     def gap(self) -> dict[str, Gap]:
@@ -62,6 +66,8 @@ class Augmented:
         Nominal system with these effects.
     parameters : iterable or mapping, optional
         What is fitted in it, as in `rt.diagnose`.
+    alternatives : tuple of tuple
+        For every effect the same at neighboring places, as in `Diagnosis.alternatives`.
 
     Examples
     --------
@@ -81,10 +87,11 @@ answer; what it leaves of the first one falls from 0.42 to 0.05 K.
     rms: float
     system: System
     parameters: Choice = None
+    alternatives: tuple[tuple[Name, ...], ...] = ()
 
     def __str__(self) -> str:
         if self.effects:
-            names = " and ".join(one.label for one in self.effects)
+            names = " and ".join(map(self._named, range(len(self.effects))))
             several = len(self.effects) > 1
             return (f"The reference records alone name {names}: {'they are' if several else 'it is'} in the model of "
                     f"this comparison and in the system of the answer; what it leaves of the first one falls from "
@@ -94,6 +101,15 @@ answer; what it leaves of the first one falls from 0.42 to 0.05 K.
                }.get(self.verdict, "name what no system can have")
         return f"The reference records alone {why}: the model of this comparison has no effect added."
 
+    def _named(self, place: int) -> str:
+        """An effect; with other places where the records cannot tell them apart."""
+        others = self.alternatives[place] if self.alternatives else ()
+        label = self.effects[place].label
+        if not others:
+            return label
+        listed = " or ".join(f"{name}({', '.join(at)})" for name, at in others)
+        return f"{label} (or {listed})"
+
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "augmented" of "reference".
 
@@ -102,6 +118,8 @@ answer; what it leaves of the first one falls from 0.42 to 0.05 K.
         dict
         """
         return {"verdict": self.verdict, "effects": [one.to_dict() for one in self.effects],
+                "alternatives": [[{"effect": name, "where": list(at)} for name, at in others]
+                                 for others in self.alternatives],
                 "rms_without": self.without, "rms": self.rms}
 
 
@@ -124,5 +142,5 @@ def augmented(system: System, reference: Sequence[Measured], parameters: Choice,
     if found.verdict in ("named", "named_with_remainder"):
         with suppress(InputError):  # a drift of an ambient, which no system has
             return Augmented(found.verdict, found.effects, gap.before, gap.after,
-                             *with_fitted(system, found.effects, parameters))
+                             *with_fitted(system, found.effects, parameters), found.alternatives)
     return Augmented(found.verdict, (), gap.before, gap.before, system, parameters)

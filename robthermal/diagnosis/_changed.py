@@ -34,7 +34,7 @@ from .change import (
     visible_changes,
 )
 from .data import DataSet, Measured, as_measured, noise_floor, records_of, refuse_constant, without_outliers
-from .evidence import Gap, adequacy, expected_rms, left
+from .evidence import Gap, adequacy, expected_rms, left, square_beyond_noise
 from .fit import Refit, SessionGain, exact, refit, too_warm
 from .search import SearchState, ShortList
 
@@ -192,14 +192,13 @@ def _losses(system: System, reference: Measured | Sequence[Measured], noise: Map
 
 def _compared(healthy: Reference, new: Refit) -> Compared:
     fit, ranges = exact(healthy.fit), healthy.listed
-    beyond = max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
     moved = new.v[:new.structure.n_parameters] - healthy.scatter.center
     for candidate, values in zip(new.structure.effects, new.structure.quantities(new.v), strict=True):
         if candidate.effect.name == NAME:
             moved[place_of(candidate.where, ranges)] += values[SIZE]
     moved = moved[:len(ranges.names)]
     deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / ranges.unit)
-    return Compared(len(healthy.each), fit.rms, float(np.sqrt(beyond)), healthy.relative,
+    return Compared(len(healthy.each), fit.rms, float(np.sqrt(square_beyond_noise(fit))), healthy.relative,
                     dict(zip(ranges.names, map(float, deviation), strict=True)))
 
 

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..errors import Diverged, InputError
 from ..fitting import Choice
 from ..thermal import System
@@ -20,7 +22,7 @@ from ._judge import Judged
 from ._outcomes import DiagnosisCode
 from ._with_names import with_fitted
 from .diagnosis import Diagnosis
-from .evidence import expected_rms
+from .evidence import expected_rms, square_beyond_noise
 from .fit import Refit
 
 Fits = Callable[[System, Choice], Sequence[Refit]]
@@ -73,9 +75,9 @@ def differing(found: Diagnosis, system: System, parameters: Choice, fits: Fits) 
     fits : callable
         ``fits(system, parameters)`` fits a system to every record by itself.
     """
-    if not _beyond(found.fit) > expected_rms(found.fit) ** 2:  # nothing to speak of is left
+    if not square_beyond_noise(found.fit) > expected_rms(found.fit) ** 2:  # nothing to speak of is left
         return None
-    together = math.sqrt(_beyond(found.fit))
+    together = math.sqrt(square_beyond_noise(found.fit))
     for effects in ((), found.provisional)[:1 + bool(found.provisional)]:
         alone = _pooled(system, effects, parameters, fits)
         if alone < _HALF * together:
@@ -123,9 +125,5 @@ def _pooled(system: System, effects: Sequence[Found], parameters: Choice, fits: 
         each = fits(*with_fitted(system, effects, parameters))
     except (Diverged, InputError):  # also of a drift of an ambient, which no system has
         return math.inf
-    return math.sqrt(sum(_beyond(fit) * fit.n_readings for fit in each) / sum(fit.n_readings for fit in each))
-
-
-def _beyond(fit: Refit) -> float:
-    """Mean square of the free-run residual beyond noise [K²]."""
-    return max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
+    weights = [fit.n_readings for fit in each]
+    return math.sqrt(float(np.average(list(map(square_beyond_noise, each)), weights=weights)))

@@ -80,6 +80,7 @@ class Answer:
     def __init__(self, verdict: str):
         self.verdict = verdict
         self.effects = (rt.diagnosis.Found("sensor_lag", ("T_b",), {"time_constant": (40.0, 1.0, "s")}, 1e-9, 1e3),)
+        self.alternatives = ((("input_lag", ("q_b",)),),)
         self.gap = {"train": rt.diagnosis.Gap(0.4, 0.1, 0.02)}
 
 
@@ -87,6 +88,8 @@ class Answer:
 def test_only_what_stands_alone_is_added(verdict: str) -> None:
     one = augmented(SYSTEM, [day(1)], None, lambda *given, **held_out: Answer(verdict))
     assert bool(one.effects) == verdict.startswith("named")
+    assert ("name sensor_lag(T_b) (or input_lag(q_b)): " in str(one)) == bool(one.effects)
+    assert one.to_dict()["alternatives"] == [[{"effect": "input_lag", "where": ["q_b"]}]] * bool(one.effects)
     assert (one.system.sensors["T_b"].time_constant or 0.0) == (40.0 if one.effects else 0.0)
     assert ("sensors.T_b.time_constant" in one.system.fit) == bool(one.effects)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from ...errors import Diverged, InputError
 from ...thermal import System, constant_losses, natural_losses
-from ..evidence import expected_rms
+from ..evidence import expected_rms, square_beyond_noise
 from ..fit import Refit
 
 _CLEARLY = 0.5  # of the mean square beyond noise, that natural convection may leave at most
@@ -81,15 +81,15 @@ def convection_of(system: System, fitted: Callable[[System], Refit]) -> Convecti
     if not links:
         return None
     plain = fitted(system)
-    if not _beyond(plain) > expected_rms(plain) ** 2:  # nothing to speak of is left
+    if not square_beyond_noise(plain) > expected_rms(plain) ** 2:  # nothing to speak of is left
         return None
     best = _or_none(system, links, fitted)
-    if best is None or not _beyond(best) < _CLEARLY * _beyond(plain):
+    if best is None or not square_beyond_noise(best) < _CLEARLY * square_beyond_noise(plain):
         return None
     for name in _large(plain.system, links):
         fewer = tuple(one for one in links if one != name)
         fit = _or_none(system, fewer, fitted)
-        if fit is not None and _beyond(fit) < _CONSTANT * _beyond(best):
+        if fit is not None and square_beyond_noise(fit) < _CONSTANT * square_beyond_noise(best):
             links, best = fewer, fit
     return Convection(links, plain.rms, best.rms, natural_losses(system, links))
 
@@ -106,8 +106,3 @@ def _or_none(system: System, links: tuple[str, ...], fitted: Callable[[System], 
         return fitted(natural_losses(system, links)) if links else None
     except (Diverged, InputError):
         return None
-
-
-def _beyond(fit: Refit) -> float:
-    """Mean square of the free-run residual beyond noise [K²]."""
-    return max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)

@@ -18,6 +18,7 @@ from ._hold_out import expected_rms as expected_rms
 from ._hold_out import hold_out as hold_out
 from ._hold_out import negative_log_predictive_density as negative_log_predictive_density
 from ._hold_out import refuse_seen as refuse_seen
+from ._hold_out import square_beyond_noise as square_beyond_noise
 from ._hold_out import validation_data as validation_data
 from ._locate import Location as Location
 from ._locate import locate as locate
@@ -40,7 +41,6 @@ from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
            "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "Wandering",
-           "adequacy",
-           "expected_rms", "explains", "hold_out", "left", "locate", "negative_log_predictive_density", "promised",
-           "promising", "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates",
-           "stability", "unknown_heat", "validation_data", "wandering"]
+           "adequacy", "expected_rms", "explains", "hold_out", "left", "locate", "negative_log_predictive_density",
+           "promised", "promising", "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates",
+           "square_beyond_noise", "stability", "unknown_heat", "validation_data", "wandering"]

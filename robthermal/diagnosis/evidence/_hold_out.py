@@ -377,6 +377,11 @@ def expected_rms(fit: Refit, data: Sequence[RecordData] | None = None) -> float:
     return float(np.sqrt(total / count)) if count else 1.0
 
 
+def square_beyond_noise(fit: Refit) -> float:
+    """Mean square of the free-run residual beyond what sensor noise and random heat alone would give [K²]."""
+    return max(fit.rms**2 - expected_rms(fit) ** 2, 0.0)
+
+
 def expected_squares(fit: Refit, path: LinearizedRecord) -> Array:
     """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²]."""
     noise, disturbance = fit.levels.of(path, fit.floor)
