@@ -84,8 +84,11 @@ def _kept(asked: _Asked) -> Step:
 
 
 def _made(parts: Augmented, h: float) -> Step:
-    theta = node_integrals(parts.F * h)
     many, nz, nq = parts.F.shape[:-2], parts.F.shape[-1], parts.N.shape[-1]
+    if not parts.ports.size and not nq:  # a linear network: its state at the end, by that at the start and held inputs
+        (K, integral), = np.moveaxis(node_integrals(parts.F * h, NODES[-1:], 2), (-4, -3), (0, 1))
+        return Step(K, integral @ (parts.B * h), np.zeros((*many, nz, 0)))
+    theta = node_integrals(parts.F * h)
     n_rows = DEGREE * parts.ports.size
     to_nodes, to_end = theta[..., parts.ports, :], theta[..., -1, :, :, :]
 
@@ -99,8 +102,8 @@ def _made(parts: Augmented, h: float) -> Step:
     return Step(stacked(0, np.eye(nz)), stacked(1, parts.B * h), M.reshape(*M.shape[:-2], (DEGREE + 1) * nq))
 
 
-def node_integrals(Z: Array) -> Array:
-    """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at nodes 1..p: e^(cZ), and integrals over s of e^((c-s)Z) s^(j-1) / (j-1)!.
+def node_integrals(Z: Array, nodes: Array = NODES[1:], functions: int = _FUNCTIONS) -> Array:
+    """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at nodes c: e^(cZ), and integrals over s of e^((c-s)Z) s^(j-1) / (j-1)!.
 
     A Taylor series at c / 2^s, then s doublings θ_j(2c) = θ_0 θ_j + Σ_(k=1..j) c^(j-k) / (j-k)! θ_k
     (Al-Mohy and Higham 2011, section 3).
@@ -109,10 +112,14 @@ def node_integrals(Z: Array) -> Array:
     ----------
     Z : ndarray, shape (..., n, n)
         Rate times step [-].
+    nodes : ndarray, shape (n_nodes,)
+        Parts of the step c [-]; default the nodes 1 to p.
+    functions : int
+        How many functions, j from 0 on; default p + 2.
 
     Returns
     -------
-    ndarray, shape (..., p, p + 2, n, n)
+    ndarray, shape (..., n_nodes, functions, n, n)
         By node and j.
     """
     size = float(np.abs(Z).sum(axis=-1).max(initial=0.0))
@@ -121,14 +128,14 @@ def node_integrals(Z: Array) -> Array:
     scaled, powers = Z / 2.0**doublings, [np.broadcast_to(np.eye(n), Z.shape)]
     for _ in range(_TERMS - 1):
         powers.append(powers[-1] @ scaled)
-    m, j = np.arange(_TERMS), np.arange(_FUNCTIONS)[:, None]
-    c = NODES[1:, None, None] / 2.0**doublings
-    weights = NODES[1:, None, None] ** m * c**j / _FACTORIALS[m + j]
+    m, j = np.arange(_TERMS), np.arange(functions)[:, None]
+    c = nodes[:, None, None] / 2.0**doublings
+    weights = nodes[:, None, None] ** m * c**j / _FACTORIALS[m + j]
     theta = np.moveaxis(np.tensordot(weights, np.stack(powers), axes=1), (0, 1), (-4, -3))
     for _ in range(doublings):
         later = np.maximum(j - j.T, 0)
         mixing = np.where((j.T >= 1) & (j.T <= j), c**later / _FACTORIALS[later], 0.0)
-        mixed = mixing @ theta.reshape(*many, DEGREE, _FUNCTIONS, n * n)
+        mixed = mixing @ theta.reshape(*many, nodes.size, functions, n * n)
         theta = theta[..., :1, :, :] @ theta + mixed.reshape(theta.shape)
         c = 2.0 * c
     return np.asarray(theta)
