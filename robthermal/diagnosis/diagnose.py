@@ -38,7 +38,7 @@ from ._refine import refine as refined
 from ._searching import searched
 from ._visible_words import visible_in_words
 from .change import NAME, relative
-from .data import Measured, as_measured, noise_floor, refuse_constant
+from .data import Measured, as_measured, noise_floor, refuse_constant, refuse_long
 from .diagnosis import Diagnosis
 from .effects import candidates
 from .evidence import (
@@ -108,8 +108,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     Raises
     ------
     InputError
-        Records too short, readings that never change, validation on the training data, no noise declared and none
-        visible, a nominal model that runs away, an unknown effect.
+        Records too short or of more than 400 000 readings, readings that never change, validation on the training
+        data, no noise declared and none visible, a nominal model that runs away, an unknown effect.
 
     Examples
     --------
@@ -129,12 +129,14 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     ('named', 'sensor_lag(T)')
     """
     names = None if effects is None else tuple(effects)
+    refuse_long(records, "records")
     checked = Validation(validation, operating_point)
     if validation is not None:
         refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
     again = partial(diagnose, parameters=parameters, effects=names, noise=noise, progress=progress)
     _refuse_mixed(reference, augment=augment, refine=refine, operating_point=operating_point)
     if reference is not None:
+        refuse_long(reference, "reference")
         healthy, _ = measured_of(reference, "reference")
         judged, compared = changed(
             system, records, reference, validation=checked, parameters=parameters, names=names, noise=noise,

@@ -11,6 +11,7 @@ from ._export import save_records as save_records
 from ._glitches import find_glitches as find_glitches
 from ._glitches import median_filter as median_filter
 from ._means import as_means as as_means
+from ._means import block_means as block_means
 from ._multisine import multisine as multisine
 from ._outcomes import SignalsCode as SignalsCode
 from ._record import Record as Record
@@ -37,6 +38,7 @@ __all__ = [
     "SignalsCode",
     "Thermistor",
     "as_means",
+    "block_means",
     "celsius_to_kelvin",
     "crest_factor",
     "declared",

@@ -6,6 +6,7 @@ from ._frequency_data import Complex as Complex
 from ._frequency_data import ResponseData as ResponseData
 from ._measured import as_measured as as_measured
 from ._measured import records_of as records_of
+from ._measured import refuse_long as refuse_long
 from ._measured import responses_of as responses_of
 from ._measured import without_outliers as without_outliers
 from ._noise_estimate import SHORTEST as SHORTEST
@@ -16,5 +17,5 @@ from ._remarks import refuse_constant as refuse_constant
 from ._warmest_room import warmest_rooms as warmest_rooms
 
 __all__ = ["SHORTEST", "Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
-           "noise_floor", "records_of", "refuse_constant", "responses_of", "warmest_rooms",
+           "noise_floor", "records_of", "refuse_constant", "refuse_long", "responses_of", "warmest_rooms",
            "without_outliers"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from ...errors import InputError
@@ -10,6 +11,9 @@ from ...thermal import System
 from ._dataset import DataSet
 from ._frequency_data import ResponseData, response_data
 from ._record_data import RecordData, record_data
+
+_MOST = 400_000  # readings: about an hour and four gigabytes
+_ENOUGH = 50_000  # minutes
 
 
 def as_measured(system: System, data: Measured | Sequence[Measured], where: str,
@@ -21,6 +25,27 @@ def as_measured(system: System, data: Measured | Sequence[Measured], where: str,
                          remedy="Leave it out: a record brings its own inputs.")
     checked: list[DataSet] = list(record_data(system, records, where)) if records else []
     return checked + [response_data(system, G, where, operating_point or {}) for G in responses]
+
+
+def refuse_long(data: Measured | Sequence[Measured], where: str) -> None:
+    """Refuse records whose fits would take hours and fill the memory, and say how many samples to average.
+
+    Parameters
+    ----------
+    data : Record, FrequencyResponse, or list of them
+        Data of a fit.
+    where : str
+        Argument that holds them.
+    """
+    records, _ = measured_of(data, where)
+    readings = sum(one.outputs.size for one in records)
+    if readings > _MOST:
+        of = math.ceil(readings / _ENOUGH)
+        raise InputError(
+            f"the {where} hold {sum(map(len, records))} samples, {readings} readings: to search them would take hours "
+            "and more memory than most computers have", where=f"argument {where}", expected=f"at most {_MOST} readings",
+            remedy="Take a part of them; or, where inputs hold over many samples and the machine is slow, average "
+                   f"them: means_of = {of} in [record] of the file, or rt.signals.block_means(record, {of}).")
 
 
 def records_of(data: Sequence[DataSet]) -> list[RecordData]:

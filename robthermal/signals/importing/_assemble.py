@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .._glitches import filter_note, filtered, glitch_rows, window_samples
-from .._means import as_means
+from .._means import as_means, block_means
 from .._record import Record
 from .._stated import KEY
 from ._columns import Channel, SystemLike
@@ -95,7 +95,8 @@ def make_records(
         )
         for k, (part, (U, Y), ripple) in enumerate(zip(parts, made, ripples, strict=True))
     )
-    return tuple(as_means(record, averaged) if averaged else record for record in records)
+    of, short = choice.record.means_of, (as_means(record, averaged) if averaged else record for record in records)
+    return tuple(block_means(record, of) if of else record for record in short)
 
 
 def say_averaged(table: Table, n_parts: int, choice: Declared) -> None:
@@ -108,6 +109,9 @@ def say_averaged(table: Table, n_parts: int, choice: Declared) -> None:
         if any(action.what == "resampled" for action in table.actions):
             text += "; means over steps of unequal length are interpolated like samples, so they are means only nearly"
         table.actions.append(Action("averaged", n_parts, text))
+    if choice.record.means_of:
+        table.actions.append(Action("averaged", n_parts, f"every {choice.record.means_of} samples became one step by "
+                                                         "their means, as declared"))
 
 
 def _say_glitches(table: Table, part: Part, channel: Channel, column: Array) -> int:

@@ -89,6 +89,8 @@ class ImportOptions(_Table):
     averaged : {"before", "after", "readings"}, optional
         Every value is the mean over the step before its stamp, or after it; or readings alone are, over the step
         before, and inputs hold from the stamp on. Default: values at the stamp.
+    means_of : int, optional
+        Samples that become one step by their means, as `block_means` does; of a long log.
     """
 
     time: str | tuple[str, ...] | None = None
@@ -114,11 +116,15 @@ class ImportOptions(_Table):
     duplicates: Literal["refuse", "first", "last", "mean"] = "refuse"
     restarts: Literal["refuse", "split"] = "refuse"
     averaged: Averaged | None = None
+    means_of: Annotated[int, Field(ge=2)] | None = None
 
     @property
     def least(self) -> int:
-        """Samples that a part needs: where inputs are means too, the first input and the last reading go."""
-        return max(self.shortest, 3) if self.averaged in ("before", "after") else self.shortest
+        """Samples that a part needs: three blocks; where inputs are means, the first input and the last reading go."""
+        gone = self.averaged in ("before", "after")
+        if self.means_of:
+            return max(self.shortest, 3 * self.means_of + gone)
+        return max(self.shortest, 3) if gone else self.shortest
 
     @field_validator("delimiter")
     @classmethod
