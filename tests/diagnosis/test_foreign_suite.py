@@ -101,7 +101,8 @@ def test_answers_are_judged(verdict, names, others, truth, expected):
     ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["sample", "hot"]]]], True),
     ([["missing_link", ["sample", "hot"]]], [[["missing_link", ["sample", "sink"]]]], True),
     ([["missing_link", ["sample", "sink"]]], [[]], True),
-    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["spreader", "hot"]]]], False),
+    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["hot", "spreader"]]]], True),
+    ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["cold", "hot"]]]], False),
     ([["missing_link", ["sample", "sink"]]], [[["missing_link", ["sink", "cold"]]]], False),
     ([["missing_link", ["sample", "sink"]]], [[["natural_convection", ["sample", "hot"]]]], False),
     ([["missing_link", ["sample", "hot"]]], [[]], False)])

@@ -50,7 +50,7 @@ def with_neighbors(round_: Accepted) -> Accepted:
 
 
 def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
-    """Whether a heat path is another one with a single lump exchanged for a neighbor of it.
+    """Whether a heat path is another one with its lumps, one or both, exchanged for neighbors of theirs.
 
     Parameters
     ----------
@@ -60,11 +60,13 @@ def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
         Candidates of the same effect.
     """
     nodes = {*system.lumps, *system.ambients}
-    if one.effect.name != other.effect.name or not all(len(at.where) == 2 and nodes >= set(at.where)
-                                                       for at in (one, other)):
+    if one.effect.name != other.effect.name or set(one.where) == set(other.where) or not all(
+            len(at.where) == 2 and nodes >= set(at.where) for at in (one, other)):
         return False
-    exchanged = set(one.where) ^ set(other.where)
-    return exchanged <= set(system.lumps) and any(set(link.between) == exchanged for link in system.links)
+    joined = {frozenset(link.between) for link in system.links if set(link.between) <= set(system.lumps)}
+    (a, b), (c, d) = one.where, other.where
+    return any(all(p == q or frozenset((p, q)) in joined for p, q in ends)
+               for ends in (((a, c), (b, d)), ((a, d), (b, c))))
 
 
 def one_place(round_: Accepted, system: System) -> bool:

@@ -69,11 +69,17 @@ def answer(row: Row) -> str:
 
 
 def one_path(row: Row) -> bool:
-    """Whether every set is the truth, with at most the same heat path from neighboring lumps: one answer."""
+    """Whether every set is the truth, with at most the same heat path from and to neighboring lumps: one answer."""
     if answer(row) not in ("unique", "in the set"):
         return False
     joined = neighbors(row["key"].split("/")[0])
-    return all(other[0] == name[0] and frozenset(set(name[1]) ^ set(other[1])) in joined
+
+    def near(one: list[str], other: list[str]) -> bool:
+        return len(one) == len(other) == 2 and any(
+            all(p == q or frozenset((p, q)) in joined for p, q in zip(one, ends, strict=True))
+            for ends in (other, other[::-1]))
+
+    return all(other[0] == name[0] and near(name[1], other[1])
                for name, others in zip(row["names"], row["others"], strict=True) for other in others)
 
 
