@@ -109,7 +109,7 @@ def _explained(records: Sequence[Record], refitted: Refitted, judged: Judged, as
     """The fit as means that explains clearly more, or as much with fewer effects; None if none does."""
     fits = as_means_of_both_kinds(records, refitted, judged.plain or judged.state.fit, asked.alike, asked.down)
     if not asked.down and not any(map(asked.clearly, fits)):
-        plain = [one for one in fits if not one.labels and one.square < asked.before]
+        plain = [one for one in fits if not one.labels]
         fits += filter(None, (with_one_effect(one, judged.state.names, CLEARLY * asked.left) for one in plain))
     better = [one for one in fits if asked.clearly(one)]
     if better:
