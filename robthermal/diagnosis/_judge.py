@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import Outcome
 from ._outcomes import DiagnosisCode
 from .data import Measured
+from .effects import Candidate
 from .evidence import Adequacy, Evidence, Gap, HoldOut, adequacy, hold_out
 from .fit import Refit, Whitened
 from .search import Accepted, SearchState, ShortList, implausible_names, ruled_out, with_wider_noise
@@ -71,6 +72,8 @@ class Judged:
         For every effect, where the model is not exact.
     why : str
         Of an answer "unexplained" that was graded: what kept effects from being named, in words that follow "because".
+    alone : str
+        Of such an answer: which effect alone predicts the validation records best, in a sentence; empty if none does.
     compared : bool
         Whether new records were compared with those of a healthy machine.
     means : str
@@ -87,6 +90,7 @@ class Judged:
     plain: Refit | None = None
     evidence: tuple[Evidence, ...] = ()
     why: str = ""
+    alone: str = ""
     compared: bool = False
     means: str = ""
     finer: str = ""
@@ -187,7 +191,8 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
         faults.append(f"A large misfit stays ({how}).")
     if held is not None and not held.outcome.ok:
         faults.append(held.outcome.text)
-    if state.rounds and held is not None and _worse(held.gap) and not any(map(_of_its_time, state.rounds)):
+    if state.rounds and held is not None and _worse(held.gap) and not any(
+            of_its_time(round_.best.candidate) for round_ in state.rounds):
         faults.append(f"With these effects the error on the validation records does not fall ({held.gap.before:.3g} to "
                       f"{held.gap.after:.3g} {held.gap.unit}).")
     if state.rounds:
@@ -199,9 +204,15 @@ def _faults(state: SearchState, checks: Adequacy, held: HoldOut | None) -> list[
     return faults
 
 
-def _of_its_time(round_: Accepted) -> bool:
-    """Whether an effect has a time of the training records in it: a swing, a step; it says little of other records."""
-    effect = round_.best.candidate.effect
+def of_its_time(candidate: Candidate) -> bool:
+    """Whether an effect has a time of the training records in it: a swing, a step; it says little of other records.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Effect at its place.
+    """
+    effect = candidate.effect
     return bool(effect.paired) or any(quantity.name == "time" for quantity in effect.quantities)
 
 

@@ -14,7 +14,7 @@ _LABEL = re.compile(r"\w+\(")  # of an effect at its place
 
 
 def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
-    """What came nearest to an answer, in two sentences; empty where the search accepted nothing, or was not graded.
+    """What came nearest to an answer, and what alone predicts best; empty where there is neither, or no grading.
 
     Parameters
     ----------
@@ -23,8 +23,13 @@ def nearest(judged: Judged, gap: Mapping[str, Gap]) -> str:
     gap : mapping
         `Gap` of "train" and, if given, "validation", after being with these effects.
     """
+    return " ".join(filter(None, [_accepted(judged, gap), judged.alone])) if judged.why else ""
+
+
+def _accepted(judged: Judged, gap: Mapping[str, Gap]) -> str:
+    """What the search accepted, in two sentences."""
     labels = [round_.best.candidate.label for round_ in judged.state.rounds]
-    if not labels or not judged.why:
+    if not labels:
         return ""
     seen = "validation" if "validation" in gap else "train"
     records = "the validation records" if seen == "validation" else f"the {_TRAINED[judged.compared]} records"

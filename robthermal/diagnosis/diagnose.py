@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError
 from ..fitting import Choice, measured_of
 from ..thermal import System
+from ._alone import predicting_best
 from ._augment import augmented
 from ._changed import Compared, changed
 from ._doubts import (
@@ -207,7 +208,7 @@ def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validatio
     """Search, verdict, and where something is left beyond the noise the graded verdict."""
     judged = lasting_beyond_steps(judge(searched(nominal, names, validation, progress), validation, progress))
     judged = unless_finer(judged)
-    return graded(reconsider_noise(judged, validation), validation, progress)
+    return predicting_best(graded(reconsider_noise(judged, validation), validation, progress), validation)
 
 
 def _asks_for_a_warm_room(judged: Judged) -> bool:

@@ -132,7 +132,7 @@ def test_every_effect_has_a_reason(unexplained: Diagnosis, monkeypatch: pytest.M
     monkeypatch.setattr("robthermal.diagnosis._nearest.evidence_of", lambda *fits: [
         Evidence(0.9, 1.0, Stability(6, 0.1), 0.9 if one else 0.12) for one in lasting])
     state = SimpleNamespace(rounds=(round_("a"), round_("b")), fit=None, nominal=None)
-    judged = SimpleNamespace(why=why, compared=False, state=state)
+    judged = SimpleNamespace(why=why, alone="", compared=False, state=state)
     said = nearest(judged, unexplained.gap)  # type: ignore[arg-type]
     rest = " what is left without it, less than the 30 % of an effect that is needed"
     assert said.partition("No name, because ")[2] == words.format(*[rest] * words.count("{}"))
