@@ -25,7 +25,7 @@ def predicting_best(judged: Judged, validation: Validation) -> Judged:
     Parameters
     ----------
     judged : Judged
-        Graded answer.
+        Graded answer, with the prediction of what the search accepted.
     validation : Validation
         Data that no fit has seen.
     """

@@ -342,7 +342,7 @@ class Record:
                 f"the step is {rows.step!r}",
                 where="record[...]",
                 expected="a slice without a step",
-                remedy="Dropping rows aliases: filter the signals and build a new Record.",
+                remedy="Dropping rows aliases. Take means over n samples: rt.signals.block_means(record, n).",
             )
         start, stop, _ = rows.indices(self.n_samples)
         if stop - start < 2:
