@@ -10,6 +10,7 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis.evidence import negative_log_predictive_density, validation_data
+from robthermal.diagnosis.evidence._hold_out import _information_root
 from robthermal.diagnosis.fit import extended
 from robthermal.diagnosis.search import resolve_alternatives
 from robthermal.jobs.diagnose._claims import diagnosis_claims
@@ -125,3 +126,13 @@ def test_other_effects_keep_their_places(plant: rt.System, unsure: rt.diagnosis.
     rounds, fit = resolve_alternatives((first, second), fits[LAG], validation_data(fits[LAG], strong, None))
     keys = [one.best.candidate.key for one in rounds if one.best is not None]
     assert keys == [c.key for c in fit.structure.effects] == [offset.key, DELAY]
+
+
+def test_what_training_says_of_common_unknowns_leaves_the_others_free(plant: rt.System, train: rt.Record) -> None:
+    """Against the inverse of a block of the covariance: RᵀR is the information with the initial temperatures free."""
+    fit = rt.diagnosis.refit(plant, train)
+    p = fit.structure.n_common
+    assert 0 < p < fit.v.size
+    R = _information_root(fit, p)
+    expected = np.linalg.inv(np.linalg.inv(fit.J.T @ fit.J)[:p, :p])
+    assert R.shape == (p, p) and np.allclose(R.T @ R, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())

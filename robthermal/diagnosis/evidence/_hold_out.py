@@ -15,7 +15,7 @@ from ...fitting import Start, counted, free_run, refuse_same, rmse
 from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ..data import DataSet, Measured, RecordData, as_measured, records_of, responses_of, without_outliers
-from ..fit import Point, Refit, Structure, Whitened, descend, filters
+from ..fit import Point, Refit, Structure, Whitened, descend, filters, turned
 from ..path import Linearized, LinearizedRecord, White, heat_spread, linearized_records
 
 Array = NDArray[np.float64]
@@ -335,15 +335,15 @@ def _own_unknowns(fit: Refit, data: Sequence[DataSet], whiteners: Sequence[White
     trained = fit.v[:p]
     low, high = (bound.copy() for bound in structure.bounds)
     low[:p], high[:p] = trained, trained
-    problem = _Validation(Whitened(structure, whiteners), _information_root(fit.J, p), trained)
+    problem = _Validation(Whitened(structure, whiteners), _information_root(fit, p), trained)
     return structure, descend(problem, v, (low, high), 20, 1e-4).at, structure.n_readings
 
 
-def _information_root(J: Array, p: int) -> Array:
+def _information_root(fit: Refit, p: int) -> Array:
     """R with RᵀR the information on the first p unknowns, the others marginalized."""
-    rest = J.shape[1] - p
-    R: Array = np.asarray(np.linalg.qr(np.concatenate([J[:, p:], J[:, :p]], axis=1)).R, np.float64)
-    return R[rest:, rest:]
+    rest = fit.v.size - p
+    R = turned(np.concatenate([fit.J[:, p:], fit.J[:, :p]], axis=1), fit.z)[0]
+    return R[rest:-1, rest:]
 
 
 def response_rms(fit: Refit, data: Sequence[DataSet]) -> float:
