@@ -134,6 +134,25 @@ def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
     return said
 
 
+def may_be_the_supply(system: System, effects: Sequence[Candidate]) -> list[str]:
+    """Which swings of heat may be the supply of a heater of their lump, a sentence each.
+
+    Parameters
+    ----------
+    system : System
+        With the lumps of its heaters.
+    effects : sequence of Candidate
+        Effects that were accepted, provisional ones included.
+    """
+    said = []
+    for one in effects:
+        heaters = [name for name, own in system.inputs.items() if own.gain and own.lump == one.where[0]]
+        if one.effect.paired and heaters:
+            said.append(f"{one.label} may be the supply of {' or '.join(heaters)}, whose power changes by twice what "
+                        "its voltage does: record the voltage, and give the power as the column.")
+    return said
+
+
 def ambients_in_words(found: Sequence[FoundAmbient], system: System) -> list[str]:
     """What the readings say of ambients that were not recorded, a sentence each.
 

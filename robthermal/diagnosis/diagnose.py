@@ -20,6 +20,7 @@ from ._doubts import (
     far_ambients,
     held_ambients,
     may_be_the_room,
+    may_be_the_supply,
     may_drift,
     nothing_fitted,
     periods_undecided,
@@ -288,6 +289,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
         said += periods_undecided(state.rounds, verdict != "named")
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
+    said += may_be_the_supply(nominal.system, state.fit.structure.effects)
     if judged.plain is None:
         return (*said, *may_be_the_room(nominal, state.fit.structure.effects))
     listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)

@@ -14,6 +14,7 @@ import pytest
 import robthermal as rt
 from robthermal.diagnosis import Diagnosis, _alone
 from robthermal.diagnosis._alone import predicting_best
+from robthermal.diagnosis._doubts import may_be_the_supply
 from robthermal.diagnosis._judge import Judged, Validation
 from robthermal.diagnosis.evidence import Gap, HoldOut
 from robthermal.diagnosis.search import SearchState, ShortList
@@ -72,6 +73,14 @@ def test_beside_a_wandering_supply_radiation_is_said_to_predict_the_other_day(un
     gap = unexplained.gap["validation"]
     assert before == pytest.approx(gap.before, rel=0.05) and after < 0.8 * gap.after
     assert said in unexplained.outcome.text
+
+
+def test_a_swing_into_a_heated_lump_may_be_the_supply(unexplained: Diagnosis) -> None:
+    """It is, here; radiation and heat into a lump without a heater are not asked."""
+    assert "periodic_load(plate) may be the supply of relay, whose power" in " ".join(unexplained.caveats)
+    assert "voltage" not in " ".join(rt.diagnose(PLATE, day(1, 0.0), effects=NAMES).caveats)
+    said = may_be_the_supply(PLATE, rt.diagnosis.candidates(PLATE, ["periodic_load", "radiation"]))
+    assert len(said) == 1 and said[0].startswith("periodic_load(plate)")
 
 
 @pytest.mark.exhaustive
