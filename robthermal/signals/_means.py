@@ -9,6 +9,8 @@ from ..errors import InputError
 from ._record import Record
 from ._stated import MEANS, Averaged
 
+_ROUNDING = 1e-12  # of the largest value of an input: what a mean of equal values may be off them
+
 
 def as_means(record: Record, averaged: Averaged) -> Record:
     """Take the values of a log as means over a step instead of as readings at their stamps.
@@ -102,6 +104,7 @@ def block_means(record: Record, samples: int) -> Record:
     for name, column in record.ripple.items():
         held[..., record.input_names.index(name)] = _in_blocks(column[:blocks * samples], samples)
     off = np.sqrt(np.mean((U - inputs[:, None])**2 + held**2, axis=1))
+    off[off < _ROUNDING * np.abs(U).max(axis=(0, 1))] = 0.0
     outputs = _in_blocks(record.outputs[1:(blocks - 1) * samples + 1], samples).mean(axis=1)
     return record.changed(
         sample_time=samples * record.sample_time, start_time=record.start_time + samples * record.sample_time,
@@ -112,4 +115,4 @@ def block_means(record: Record, samples: int) -> Record:
 
 def _in_blocks(rows: NDArray[np.float64], samples: int) -> NDArray[np.float64]:
     """(blocks, samples, ...) of (blocks samples, ...)."""
-    return rows.reshape(-1, samples, *rows.shape[1:])
+    return rows.reshape(len(rows) // samples, samples, *rows.shape[1:])

@@ -42,7 +42,7 @@ def refuse_long(data: Measured | Sequence[Measured], where: str) -> None:
     if readings > _MOST:
         of = math.ceil(readings / _ENOUGH)
         raise InputError(
-            f"the {where} hold {sum(map(len, records))} samples, {readings} readings: to search them would take hours "
+            f"the records hold {sum(map(len, records))} samples, {readings} readings: to search them would take hours "
             "and more memory than most computers have", where=f"argument {where}", expected=f"at most {_MOST} readings",
             remedy="Take a part of them; or, where inputs hold over many samples and the machine is slow, average "
                    f"them: means_of = {of} in [record] of the file, or rt.signals.block_means(record, {of}).")
