@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ZERO_CELSIUS
+from ..fitting import within_steps
 from ..thermal import parameter_in_words, trajectory
 from ._joint import JointProblem
 
@@ -52,6 +53,8 @@ def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
         yield ("The records hold means, which are late or early by up to half a sample of the logger; that is not "
                "estimated here." + (f" If they are late and of {_SAMPLES} samples each, {moved} than it is." if moved
                                     else "") + " `robthermal diagnose` estimates it beside the parameters.")
+    for one in problem.data:
+        yield from within_steps(system, one)
     yield from _beyond_noise(joint, v)
 
 

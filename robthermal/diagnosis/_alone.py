@@ -41,8 +41,7 @@ def predicting_best(judged: Judged, validation: Validation) -> Judged:
         return judged
     return replace(judged, alone=(
         f"Of the effects tried alone {best.candidate.label} predicts the validation records best: with it their error "
-        f"falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}. It is no name either: other effects, or lumps "
-        "split in two, explain the training records better."))
+        f"falls from {gap.before:.2g} to {gap.after:.2g} {gap.unit}. That is a hint where to look, and no name."))
 
 
 def _predicted(judged: Judged, entry: Entry, validation: Validation) -> Gap | None:

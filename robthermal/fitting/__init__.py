@@ -43,3 +43,4 @@ from ._start import Start as Start
 from ._start import initial_of as initial_of
 from ._start import start_values as start_values
 from ._start import started as started
+from ._within_steps import within_steps as within_steps

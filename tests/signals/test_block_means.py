@@ -140,6 +140,17 @@ def day(of: int) -> rt.diagnosis.Diagnosis:
     return rt.diagnose(BAR, rt.signals.block_means(log, of))
 
 
+@pytest.mark.parametrize(("of", "says"), [(6, False), (7, True)])
+def test_a_calibration_says_that_inputs_change_within_steps(of: int, says: bool) -> None:
+    """Levels of 60 s in steps of 6 s hold over them, in steps of 7 s they do not."""
+    rng = np.random.default_rng(5)
+    run = rt.thermal.simulate(BAR, drive(np.repeat(rng.uniform(0.0, 10.0, 20), 60), 1.0))
+    log = run.with_outputs(run.outputs + 0.02 * rng.standard_normal(run.outputs.shape))
+    fit = rt.calibrate(BAR, rt.signals.block_means(log, of), parameters={"lumps.a.capacity": (20.0, 100.0)})
+    said = " ".join(fit.remarks)
+    assert ("q changes within" in said and f"within about {5 * of} s are off by more" in said) is says
+
+
 @pytest.mark.exhaustive
 def test_a_lag_is_found_in_a_day_of_seconds_and_inputs_that_change_within_steps_are_said() -> None:
     found = day(10)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
-from ...fitting import Data, quantum
+from ...fitting import Data, quantum, within_steps
 from ...thermal import System
 
 Array = NDArray[np.float64]
@@ -19,8 +19,6 @@ _LEAST = 10  # samples there
 _ALIKE = 0.8  # of the runs of equal readings that are as long as most: a sensor slower than its log
 _JUMP = 8.0  # times the largest change between other samples nearby
 _BEYOND = 0.5  # of the width of an input's limits: farther outside, the column has another unit
-_MOVES = 0.02  # of the range of an input: rms by which it is off its mean within a step
-_STEPS = 5  # within which heat that acts half a step early or late is seen
 
 
 def remarks(system: System, data: Sequence[Data], noise: Mapping[str, float]) -> tuple[str, ...]:
@@ -42,7 +40,7 @@ def remarks(system: System, data: Sequence[Data], noise: Mapping[str, float]) ->
     for one in data:
         for name, y in zip(one.sensors, one.readings.T, strict=True):
             said += _of_reading(system, name, y, one)
-        said += [*_copies(one), *_jumps(one, noise), *_within_steps(system, one)]
+        said += [*_copies(one), *_jumps(one, noise), *within_steps(system, one)]
     return tuple(dict.fromkeys(said))
 
 
@@ -103,19 +101,6 @@ def _copies(one: Data) -> Iterator[str]:
         if same and np.ptp(y) > 0.0:
             yield (f"{name} and {same[0]} read the same in every sample of record {one.label!r}: one column twice? "
                    "Leave the copy out.")
-
-
-def _within_steps(system: System, one: Data) -> Iterator[str]:
-    """Inputs that change within the steps of a record of means, and act there by their mean."""
-    for name in [*system.inputs, *system.modules]:
-        off, range_ = one.record.ripple.get(name), np.ptp(one.record[name]) if name in one.record.input_names else 0.0
-        if off is not None and one.record.averaged:
-            n = int(np.sum(off > _MOVES * range_))
-            if n:
-                yield (f"{name} changes within {n} of the {len(off)} steps of record {one.label!r} and acts there by "
-                       "its mean, up to half a step early or late: times and capacities that act within about "
-                       f"{_STEPS * one.record.sample_time:.4g} s are off by more than is said of them. Take shorter "
-                       "steps, or a part of the log at its own.")
 
 
 def _constant_inputs(system: System, data: Sequence[Data]) -> Iterator[str]:
