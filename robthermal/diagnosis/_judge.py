@@ -77,7 +77,7 @@ class Judged:
     compared : bool
         Whether new records were compared with those of a healthy machine.
     means : str
-        What the records would be if their values were means over a step; empty where that explains nothing.
+        How else the log may be read, as means or with commands in another row; empty where that explains nothing.
     finer : str
         That a finer network explains the records as well as the one effect named; empty where it does not.
     """

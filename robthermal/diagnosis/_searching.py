@@ -18,6 +18,7 @@ from .search import (
     beside,
     compare,
     exchange,
+    reconsider,
     refit_candidates,
     revise,
     shortlist,
@@ -114,7 +115,11 @@ def accepted_effects(state: SearchState, progress: Progress, known: Accepted | N
     known : Accepted, optional
         Effect found before, on the same nominal system; it is a candidate of the first round.
     """
-    while not state.complete:
+    again = False
+    while not state.complete or (state.misfit_left and not again):
+        if state.complete:
+            again, state = True, reconsider(state)
+            continue
         if state.rounds:
             progress(f"trying every effect again beside {len(state.rounds)} accepted")
         state = shortlist(state)

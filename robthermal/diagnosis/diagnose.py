@@ -33,8 +33,9 @@ from ._found import Found
 from ._graded import graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
-from ._means import asked_of_means
+from ._late_commands import late_by_rows
 from ._nearest import nearest
+from ._other_log import asked_of_log
 from ._own_names import in_own_names
 from ._refine import refine as refined
 from ._searching import searched
@@ -155,7 +156,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if too_warm(nominal) and _asks_for_a_warm_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")
         judged = _judged(only_heated(nominal), names, checked, progress)
-    judged = asked_of_means(judged, lambda others: refit(system, others, floor, parameters=parameters,
+    judged = asked_of_log(judged, lambda others: refit(system, others, floor, parameters=parameters,
                                                          session_gain=session_gain), checked)
     progress("locating the misfit and planning the next experiment")
     found, fitted_to, held_out = concluded(judged), records, validation
@@ -287,6 +288,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
         said += place_undecided([one.key for one in found.effects], found.alternatives)
     if verdict in ("named", "named_with_remainder", "ambiguous"):
         said += periods_undecided(state.rounds, verdict != "named")
+        said += late_by_rows(state.fit)
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     said += may_be_the_supply(nominal.system, state.fit.structure.effects)

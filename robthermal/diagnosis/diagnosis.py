@@ -72,7 +72,8 @@ class Diagnosis:
         What splitting a lump does to the remainder, if it was asked for and there is one; the rest of the answer is of
         the network as it is.
     means : str
-        What the log would be if its values were means over a step, where that explains as much or more; else empty.
+        How else the log may be read, as means over a step or with its commands in another row, where that explains as
+        much or more; else empty.
     caveats : tuple of str
         What to hold against a name, a sentence each; the outcome's text has them too.
     nearest : str

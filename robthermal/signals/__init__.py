@@ -15,6 +15,7 @@ from ._means import block_means as block_means
 from ._multisine import multisine as multisine
 from ._outcomes import SignalsCode as SignalsCode
 from ._record import Record as Record
+from ._shift import shift_inputs as shift_inputs
 from ._staircase import staircase as staircase
 from ._thermistor import Thermistor as Thermistor
 from ._units import celsius_to_kelvin as celsius_to_kelvin
@@ -55,5 +56,6 @@ __all__ = [
     "read_record",
     "read_records",
     "save_records",
+    "shift_inputs",
     "staircase",
 ]

@@ -278,3 +278,35 @@ def test_what_is_longer_than_the_record_is_not_seen_to_be_periodic() -> None:
     heat = next(one for one in diagnosed("nothing", both=True).scores.candidates if one.key == HEAT)
     assert "longer than the record" in implausible(heat, fit, {"period": 2000.0, "heat": 1.0, "phase": 0.0}, ())
     assert not implausible(heat, fit, {"period": 1000.0, "heat": 1.0, "phase": 0.0}, ())
+
+
+def heated_at_once(n: int, step: float, rest: int, noise: float, seed: int = 0) -> rt.Record:
+    """The board at rest for a few samples in a room of 20 °C, then 15 K above it."""
+    rng = np.random.default_rng(seed)
+    heaters = np.where(np.arange(n)[:, None] < rest, 0.0, 80.0) * np.ones(2)
+    warm = 293.15 + 15.0 * (np.arange(n) >= rest + 4)[:, None] + noise * rng.standard_normal((n, 2))
+    return rt.Record(sample_time=step, inputs=heaters, outputs=warm, input_names=["q1", "q2"],
+                     output_names=["T1", "T2"])
+
+
+def test_a_few_samples_at_rest_say_how_warm_a_room_can_have_been() -> None:
+    """A fifth percentile alone put it 15 K above the readings before the heaters came on (a measured board: 8 K)."""
+    board, _ = two_heaters()
+    (one,) = record_data(board, [heated_at_once(240, 5.0, 3, 0.1)], "records")
+    assert 293.15 + 0.9 < one.warmest_room(board) < 293.15 + 1.0 + 1.0 / 3.0
+
+
+def test_over_a_day_a_room_may_have_warmed_up_since() -> None:
+    board, _ = two_heaters()
+    (one,) = record_data(board, [heated_at_once(1440, 60.0, 3, 0.1)], "records")
+    assert one.warmest_room(board) == pytest.approx(293.15 + 15.0 + 1.0, abs=0.2)
+
+
+def test_noise_and_single_cold_readings_do_not_put_the_bound_below_the_room() -> None:
+    board, _ = two_heaters()
+    for seed in range(50):
+        record = heated_at_once(3000, 1.0, 3000, 0.5, seed)
+        read = record.outputs.copy()
+        read[::200] -= 30.0
+        (one,) = record_data(board, [record.with_outputs(read)], "records")
+        assert one.warmest_room(board) > 293.15

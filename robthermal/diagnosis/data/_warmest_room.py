@@ -11,13 +11,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...fitting import Data
 from ...thermal import System
 from ._dataset import DataSet
 
 SLACK = 1.0
-_COOLEST = 5.0  # per cent of the readings: noise makes single ones colder
+_COOLEST = 5.0  # per cent of the readings: single ones are colder by noise, and in a night by a colder room
+_RUNNING = 5  # readings of a running median: a machine may be at rest for no longer than a few
+_WARMS = 1.0 / 3600.0  # K/s: how fast a room is taken to warm up after its coolest reading
 
 
 def warmest_room(system: System, one: Data) -> float:
@@ -36,8 +39,17 @@ def warmest_room(system: System, one: Data) -> float:
         return np.inf
     readings = [values[np.isfinite(values)] for name, values in zip(one.sensors, one.readings.T, strict=True)
                 if name in system.thermometers]
-    cool = [float(np.percentile(values, _COOLEST)) for values in readings if values.size]
+    span = len(one.readings) * one.record.sample_time
+    cool = [_coolest(values, span) for values in readings if values.size]
     return min(cool) + SLACK if cool else np.inf
+
+
+def _coolest(values: NDArray[np.float64], span: float) -> float:
+    """Coolest that a sensor has read [K], by itself or as the room may have warmed up since."""
+    half = min(_RUNNING // 2, values.size - 1)
+    running = np.lib.stride_tricks.sliding_window_view(np.pad(values, half, mode="reflect"), 2 * half + 1)
+    first = float(np.min(np.median(running, axis=1)))
+    return min(float(np.percentile(values, _COOLEST)), first + _WARMS * span)
 
 
 def warmest_rooms(system: System, data: Sequence[DataSet]) -> list[float]:

@@ -33,6 +33,7 @@ from ._stages import accept as accept
 from ._stages import begin as begin
 from ._stages import compare as compare
 from ._stages import exchange as exchange
+from ._stages import reconsider as reconsider
 from ._stages import refit_candidates as refit_candidates
 from ._stages import revise as revise
 from ._stages import shortlist as shortlist
@@ -43,6 +44,6 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
            "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods",
-           "quantities_of", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
+           "quantities_of", "reconsider", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
            "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
            "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]

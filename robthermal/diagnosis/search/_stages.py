@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from ..data import DataSet
-from ..evidence import Scores, explains, promised, promising, score
-from ..fit import Refit, coarsened
+from ..evidence import BIC_GAP, Scores, explains, promised, promising, score
+from ..fit import Refit, coarsened, extended
 from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
 from ._exchange import with_exchanged
@@ -84,6 +85,27 @@ def accept(state: SearchState) -> SearchState:
         fit = coarsened(fit)
     left = leaves_large_misfit(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
     return replace(state, rounds=rounds, fit=fit, complete=left, misfit_left=left)
+
+
+def reconsider(state: SearchState) -> SearchState:
+    """Choose each effect again where they leave a large misfit: the first ones were chosen far from the truth.
+
+    Where three effects are missing, what the first of them seems to be may be another one. The search goes on where
+    what is chosen again explains clearly more, with room for another effect.
+
+    Parameters
+    ----------
+    state : SearchState
+        Complete state; without a large misfit, or with fewer than two effects, it is returned as it is.
+    """
+    if not state.misfit_left or len(state.rounds) < 2:
+        return state
+    rounds, fit = revised(state.rounds, state.nominal, state.names, last_is_new=True)
+    again = extended(state.fit, fit.structure, fit.v)  # with the filters that the others had
+    if fit.n_readings * math.log(state.fit.rss / again.rss) < BIC_GAP:
+        return state
+    more = len(rounds) < MOST_EFFECTS
+    return replace(state, rounds=rounds, fit=fit, complete=not more, misfit_left=not more and fit.variance > _LARGE)
 
 
 def revise(state: SearchState) -> SearchState:

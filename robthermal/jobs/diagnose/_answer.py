@@ -17,8 +17,9 @@ def answer_sentence(found: Diagnosis) -> str:
     """
     gap, records = _shown(found)
     if found.effects:
+        log = ", or the log is to be read otherwise" if found.means.startswith("The log may") else ""  # not beside it
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
-            f"The model lacks {accepted_in_words(found)}{', or the log holds means' if found.means else ''}")
+            f"The model lacks {accepted_in_words(found)}{log}")
         both = f"{gap.before:.2g} to {gap.after:.2g} {gap.unit}"
         falls = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records} falls from {both}."
         return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])

@@ -11,6 +11,7 @@ import numpy as np
 from .._glitches import filter_note, filtered, glitch_rows, window_samples
 from .._means import as_means, block_means
 from .._record import Record
+from .._shift import shift_inputs
 from .._stated import KEY
 from ._columns import Channel, SystemLike
 from ._options import Declared
@@ -67,7 +68,7 @@ def make_records(
     for matrix in (values.inputs, values.outputs, *(one for both in made for one in both)):
         _freeze(matrix)
     averaged = choice.record.averaged
-    say_averaged(table, len(parts), choice)
+    say_declared(table, len(parts), choice)
     say_dropped(table, values, time)
     report = make_report(source, table, clock, time, values, parts, glitches, choice, system)
     said = [action.text for action in table.actions if action.what in _LOUD]
@@ -95,12 +96,18 @@ def make_records(
         )
         for k, (part, (U, Y), ripple) in enumerate(zip(parts, made, ripples, strict=True))
     )
-    of, short = choice.record.means_of, (as_means(record, averaged) if averaged else record for record in records)
+    of, shift = choice.record.means_of, choice.record.input_shift
+    commands = [c.name for c in driven if c.role != "ambient"]
+    moved = (shift_inputs(record, shift, commands) if shift else record for record in records)
+    short = (as_means(record, averaged) if averaged else record for record in moved)
     return tuple(block_means(record, of) if of else record for record in short)
 
 
-def say_averaged(table: Table, n_parts: int, choice: Declared) -> None:
-    """Say of values that are means over which step, and who says so."""
+def say_declared(table: Table, n_parts: int, choice: Declared) -> None:
+    """Say of values that are means over which step, and who says so; and of inputs that act in another row."""
+    if shift := choice.record.input_shift:
+        rows, which = "a row" if abs(shift) == 1 else f"{abs(shift)} rows", "later" if shift > 0 else "earlier"
+        table.actions.append(Action("shifted", n_parts, f"inputs act {rows} {which} than they stand, as declared"))
     averaged, who = choice.record.averaged, "the file says" if table.facts.get(KEY) else "declared"
     if averaged:
         text = (f"readings are means over the step before their stamp, as {who}" if averaged == "readings" else

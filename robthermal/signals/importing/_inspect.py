@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .._glitches import glitch_rows
 from .._stated import KEY
-from ._assemble import make_report, say_averaged, say_dropped
+from ._assemble import make_report, say_declared, say_dropped
 from ._cells import NumberReader, take_codes
 from ._clock import time_columns, time_reader
 from ._columns import Channel
@@ -73,7 +73,7 @@ def inspect(
         parts = find_parts(table, clock, alone, choice)
         if table.lines is not before:  # rows that repeat a time are gone
             values.keep(np.isin(before.numbers(), table.lines.numbers()))
-        say_averaged(table, len(parts), choice)
+        say_declared(table, len(parts), choice)
         say_dropped(table, values, time)
         glitches = {c.name: sum(_glitches(values.column(c)[part.rows]) for part in parts) for c in values.channels}
         report = make_report(source, table, clock, time, values, parts, glitches, choice, None)

@@ -91,6 +91,8 @@ class ImportOptions(_Table):
         before, and inputs hold from the stamp on. Default: values at the stamp.
     means_of : int, optional
         Samples that become one step by their means, as `block_means` does; of a long log.
+    input_shift : int
+        How many rows later than theirs the inputs of a log act, as `shift_inputs` takes it; -1: a row earlier.
     """
 
     time: str | tuple[str, ...] | None = None
@@ -117,14 +119,15 @@ class ImportOptions(_Table):
     restarts: Literal["refuse", "split"] = "refuse"
     averaged: Averaged | None = None
     means_of: Annotated[int, Field(ge=2)] | None = None
+    input_shift: int = 0
 
     @property
     def least(self) -> int:
         """Samples that a part needs: three blocks; where inputs are means, the first input and the last reading go."""
-        gone = self.averaged in ("before", "after")
+        means, shift = self.averaged in ("before", "after"), abs(self.input_shift)
         if self.means_of:
-            return max(self.shortest, 3 * self.means_of + gone)
-        return max(self.shortest, 3) if gone else self.shortest
+            return max(self.shortest, 3 * self.means_of + means + shift)
+        return max(self.shortest, 2 + means + shift)
 
     @field_validator("delimiter")
     @classmethod

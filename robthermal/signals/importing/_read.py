@@ -57,7 +57,7 @@ def read_records(
     **options
         Keys of [record]: time, time_format, timezone, sample_time, delimiter, decimal, thousands, encoding,
         header_line, units_line, sheet, variable, header, temperature_unit, missing, gaps, fill_up_to,
-        shortest, jitter, clock, duplicates, restarts, averaged, means_of.
+        shortest, jitter, clock, duplicates, restarts, averaged, means_of, input_shift.
 
     Returns
     -------

@@ -21,8 +21,8 @@ class Action:
     ----------
     what : str
         "decoded", "skipped", "mapped", "converted", "units_row", "dropped_row", "dropped_column", "duplicates",
-        "fault_code", "split", "filled", "resampled", "clock", "counted", "timezone", "left_out", "averaged" or
-        "glitches".
+        "fault_code", "split", "filled", "resampled", "clock", "counted", "timezone", "left_out", "shifted",
+        "averaged" or "glitches".
     n : int
         How many lines, rows, cells or columns.
     text : str

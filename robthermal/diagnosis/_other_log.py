@@ -1,4 +1,7 @@
-"""Whether a log of means, taken for readings at their stamps, explains what was found (docs: Measured files)."""
+"""Whether a log read otherwise explains what was found: means, or commands a row from where they act.
+
+Docs: Measured files.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,21 @@ from dataclasses import dataclass, replace
 
 from ..errors import Diverged, InputError
 from ..signals import Record
-from ._as_means import (
+from ._judge import Judged, Validation
+from ._outcomes import DiagnosisCode
+from ._read_otherwise import (
     CLEARLY,
-    AsMeans,
+    MEANS,
+    ReadAs,
     Reading,
     Refitted,
-    as_means_of_both_kinds,
+    read_otherwise,
     simplest,
     square,
+    stands,
     with_one_effect,
     with_some,
 )
-from ._judge import Judged, Validation
-from ._outcomes import DiagnosisCode
 from .data import records_of, responses_of
 from .fit import Refit
 
@@ -30,10 +35,30 @@ _CHANCE = 6.0  # readings' worth of the mean square by which equally good answer
 _LATE = 0.06  # of a step: means of eight samples; those of less are as good as any delay
 _SHORT, _PART = 20, 1500  # samples
 
-_WORDS: dict[Reading, tuple[str, str]] = {
-    "after": ("every value of the log is a mean over a step (loggers and data bases that average)",
-              'averaged = "after", or "before" where stamps are at the end'),
-    "readings": ("the readings are means over the step before their stamp", 'averaged = "readings"'),
+@dataclass(frozen=True)
+class _Words:
+    """How a log is read otherwise: what it would do, what that means, what is declared, and what one looks up."""
+
+    off: str
+    what: str
+    declare: str
+    better: str
+    look_up: str
+
+
+_MEAN = ("as means over a step", "Look up whether the logger averages.")
+_SHIFT = ("with commands in another row", "Look up when the program logs commands, and when it sends them.")
+_WORDS: dict[Reading, _Words] = {
+    "after": _Words("hold means", "every value of the log is a mean over a step (loggers and data bases that average)",
+                    'averaged = "after", or "before" where stamps are at the end', *_MEAN),
+    "readings": _Words("hold means", "the readings are means over the step before their stamp",
+                       'averaged = "readings"', *_MEAN),
+    "earlier": _Words("have its commands a row too late",
+                      "the commands of a row act from the stamp before on (a program that logs what it sent before)",
+                      "input_shift = -1", *_SHIFT),
+    "later": _Words("have its commands a row too early",
+                    "the commands of a row act from the next stamp on (a program that logs before it sends)",
+                    "input_shift = 1", *_SHIFT),
 }
 
 
@@ -53,24 +78,26 @@ class _Compared:
         """Mean square of an answer as good as the one found."""
         return self.left + _NEARLY * max(self.before - self.left, 0.0) + _CHANCE / self.n_readings * self.left
 
-    def clearly(self, one: AsMeans) -> bool:
+    def clearly(self, one: ReadAs) -> bool:
         """Whether records as means are clearly better explained."""
         if not one.labels and one.square < min(_LESS * self.left, CLEARLY * self.before):
             return True
         return one.square < CLEARLY * self.left
 
-    def as_well(self, one: AsMeans) -> bool:
-        """Whether they are explained as well with fewer effects: of an answer without a name, much must be."""
+    def as_well(self, one: ReadAs) -> bool:
+        """Whether they explain as well with fewer effects: of an answer without a name, much must be explained."""
+        if one.how == "later":  # heaters with a dead time do so, too
+            return False
         much = self.named or one.square < CLEARLY * self.before
         return much and len(one.labels) < self.n_effects and one.square <= self.alike and one.late <= _LATE
 
 
-def asked_of_means(judged: Judged, refitted: Refitted, validation: Validation) -> Judged:
-    """Refit the system with the records taken as means over a step, and say whether that explains more.
+def asked_of_log(judged: Judged, refitted: Refitted, validation: Validation) -> Judged:
+    """Refit the system with the log read otherwise, and say whether that explains more.
 
-    Names are withdrawn where the model is then clearly better, and where it is as good with at least two effects less.
-    With one effect less the records cannot tell. Returned as it is where nothing is missing, and for records that are
-    means, or beside frequency responses.
+    Names are withdrawn where the model is then clearly better, unless the same effects are chosen then, too, and where
+    it is as good with at least two effects less. With one effect less the records cannot tell. Returned as it is where
+    nothing is missing, and for records that are means, or beside frequency responses.
 
     Parameters
     ----------
@@ -105,11 +132,11 @@ def _compared(judged: Judged, before: float, left: float) -> _Compared:
                      judged.verdict != "unexplained")
 
 
-def _explained(records: Sequence[Record], refitted: Refitted, judged: Judged, asked: _Compared) -> AsMeans | None:
+def _explained(records: Sequence[Record], refitted: Refitted, judged: Judged, asked: _Compared) -> ReadAs | None:
     """The fit as means that explains clearly more, or as much with fewer effects; None if none does."""
-    fits = as_means_of_both_kinds(records, refitted, judged.plain or judged.state.fit, asked.alike, asked.down)
+    fits = read_otherwise(records, refitted, judged.plain or judged.state.fit, asked.before, asked.alike, asked.down)
     if not asked.down and not any(map(asked.clearly, fits)):
-        plain = [one for one in fits if not one.labels]
+        plain = [one for one in fits if not one.labels and one.how in MEANS]
         fits += filter(None, (with_one_effect(one, judged.state.names, CLEARLY * asked.left) for one in plain))
     better = [one for one in fits if asked.clearly(one)]
     if better:
@@ -131,7 +158,7 @@ def _distinguished(records: Sequence[Record], refitted: Refitted, judged: Judged
     if both is None:
         return False
     asked = replace(_compared(judged, square(plain), square(both)), n_readings=plain.n_readings)
-    return not any(map(asked.as_well, as_means_of_both_kinds(records, refitted, both, asked.alike, asked.down)))
+    return not any(map(asked.as_well, read_otherwise(records, refitted, both, asked.before, asked.alike, asked.down)))
 
 
 def _sampled(validation: Validation) -> list[Record]:
@@ -141,25 +168,28 @@ def _sampled(validation: Validation) -> list[Record]:
     return records if len(records) == len(listed) else []
 
 
-def _answered(judged: Judged, asked: _Compared, answer: AsMeans) -> Judged:
-    """The answer with what is to be said of means, and without names that they make doubtful."""
-    what, declare = _WORDS[answer.how]
+def _answered(judged: Judged, asked: _Compared, answer: ReadAs) -> Judged:
+    """The answer with what is to be said of the log, and without names that it makes doubtful."""
+    words, clear, unit = _WORDS[answer.how], asked.clearly(answer), judged.state.nominal.unit
+    rounds, names = judged.state.rounds, judged.state.names
+    if asked.named and len(answer.labels) == len(rounds) and stands(answer, rounds, names):
+        return replace(judged, means=f"The log seems to {words.off}: if {words.what}, the error falls further, from "
+                       f"{asked.left**0.5:.2g} to {answer.square**0.5:.2g} {unit}, with the same effects of other "
+                       f"sizes. Then declare {words.declare} in [record], and diagnose again.")
     beside = f"with {' and '.join(answer.labels)}" if answer.labels else "without any effect"
-    unit = judged.state.nominal.unit
-    falls = f"the error falls from {asked.before**0.5:.2g} to {answer.square**0.5:.2g} {unit} {beside}"
-    clear = asked.clearly(answer)
+    falls = (f"if {words.what}, the error falls from {asked.before**0.5:.2g} to {answer.square**0.5:.2g} {unit} "
+             f"{beside}")
     if not clear and asked.n_effects - len(answer.labels) == 1 and asked.named:
-        text = (f"The log may hold means: if {what}, {falls}, about as far as with what is listed. Then declare "
-                f"{declare} in [record], and diagnose again.")
+        text = (f"The log may {words.off}: {falls}, about as far as with what is listed. Then declare "
+                f"{words.declare} in [record], and diagnose again.")
         return replace(judged, verdict="ambiguous", means=text, outcome=DiagnosisCode.AMBIGUOUS.outcome(
-            "The records cannot distinguish what is listed from a log of means over a step.",
-            remedy="Look up whether the logger averages."))
-    text = (f"The log {'seems to' if clear else 'may'} hold means: if {what}, {falls}, against {asked.left**0.5:.2g} "
-            f"{unit} with readings at their stamps. Declare {declare} in [record], and diagnose again.")
+            f"What is listed explains the records, and so does the log {words.better}.", remedy=words.look_up))
+    text = (f"The log {'seems to' if clear else 'may'} {words.off}: {falls}, against {asked.left**0.5:.2g} {unit} as "
+            f"it stands. Declare {words.declare} in [record], and diagnose again.")
     return replace(judged, verdict="unexplained", evidence=(), plain=None, means=text,
                    outcome=judged.outcome if not asked.named else DiagnosisCode.UNEXPLAINED.outcome(
-                       f"No name: the records are explained {'better' if clear else 'as well'} as means over a step.",
-                       remedy="Declare it, if that is what they are."))
+                       f"No name: the records are explained {'better' if clear else 'as well'} {words.better}.",
+                       remedy=f"{words.look_up} If it is so, declare it."))
 
 
 def _askable(nominal: Refit) -> list[Record]:

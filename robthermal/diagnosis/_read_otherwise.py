@@ -1,9 +1,12 @@
-"""Fits to a log whose values are taken as means over a step: without effects, with those accepted, with one more."""
+"""Fits to a log read otherwise: without effects, with those accepted, with one more.
+
+Its values may be means over a step, or its commands may stand a row from where they act.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal, get_args
 
@@ -11,31 +14,37 @@ import numpy as np
 
 from ..errors import Diverged, InputError
 from ..fitting import rmse
-from ..signals import Record, as_means
+from ..signals import Record, as_means, shift_inputs
 from .evidence import promised, score
 from .fit import NoiseScaling, Refit, fitted
-from .search import refit_short_list
+from .search import Accepted, refit_short_list, revised
 
-Reading = Literal["after", "readings"]
+Means = Literal["after", "readings"]
+Reading = Literal["after", "readings", "earlier", "later"]
 Refitted = Callable[[Sequence[Record]], Refit]
 CLEARLY = 0.5  # of a mean square: what is clearly less
+MEANS = get_args(Means)
 _READINGS = get_args(Reading)
+_ROWS: dict[Reading, int] = {"earlier": -1, "later": 1}  # that commands move
 
 
 @dataclass(frozen=True, eq=False)
-class AsMeans:
-    """A fit to the records as means.
+class ReadAs:
+    """A fit to the records read otherwise.
 
     Parameters
     ----------
     fit : Refit
         Fit with no, some or all effects.
-    how : {"after", "readings"}
-        Which means the values are.
+    how : {"after", "readings", "earlier", "later"}
+        Which means the values are, or by a row earlier or later than theirs commands act.
+    plain : Refit
+        Fit without effects to the records read so.
     """
 
     fit: Refit
     how: Reading
+    plain: Refit
 
     @property
     def square(self) -> float:
@@ -54,11 +63,12 @@ class AsMeans:
         return tuple(candidate.label for candidate in self.fit.structure.effects)
 
 
-def as_means_of_both_kinds(records: Sequence[Record], refitted: Refitted, found: Refit, alike: float,
-                           fewer: bool) -> list[AsMeans]:
-    """Fits to the records as means without effects, with those of another fit, and with every part of these.
+def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, before: float, alike: float,
+                   fewer: bool) -> list[ReadAs]:
+    """Fits to the records read otherwise without effects, with those of another fit, and with every part of these.
 
-    Effects that made up for means are not needed beside them: a part of them then does as well.
+    Effects that made up for means are not needed beside them: a part of them then does as well. With commands in
+    another row effects are tried where these explain something by themselves.
 
     Parameters
     ----------
@@ -68,31 +78,43 @@ def as_means_of_both_kinds(records: Sequence[Record], refitted: Refitted, found:
         Fits the nominal system to other records.
     found : Refit
         Fit to the records as readings at their stamps.
+    before : float
+        Mean square without effects, as readings at their stamps [K²].
     alike : float
         Mean square of a fit as good as that [K²]: parts of the effects are tried where all of them leave no more.
     fewer : bool
         Whether only fits with fewer effects are asked for.
     """
     effects, fits = len(found.structure.effects), []
+    ambients = found.structure.base.ambients
     for how in _READINGS:
         try:
-            plain = refitted([as_means(one, how) for one in records])
+            plain = refitted([_read(one, how, ambients) for one in records])
         except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
             continue
-        fits.append(AsMeans(plain, how))
-        whole = [AsMeans(fit, how) for fit in with_some(plain, found, effects)] if effects > fewer else []
+        fits.append(ReadAs(plain, how, plain))
+        if how in _ROWS and square(plain) >= before:
+            continue
+        whole = [ReadAs(fit, how, plain) for fit in with_some(plain, found, effects)] if effects > fewer else []
         fits += whole
         if whole and whole[0].square <= alike:
-            fits += [AsMeans(fit, how) for n in range(1, effects) for fit in with_some(plain, found, n)]
+            fits += [ReadAs(fit, how, plain) for n in range(1, effects) for fit in with_some(plain, found, n)]
     return fits
 
 
-def with_one_effect(plain: AsMeans, names: Sequence[str] | None, enough: float) -> AsMeans | None:
+def _read(record: Record, how: Reading, ambients: Container[str]) -> Record:
+    """A record with its rows read otherwise; temperatures of ambients are readings, no commands."""
+    if how == "after" or how == "readings":
+        return as_means(record, how)
+    return shift_inputs(record, _ROWS[how], [name for name in record.input_names if name not in ambients])
+
+
+def with_one_effect(plain: ReadAs, names: Sequence[str] | None, enough: float) -> ReadAs | None:
     """The fit with the effect that scores best beside means, if it promises to leave no more than enough.
 
     Parameters
     ----------
-    plain : AsMeans
+    plain : ReadAs
         Fit without effects.
     names : sequence of str or None
         Effects to try; None for the whole catalog.
@@ -108,15 +130,34 @@ def with_one_effect(plain: AsMeans, names: Sequence[str] | None, enough: float) 
         entries = refit_short_list(fit, scores, length=1).entries
     except (Diverged, InputError):  # a model that runs away explains nothing
         return None
-    return AsMeans(_of_its_own(plain.fit, entries[0].fit), plain.how) if entries else None
+    return ReadAs(_of_its_own(plain.fit, entries[0].fit), plain.how, plain.fit) if entries else None
 
 
-def simplest(fits: Sequence[AsMeans], most: float) -> AsMeans | None:
+def stands(answer: ReadAs, rounds: Sequence[Accepted], names: Sequence[str] | None) -> bool:
+    """Whether the same effects are chosen where the log is read otherwise, each again beside the others.
+
+    Parameters
+    ----------
+    answer : ReadAs
+        Fit with these effects.
+    rounds : sequence of Accepted
+        What was accepted with the log as it stands.
+    names : sequence of str or None
+        Effects to try; None for the whole catalog.
+    """
+    start = tuple(Accepted(answer.plain, best=replace(round_.best, fit=answer.fit)) for round_ in rounds)
+    again, _ = revised(start, answer.plain, names)
+    listed = {one.key for round_ in again for entry in (round_.best, *round_.contenders)
+              for one in (entry.candidate, *entry.aliases)}
+    return len(again) == len(rounds) and all(round_.best.candidate.key in listed for round_ in rounds)
+
+
+def simplest(fits: Sequence[ReadAs], most: float) -> ReadAs | None:
     """The fit with the fewest effects that leaves no more than this; of several the best.
 
     Parameters
     ----------
-    fits : sequence of AsMeans
+    fits : sequence of ReadAs
         Fits to choose from.
     most : float
         Mean square of the residual [K²].
