@@ -53,3 +53,26 @@ def day(seed: int, late: float = 0.0) -> rt.Record:
             T, sensor = T + STEP / fine * heat / 2.0, sensor + STEP / fine * (T - sensor) / np.array(LAGS)
     return rt.Record(sample_time=STEP, inputs=np.array(sent[4:]), outputs=np.array(read) + NOISE * rng.standard_normal(
         (N, 2)), input_names=["q1", "q2"], output_names=["T1", "T2"])
+
+
+def step_test(seed: int, radiation: float = 0.0) -> rt.Record:
+    """A log of ten minutes: heater 1 at half its power from the first row on, heater 2 off.
+
+    Parameters
+    ----------
+    seed : int
+        Of the noise.
+    radiation : float
+        Coefficient of both heaters' radiation [W/K⁴].
+    """
+    gain, loss, n, fine = np.array([0.012, 0.0064]), np.array([0.011, 0.010]), 126, 20
+    T, sensor, read = np.full(2, ROOM), np.full(2, ROOM), []
+    for _ in range(n):
+        read.append(sensor)
+        for _ in range(fine):
+            heat = gain * np.array([50.0, 0.0]) - loss * (T - ROOM) + PATH * (T[::-1] - T)
+            heat = heat - radiation * (T**4 - ROOM**4)
+            T, sensor = T + STEP / fine * heat / 2.0, sensor + STEP / fine * (T - sensor) / np.array(LAGS)
+    noise = NOISE * np.random.default_rng(seed).standard_normal((n, 2))
+    return rt.Record(sample_time=STEP, inputs=np.tile([50.0, 0.0], (n, 1)), outputs=np.array(read) + noise,
+                     input_names=["q1", "q2"], output_names=["T1", "T2"])

@@ -30,7 +30,9 @@ from .fit import Refit
 
 _LESS = 0.8  # of the mean square that the answer leaves: means without any effect are the better answer
 _NEARLY = 0.005  # of what the answer takes off the mean square: who takes all but this off explains as much
+_MORE = 0.25  # of what the answer leaves: no more may be left by one that explains as much
 _MOSTLY = 0.02  # of what the best takes off: what an effect more has to take off beside it
+_REST = 0.1  # of the mean square without effects: names stay in two readings of a log where the better leaves less
 _CHANCE = 6.0  # readings' worth of the mean square by which equally good answers differ
 _LATE = 0.06  # of a step: means of eight samples; those of less are as good as any delay
 _SHORT, _PART = 20, 1500  # samples
@@ -76,7 +78,8 @@ class _Compared:
     @property
     def alike(self) -> float:
         """Mean square of an answer as good as the one found."""
-        return self.left + _NEARLY * max(self.before - self.left, 0.0) + _CHANCE / self.n_readings * self.left
+        nearly = min(_NEARLY * max(self.before - self.left, 0.0), _MORE * self.left)
+        return self.left + nearly + _CHANCE / self.n_readings * self.left
 
     def clearly(self, one: ReadAs) -> bool:
         """Whether records as means are clearly better explained."""
@@ -172,7 +175,8 @@ def _answered(judged: Judged, asked: _Compared, answer: ReadAs) -> Judged:
     """The answer with what is to be said of the log, and without names that it makes doubtful."""
     words, clear, unit = _WORDS[answer.how], asked.clearly(answer), judged.state.nominal.unit
     rounds, names = judged.state.rounds, judged.state.names
-    if asked.named and len(answer.labels) == len(rounds) and stands(answer, rounds, names):
+    explained = asked.named and answer.square < _REST * asked.before
+    if explained and len(answer.labels) == len(rounds) and stands(answer, rounds, names):
         return replace(judged, means=f"The log seems to {words.off}: if {words.what}, the error falls further, from "
                        f"{asked.left**0.5:.2g} to {answer.square**0.5:.2g} {unit}, with the same effects of other "
                        f"sizes. Then declare {words.declare} in [record], and diagnose again.")

@@ -5,7 +5,7 @@ Its values may be means over a step, or its commands may stand a row from where 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal, get_args
@@ -86,10 +86,11 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
         Whether only fits with fewer effects are asked for.
     """
     effects, fits = len(found.structure.effects), []
-    ambients = found.structure.base.ambients
-    for how in _READINGS:
+    commands = [name for name in records[0].input_names if name not in found.structure.base.ambients]
+    moved = any(np.ptp(one[name]) > 0.0 for one in records for name in commands)
+    for how in _READINGS if moved else MEANS:
         try:
-            plain = refitted([_read(one, how, ambients) for one in records])
+            plain = refitted([_read(one, how, commands) for one in records])
         except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
             continue
         fits.append(ReadAs(plain, how, plain))
@@ -102,11 +103,11 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
     return fits
 
 
-def _read(record: Record, how: Reading, ambients: Container[str]) -> Record:
+def _read(record: Record, how: Reading, commands: Sequence[str]) -> Record:
     """A record with its rows read otherwise; temperatures of ambients are readings, no commands."""
     if how == "after" or how == "readings":
         return as_means(record, how)
-    return shift_inputs(record, _ROWS[how], [name for name in record.input_names if name not in ambients])
+    return shift_inputs(record, _ROWS[how], commands)
 
 
 def with_one_effect(plain: ReadAs, names: Sequence[str] | None, enough: float) -> ReadAs | None:
@@ -136,6 +137,8 @@ def with_one_effect(plain: ReadAs, names: Sequence[str] | None, enough: float) -
 def stands(answer: ReadAs, rounds: Sequence[Accepted], names: Sequence[str] | None) -> bool:
     """Whether the same effects are chosen where the log is read otherwise, each again beside the others.
 
+    Of a set of alternatives one is enough: the other reading may tell between them.
+
     Parameters
     ----------
     answer : ReadAs
@@ -147,9 +150,9 @@ def stands(answer: ReadAs, rounds: Sequence[Accepted], names: Sequence[str] | No
     """
     start = tuple(Accepted(answer.plain, best=replace(round_.best, fit=answer.fit)) for round_ in rounds)
     again, _ = revised(start, answer.plain, names)
-    listed = {one.key for round_ in again for entry in (round_.best, *round_.contenders)
-              for one in (entry.candidate, *entry.aliases)}
-    return len(again) == len(rounds) and all(round_.best.candidate.key in listed for round_ in rounds)
+    sets, chosen = ([{one.key for entry in (round_.best, *round_.contenders)
+                      for one in (entry.candidate, *entry.aliases)} for round_ in some] for some in (rounds, again))
+    return len(chosen) == len(sets) and all(any(one & other for other in chosen) for one in sets)
 
 
 def simplest(fits: Sequence[ReadAs], most: float) -> ReadAs | None:

@@ -217,10 +217,11 @@ def _asks_for_a_warm_room(judged: Judged) -> bool:
     """Whether an answer does not explain the records down to the noise, or only with a room too warm for the machine.
 
     Where the room comes out cool enough beside the effects named, holding it below the readings would change nothing.
+    Where nothing is missing the machine may have been brought in from the cold.
     """
-    if judged.verdict == "unexplained":
-        return True
-    return judged.plain is not None and too_warm(judged.plain)
+    if judged.verdict in ("unexplained", "consistent"):
+        return judged.verdict == "unexplained"
+    return too_warm(judged.plain or judged.state.fit)
 
 
 def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:

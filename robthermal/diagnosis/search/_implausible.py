@@ -11,11 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
 from ..effects import AMBIENT_DRIFT, Candidate
 from ..evidence import Twin
 from ..fit import Refit
 
 _LAGS = ("sensor_lag", "input_lag")
+_BY_ITSELF = 0.25  # relative: by so much radiation and natural convection change a conductance over tens of kelvins
 FASTEST = 3.0 / 60.0  # K/s: air that is cooled or heated by cycling equipment changes by 1 to 2 K per minute
 
 
@@ -39,6 +42,9 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     if candidate.effect.name in _LAGS and values["time_constant"] > span:
         return (f"its lag of {values['time_constant']:.3g} s is longer than the record, of {span:.3g} s: stuck, or not "
                 "attached")
+    if abs(values.get("relative", _BY_ITSELF)) < _BY_ITSELF and "time" in values and not _moved(fit):
+        return ("no input changes in the records, and while everything only settles a conductance that depends on "
+                "temperature looks like one that changes at some time")
     if not candidate.effect.paired:
         return ""
     if candidate.effect.name == AMBIENT_DRIFT:
@@ -47,6 +53,13 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     if values["period"] <= span or any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
         return ""
     return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
+
+
+def _moved(fit: Refit) -> bool:
+    """Whether any command changes within a record."""
+    ambients = fit.structure.base.ambients
+    return any(np.ptp(path.one.record[name]) > 0.0 for path in fit.records for name in path.one.record.input_names
+               if name not in ambients)
 
 
 def implausible_names(fit: Refit, twins: Mapping[tuple[str, tuple[str, ...]], Sequence[Twin]]) -> Iterator[str]:
