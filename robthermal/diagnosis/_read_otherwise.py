@@ -85,7 +85,7 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
     fewer : bool
         Whether only fits with fewer effects are asked for.
     """
-    effects, fits = len(found.structure.effects), []
+    fits = []
     commands = [name for name in records[0].input_names if name not in found.structure.base.ambients]
     moved = any(np.ptp(one[name]) > 0.0 for one in records for name in commands)
     for how in _READINGS if moved else MEANS:
@@ -94,13 +94,18 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
         except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
             continue
         fits.append(ReadAs(plain, how, plain))
-        if how in _ROWS and square(plain) >= before:
-            continue
-        whole = [ReadAs(fit, how, plain) for fit in with_some(plain, found, effects)] if effects > fewer else []
-        fits += whole
-        if whole and whole[0].square <= alike:
-            fits += [ReadAs(fit, how, plain) for n in range(1, effects) for fit in with_some(plain, found, n)]
+        if how in MEANS or square(plain) < before:
+            fits += [ReadAs(fit, how, plain) for fit in _with_effects(plain, found, alike, fewer)]
     return fits
+
+
+def _with_effects(plain: Refit, found: Refit, alike: float, fewer: bool) -> list[Refit]:
+    """The fit with all effects of another one, and with every part of these where all of them explain as much."""
+    effects = len(found.structure.effects)
+    whole = list(with_some(plain, found, effects)) if effects > fewer else []
+    if whole and square(whole[0]) <= alike:
+        return whole + [fit for n in range(1, effects) for fit in with_some(plain, found, n)]
+    return whole
 
 
 def _read(record: Record, how: Reading, commands: Sequence[str]) -> Record:

@@ -60,6 +60,7 @@ from .fit import Refit, SessionGain, exact, found_ambients, only_heated, refit, 
 from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
 
+_TOO_WARM = 1.0  # K above what the readings allow: a room beside which no name stays
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def diagnose(system: System, records: Measured | Sequence[Measured], *,
@@ -221,7 +222,7 @@ def _asks_for_a_warm_room(judged: Judged) -> bool:
     """
     if judged.verdict in ("unexplained", "consistent"):
         return judged.verdict == "unexplained"
-    return too_warm(judged.plain or judged.state.fit)
+    return too_warm(judged.plain or judged.state.fit, _TOO_WARM)
 
 
 def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:

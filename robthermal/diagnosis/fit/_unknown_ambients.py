@@ -90,12 +90,14 @@ def found_ambients(fit: Refit) -> tuple[FoundAmbient, ...]:
     return tuple(found)
 
 
-def too_warm(fit: Refit) -> bool:
+def too_warm(fit: Refit, beyond: float = 0.0) -> bool:
     """Whether an ambient that was not recorded comes out warmer than a machine can have that is only heated.
 
     Parameters
     ----------
     fit : Refit
         Fit to the records, with ambients free.
+    beyond : float
+        By how much at least [K].
     """
-    return not fit.structure.only_heated and any(one.value > one.warmest for one in found_ambients(fit))
+    return not fit.structure.only_heated and any(one.value > one.warmest + beyond for one in found_ambients(fit))
