@@ -31,7 +31,7 @@ from .fit import Refit
 _LESS = 0.8  # of the mean square that the answer leaves: means without any effect are the better answer
 _NEARLY = 0.005  # of what the answer takes off the mean square: who takes all but this off explains as much
 _MORE = 0.25  # of what the answer leaves: no more may be left by one that explains as much
-_MOSTLY = 0.02  # of what the best takes off: what an effect more has to take off beside it
+_MOSTLY = 0.02  # of what the best takes off: what an effect more has to take off beside it, or _MORE of what is left
 _REST = 0.1  # of the mean square without effects: names stay in two readings of a log where the better leaves less
 _CHANCE = 6.0  # readings' worth of the mean square by which equally good answers differ
 _LATE = 0.06  # of a step: means of eight samples; those of less are as good as any delay
@@ -137,14 +137,14 @@ def _compared(judged: Judged, before: float, left: float) -> _Compared:
 
 def _explained(records: Sequence[Record], refitted: Refitted, judged: Judged, asked: _Compared) -> ReadAs | None:
     """The fit as means that explains clearly more, or as much with fewer effects; None if none does."""
-    fits = read_otherwise(records, refitted, judged.plain or judged.state.fit, asked.before, asked.alike, asked.down)
+    fits = read_otherwise(records, refitted, judged.plain or judged.state.fit, asked.alike, asked.down)
     if not asked.down and not any(map(asked.clearly, fits)):
         plain = [one for one in fits if not one.labels and one.how in MEANS]
         fits += filter(None, (with_one_effect(one, judged.state.names, CLEARLY * asked.left) for one in plain))
     better = [one for one in fits if asked.clearly(one)]
     if better:
         least = min(one.square for one in better)
-        return simplest(better, least + _MOSTLY * max(asked.before - least, 0.0))
+        return simplest(better, least + min(_MOSTLY * max(asked.before - least, 0.0), _MORE * least))
     return simplest([one for one in fits if asked.as_well(one)], asked.alike)
 
 
@@ -161,7 +161,7 @@ def _distinguished(records: Sequence[Record], refitted: Refitted, judged: Judged
     if both is None:
         return False
     asked = replace(_compared(judged, square(plain), square(both)), n_readings=plain.n_readings)
-    return not any(map(asked.as_well, read_otherwise(records, refitted, both, asked.before, asked.alike, asked.down)))
+    return not any(map(asked.as_well, read_otherwise(records, refitted, both, asked.alike, asked.down)))
 
 
 def _sampled(validation: Validation) -> list[Record]:

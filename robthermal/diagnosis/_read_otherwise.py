@@ -63,12 +63,12 @@ class ReadAs:
         return tuple(candidate.label for candidate in self.fit.structure.effects)
 
 
-def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, before: float, alike: float,
-                   fewer: bool) -> list[ReadAs]:
+def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, alike: float, fewer: bool
+                   ) -> list[ReadAs]:
     """Fits to the records read otherwise without effects, with those of another fit, and with every part of these.
 
-    Effects that made up for means are not needed beside them: a part of them then does as well. With commands in
-    another row effects are tried where these explain something by themselves.
+    Effects that made up for means are not needed beside them: a part of them then does as well. Nor is a row worth
+    anything by itself where lags are missing: these hide commands that are logged late.
 
     Parameters
     ----------
@@ -78,8 +78,6 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
         Fits the nominal system to other records.
     found : Refit
         Fit to the records as readings at their stamps.
-    before : float
-        Mean square without effects, as readings at their stamps [K²].
     alike : float
         Mean square of a fit as good as that [K²]: parts of the effects are tried where all of them leave no more.
     fewer : bool
@@ -93,9 +91,7 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
             plain = refitted([_read(one, how, commands) for one in records])
         except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
             continue
-        fits.append(ReadAs(plain, how, plain))
-        if how in MEANS or square(plain) < before:
-            fits += [ReadAs(fit, how, plain) for fit in _with_effects(plain, found, alike, fewer)]
+        fits += [ReadAs(fit, how, plain) for fit in (plain, *_with_effects(plain, found, alike, fewer))]
     return fits
 
 
