@@ -6,6 +6,8 @@ Commands may act later than the row in which they are logged, as on a measured b
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 import robthermal as rt
@@ -27,7 +29,18 @@ def model() -> rt.System:
         fit=ranges | {f"inputs.q{i}.gain": {"lower": 1e-3, "upper": 0.1} for i in "12"})
 
 
-def day(seed: int, late: float = 0.0) -> rt.Record:
+@dataclass(frozen=True)
+class Board:
+    """Numbers of a board: gains [W/%], losses and path [W/K], lags of both sensors [s], room [K]."""
+
+    gain: tuple[float, float] = (0.010, 0.0064)
+    loss: tuple[float, float] = (0.011, 0.014)
+    path: float = PATH
+    lags: tuple[float, float] = LAGS
+    room: float = ROOM
+
+
+def day(seed: int, late: float = 0.0, board: Board = Board()) -> rt.Record:  # noqa: B008  # frozen
     """A log of 20 min: rows of commands and of the readings that they follow.
 
     Parameters
@@ -36,21 +49,25 @@ def day(seed: int, late: float = 0.0) -> rt.Record:
         Of goals and noise.
     late : float
         How much later than their row commands act [s], up to three rows.
+    board : Board
+        Its numbers.
     """
-    gain, loss = np.array([0.010, 0.0064]), np.array([0.011, 0.014])
+    gain, loss, lags = (np.array(each) for each in (board.gain, board.loss, board.lags))
     rng = np.random.default_rng(seed)
-    T, sensor, sent, read, goal = np.full(2, ROOM), np.full(2, ROOM), [np.zeros(2)] * 4, [], np.zeros(2)
-    fine = 20
+    T, sent, read, goal = np.full(2, board.room), [np.zeros(2)] * 4, [], np.zeros(2)
+    sensor, fine = T, 20
     for k in range(N):
         if k % 60 == 0:
-            goal = ROOM + np.array([28.0, 20.0]) * (0.7 + 0.6 * rng.random(2))
+            goal = board.room + np.array([28.0, 20.0]) * (0.7 + 0.6 * rng.random(2))
         cold = sensor + NOISE * rng.standard_normal(2) < goal
         sent.append(100.0 * cold * np.array([k > 1, 1 < k < 10 or k > 100]))
         read.append(sensor)
         for j in range(fine):
             u = sent[-1 + int(np.floor((j + 0.5) / fine - late / STEP))]
-            heat = gain * u - loss * (T - ROOM) + PATH * (T[::-1] - T)
-            T, sensor = T + STEP / fine * heat / 2.0, sensor + STEP / fine * (T - sensor) / np.array(LAGS)
+            heat = gain * u - loss * (T - board.room) + board.path * (T[::-1] - T)
+            follows = sensor + STEP / fine * (T - sensor) / np.maximum(lags, 1.0)
+            T = T + STEP / fine * heat / 2.0
+            sensor = np.where(lags > 0.0, follows, T)
     return rt.Record(sample_time=STEP, inputs=np.array(sent[4:]), outputs=np.array(read) + NOISE * rng.standard_normal(
         (N, 2)), input_names=["q1", "q2"], output_names=["T1", "T2"])
 
