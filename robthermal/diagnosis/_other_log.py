@@ -37,6 +37,7 @@ _CHANCE = 6.0  # readings' worth of the mean square by which equally good answer
 _LATE = 0.06  # of a step: means of eight samples; those of less are as good as any delay
 _SHORT, _PART = 20, 1500  # samples
 
+
 @dataclass(frozen=True)
 class _Words:
     """How a log is read otherwise: what it would do, what that means, what is declared, and what one looks up."""

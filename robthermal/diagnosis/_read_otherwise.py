@@ -150,7 +150,10 @@ def stands(answer: ReadAs, rounds: Sequence[Accepted], names: Sequence[str] | No
         Effects to try; None for the whole catalog.
     """
     start = tuple(Accepted(answer.plain, best=replace(round_.best, fit=answer.fit)) for round_ in rounds)
-    again, _ = revised(start, answer.plain, names)
+    try:
+        again, _ = revised(start, answer.plain, names)
+    except (Diverged, InputError):  # a model that runs away chooses nothing
+        return False
     sets, chosen = ([{one.key for entry in (round_.best, *round_.contenders)
                       for one in (entry.candidate, *entry.aliases)} for round_ in some] for some in (rounds, again))
     return len(chosen) == len(sets) and all(any(one & other for other in chosen) for one in sets)

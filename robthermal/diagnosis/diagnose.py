@@ -157,8 +157,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     if too_warm(nominal) and _asks_for_a_warm_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")
         judged = _judged(only_heated(nominal), names, checked, progress)
-    judged = asked_of_log(judged, lambda others: refit(system, others, floor, parameters=parameters,
-                                                         session_gain=session_gain), checked)
+    held = only_heated if judged.state.nominal.structure.only_heated else replace
+    judged = asked_of_log(judged, lambda others: held(refit(system, others, floor, parameters=parameters,
+                                                            session_gain=session_gain)), checked)
     progress("locating the misfit and planning the next experiment")
     found, fitted_to, held_out = concluded(judged), records, validation
     every, responses = measured_of(records, "records")
