@@ -69,7 +69,7 @@ def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Nam
 
 
 def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
-    """Where a lag is named beside a remainder: lumps whose body may take that time itself, a sentence each.
+    """Where a lag is named beside a remainder: lumps whose body may take that time itself, in a sentence.
 
     Parameters
     ----------
@@ -81,9 +81,9 @@ def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
     lumps = [system.inputs[where[0]].lump if name == "input_lag" else system.sensors[where[0]].lump
              for name, where in effects  # a module heats two lumps at once
              if name == "sensor_lag" or (name == "input_lag" and where[0] in system.inputs)]
-    return [f"A lag at {lump} may also be the time that heat takes within {lump}, from where it enters to the "
-            f"thermometer: see whether a network with {lump} split in two does as well."
-            for lump in dict.fromkeys(filter(None, lumps))]
+    at = " or ".join(dict.fromkeys(filter(None, lumps)))
+    return [f"A lag at {at} may also be the time that heat takes within {at}, from where it enters to the "
+            f"thermometer: see whether a network with {at} split in two does as well."] if at else []
 
 
 def periods_undecided(rounds: Sequence[Accepted], remainder: bool) -> list[str]:

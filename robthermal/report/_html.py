@@ -149,6 +149,7 @@ def _template(name: str) -> jinja2.Template:
                                      undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
                                      keep_trailing_newline=True)
     environment.filters["units"] = _together
+    environment.filters["answer_and_rest"] = _answer_and_rest
     return environment.get_template(name)
 
 
@@ -158,6 +159,12 @@ def _amps(bound: Bound | None) -> str:
 
 def _ranges(claim: Claim) -> list[str]:
     return [part.strip() for part in claim.box.split(";") if part.strip()]
+
+
+def _answer_and_rest(headline: str) -> tuple[str, str]:
+    """The first two sentences, what is missing and what the error becomes with it, and what is held against them."""
+    sentences = re.split(r"(?<=\.) (?=[A-Z])", headline)
+    return " ".join(sentences[:2]), " ".join(sentences[2:])
 
 
 def _together(text: str) -> str:
