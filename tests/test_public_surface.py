@@ -99,7 +99,7 @@ SURFACE = {
         Declared DesignCheck Excitation Import ImportOptions Record
         SignalsCode Thermistor as_means block_means celsius_to_kelvin crest_factor declared design_check find_glitches
         inspect_file kelvin_to_celsius median_filter multisine multisines noise
-        options_from_text prbs read_record read_records save_records staircase
+        options_from_text prbs read_record read_records save_records shift_inputs staircase
     """,
     "synthesis": """
         AntiWindupDesign
