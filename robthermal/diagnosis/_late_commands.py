@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .data import commands
 from .fit import Refit
 from .search import quantities_of
 
@@ -20,10 +21,10 @@ def late_by_rows(fit: Refit) -> list[str]:
     if not fit.records:
         return []
     record, structure = fit.records[0].one.record, fit.structure
-    commands = {name for name in record.input_names if name not in structure.base.ambients}
+    sent = set(commands(structure.base, record))
     delays = {effect.where[0]: quantities_of(fit, place)["delay"] for place, effect in enumerate(structure.effects)
               if effect.effect.name == "input_delay"}
-    if not commands or set(delays) != commands:
+    if not sent or set(delays) != sent:
         return []
     h = record.sample_time
     rows = {round(delay / h) for delay, _ in delays.values()}

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import Diverged, InputError
 from ..fitting import rmse
 from ..signals import Record, as_means, shift_inputs
+from .data import commands, moves
 from .evidence import promised, score
 from .fit import NoiseScaling, Refit, fitted
 from .search import Accepted, refit_short_list, revised
@@ -84,11 +85,10 @@ def read_otherwise(records: Sequence[Record], refitted: Refitted, found: Refit, 
         Whether only fits with fewer effects are asked for.
     """
     fits = []
-    commands = [name for name in records[0].input_names if name not in found.structure.base.ambients]
-    moved = any(np.ptp(one[name]) > 0.0 for one in records for name in commands)
-    for how in _READINGS if moved else MEANS:
+    system = found.structure.base
+    for how in _READINGS if any(moves(system, one) for one in records) else MEANS:
         try:
-            plain = refitted([_read(one, how, commands) for one in records])
+            plain = refitted([_read(one, how, commands(system, one)) for one in records])
         except (Diverged, InputError):  # as means they would be too short, or lead where the model runs away
             continue
         fits += [ReadAs(fit, how, plain) for fit in (plain, *_with_effects(plain, found, alike, fewer))]
@@ -104,11 +104,11 @@ def _with_effects(plain: Refit, found: Refit, alike: float, fewer: bool) -> list
     return whole
 
 
-def _read(record: Record, how: Reading, commands: Sequence[str]) -> Record:
+def _read(record: Record, how: Reading, sent: Sequence[str]) -> Record:
     """A record with its rows read otherwise; temperatures of ambients are readings, no commands."""
     if how == "after" or how == "readings":
         return as_means(record, how)
-    return shift_inputs(record, _ROWS[how], commands)
+    return shift_inputs(record, _ROWS[how], sent)
 
 
 def with_one_effect(plain: ReadAs, names: Sequence[str] | None, enough: float) -> ReadAs | None:

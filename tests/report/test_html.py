@@ -237,3 +237,12 @@ def test_of_many_claims_the_first_and_the_failing_have_cards(tmp_path: Path) -> 
     page = write_html(report, tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count('<article class="claim') == 5 and ">Bad<" in page
     assert "56 more claims" in page
+
+
+def test_only_the_answer_is_bold_and_nothing_of_the_headline_is_lost(report: Report, tmp_path: Path) -> None:
+    said = "The model lacks a mass.", "With it the error falls from 9.6 to 0.73 K.", "Record the room.", "Take care."
+    for n in (1, 2, 4):
+        page = write_html(replace(report, answer="NAMED", headline=" ".join(said[:n])), tmp_path / f"{n}.html"
+                          ).read_text(encoding="utf-8").replace("\u00a0", " ")
+        assert f'<p class="lead">{" ".join(said[:min(n, 2)])}</p>' in page
+        assert ("<p>Record the room. Take care.</p>" in page) is (n == 4)

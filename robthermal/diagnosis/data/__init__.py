@@ -1,6 +1,8 @@
 """Measured records and frequency responses, checked, and the noise in them."""
 
 from ...fitting import Measured as Measured
+from ._commands import commands as commands
+from ._commands import moves as moves
 from ._dataset import DataSet as DataSet
 from ._frequency_data import Complex as Complex
 from ._frequency_data import ResponseData as ResponseData
@@ -17,5 +19,5 @@ from ._remarks import refuse_constant as refuse_constant
 from ._warmest_room import warmest_rooms as warmest_rooms
 
 __all__ = ["SHORTEST", "Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
-           "noise_floor", "records_of", "refuse_constant", "refuse_long", "responses_of", "warmest_rooms",
-           "without_outliers"]
+           "commands", "moves", "noise_floor", "records_of", "refuse_constant", "refuse_long", "responses_of",
+           "warmest_rooms", "without_outliers"]

@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-import numpy as np
-
+from ..data import moves
 from ..effects import AMBIENT_DRIFT, Candidate
 from ..evidence import Twin
 from ..fit import Refit
@@ -42,7 +41,8 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     if candidate.effect.name in _LAGS and values["time_constant"] > span:
         return (f"its lag of {values['time_constant']:.3g} s is longer than the record, of {span:.3g} s: stuck, or not "
                 "attached")
-    if abs(values.get("relative", _BY_ITSELF)) < _BY_ITSELF and "time" in values and not _moved(fit):
+    if abs(values.get("relative", _BY_ITSELF)) < _BY_ITSELF and "time" in values and not any(
+            moves(fit.structure.base, path.one.record) for path in fit.records):
         return ("no input changes in the records, and while everything only settles a conductance that depends on "
                 "temperature looks like one that changes at some time")
     if not candidate.effect.paired:
@@ -53,13 +53,6 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     if values["period"] <= span or any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
         return ""
     return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
-
-
-def _moved(fit: Refit) -> bool:
-    """Whether any command changes within a record."""
-    ambients = fit.structure.base.ambients
-    return any(np.ptp(path.one.record[name]) > 0.0 for path in fit.records for name in path.one.record.input_names
-               if name not in ambients)
 
 
 def implausible_names(fit: Refit, twins: Mapping[tuple[str, tuple[str, ...]], Sequence[Twin]]) -> Iterator[str]:
