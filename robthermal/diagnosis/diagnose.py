@@ -159,7 +159,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
         judged = _judged(only_heated(nominal), names, checked, progress)
     held = only_heated if judged.state.nominal.structure.only_heated else replace
     judged = asked_of_log(judged, lambda others: held(refit(system, others, floor, parameters=parameters,
-                                                            session_gain=session_gain)), checked)
+                                                            session_gain=session_gain, near=nominal)), checked)
     progress("locating the misfit and planning the next experiment")
     found, fitted_to, held_out = concluded(judged), records, validation
     every, responses = measured_of(records, "records")

@@ -8,6 +8,16 @@
 #include <stdint.h>
 #include <string.h>
 
+/* Samples that are differentiated at a time, in vectors that every processor has in some width; with GNU's library the
+ * widest that this one has is chosen where it runs. */
+enum { TOGETHER = 4 };
+typedef double vec __attribute__((vector_size(32)));
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define WIDEST __attribute__((target_clones("fma", "default")))
+#else
+#define WIDEST
+#endif
+#define PIVOT 1e-2
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
 #define INLINE inline __attribute__((always_inline))
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
@@ -242,11 +252,10 @@ static int sample(const problem *at, const double *z, const double *w, double *e
 }
 
 /* Rows of M times the derivatives of the heats by the ports, node by node: out (rows, NODES n_ports). */
-static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M, int64_t rows, const double *G,
-                            double *out)
+static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M, int64_t rows, const vec *G, vec *out)
 {
     const int64_t n_q = at->n_q;
-    memset(out, 0, sizeof(double) * rows * NODES * n_ports);
+    memset(out, 0, sizeof(vec) * rows * NODES * n_ports);
     for (int64_t row = 0; row < rows; row++, M += NODES * n_q, out += NODES * n_ports)
         for (int64_t node = 0; node < NODES; node++)
             for (int64_t j = 0; j < n_q; j++)
@@ -254,10 +263,18 @@ static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M,
                     out[n_ports * node + i] += M[n_q * node + j] * G[n_ports * (n_q * node + j) + i];
 }
 
-/* Derivatives G (n_q, n_ports) of the heats by target at one node. */
+/* Numbers of TOGETHER samples from `first` on, `apart` from one to the next; what is beyond the last one is left out. */
+static INLINE void store(const problem *at, double *to, int64_t apart, int64_t first, vec numbers)
+{
+    for (int64_t lane = 0; lane < TOGETHER && first + lane < at->count; lane++)
+        to[apart * (first + lane)] = numbers[lane];
+}
+
+/* Derivatives (n_q, n_ports) of the heats by target at one node: one of TOGETHER numbers each, the first at G. */
 static void heat_slopes(const problem *at, const double *V, double *G)
 {
-    memset(G, 0, sizeof(double) * at->n_q * at->n_ports);
+    for (int64_t j = 0; j < at->n_q * at->n_ports; j++)
+        G[TOGETHER * j] = 0.0;
     for (int64_t pair = 0; pair < at->n_pairs; pair++) {
         const int64_t *place = at->pairs + 4 * pair;
         double by[2][3];
@@ -267,29 +284,24 @@ static void heat_slopes(const problem *at, const double *V, double *G)
                 const double to = at->scatter[at->n_q * (2 * pair + side) + j];
                 for (int k = 0; k < 3; k++)
                     if (to != 0.0 && place[1 + k] >= 0 && place[1 + k] < at->n_ports)
-                        G[at->n_ports * j + place[1 + k]] += to * by[side][k];
+                        G[TOGETHER * (at->n_ports * j + place[1 + k])] += to * by[side][k];
             }
     }
 }
 
-/* Solve [A B] of n rows: X with A X = B replaces B. 0 where A is singular. */
-static INLINE int solve(double *rows, int64_t n, int64_t width)
+/* Solve [A B] of n rows: X with A X = B replaces B. A is 1 less the derivative of a fixed point that converges: without
+ * exchange of rows; 0 where a pivot is small all the same. */
+static INLINE int solve(vec *rows, int64_t n, int64_t width)
 {
-    double per_pivot[DEGREE * MOST_PORTS];
+    vec per_pivot[DEGREE * MOST_PORTS];
     for (int64_t k = 0; k < n; k++) {
-        int64_t best = k;
-        for (int64_t i = k + 1; i < n; i++)
-            best = fabs(rows[width * i + k]) > fabs(rows[width * best + k]) ? i : best;
-        if (!(fabs(rows[width * best + k]) > 0.0))
-            return 0;
-        for (int64_t j = k; best != k && j < width; j++) {
-            const double kept = rows[width * k + j];
-            rows[width * k + j] = rows[width * best + j];
-            rows[width * best + j] = kept;
-        }
-        per_pivot[k] = 1.0 / rows[width * k + k];
+        const vec pivot = rows[width * k + k];
+        for (int lane = 0; lane < TOGETHER; lane++)
+            if (!(fabs(pivot[lane]) > PIVOT))
+                return 0;
+        per_pivot[k] = 1.0 / pivot;
         for (int64_t i = k + 1; i < n; i++) {
-            const double factor = rows[width * i + k] * per_pivot[k];
+            const vec factor = rows[width * i + k] * per_pivot[k];
             for (int64_t j = k + 1; j < width; j++)
                 rows[width * i + j] -= factor * rows[width * k + j];
         }
@@ -304,18 +316,23 @@ static INLINE int solve(double *rows, int64_t n, int64_t width)
     return 1;
 }
 
-/* Derivatives of one sample from z: F of its end by its start, `through` of its end by what is added at the nodes. */
-static INLINE int derivatives(const problem *at, int64_t n_ports, const double *z, const double *w, double *V, double *q,
-                              double *F, double *through)
+/* Derivatives of TOGETHER samples from `first` on, F of their ends by their starts and `through` of these by what is added
+ * at the nodes; at the end of the samples the last one takes the places that are left. */
+static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
 {
     const int64_t n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;
-    const int64_t columns = NODES * n_ports, width = nodes + n;
-    double base[DEGREE * MOST + MOST], G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
-    double at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
-    if (!fixed_point(at, z, w, V, q, base))
-        return 0;
-    for (int64_t node = 0; node < NODES; node++)
-        heat_slopes(at, V + (n_ports + at->n_w) * node, G + n_q * n_ports * node);
+    const int64_t columns = NODES * n_ports, width = nodes + n, per_node = n_ports + at->n_w;
+    double base[DEGREE * MOST + MOST];
+    vec G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
+    vec at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
+    for (int64_t lane = 0; lane < TOGETHER; lane++) {
+        const int64_t k = first + lane < at->count ? first + lane : at->count - 1;
+        double *V = at->V + NODES * per_node * k;
+        if (!fixed_point(at, at->z + at->n_z * k, at->w + at->n_w * k, V, at->q + NODES * n_q * k, base))
+            return 0;
+        for (int64_t node = 0; node < NODES; node++)
+            heat_slopes(at, V + per_node * node, (double *)(G + n_q * n_ports * node) + lane);
+    }
     by_ports(at, n_ports, at->M, nodes, G, at_nodes);
     by_ports(at, n_ports, at->M + nodes * NODES * n_q, n, G, at_end);
     for (int64_t i = 0; i < nodes; i++) { /* transposed: as many right sides as states */
@@ -327,30 +344,34 @@ static INLINE int derivatives(const problem *at, int64_t n_ports, const double *
     if (!solve(rows, nodes, width))
         return 0;
     for (int64_t i = 0; i < n; i++) {
-        memcpy(F + n * i, at->K + at->n_z * (nodes + i), sizeof(double) * n);
+        vec F[MOST];
+        for (int64_t j = 0; j < n; j++)
+            F[j] = at->K[at->n_z * (nodes + i) + j] + (vec){0.0};
         for (int64_t p = 0; p < n_ports; p++)
-            F[n * i + at->ports[p]] += at_end[columns * i + p];
+            F[at->ports[p]] += at_end[columns * i + p];
         for (int64_t k = 0; k < nodes; k++) {
-            const double by = through[nodes * i + k] = rows[width * k + nodes + i];
+            const vec by = rows[width * k + nodes + i];
+            store(at, at->through + nodes * i + k, n * nodes, first, by);
             for (int64_t j = 0; j < n; j++)
-                F[n * i + j] += by * at->K[at->n_z * k + j];
+                F[j] += by * at->K[at->n_z * k + j];
             for (int64_t p = 0; p < n_ports; p++)
-                F[n * i + at->ports[p]] += by * at_nodes[columns * k + p];
+                F[at->ports[p]] += by * at_nodes[columns * k + p];
         }
+        for (int64_t j = 0; j < n; j++)
+            store(at, at->F + n * i + j, n * n, first, F[j]);
     }
     return 1;
 }
 
 /* The same, where the compiler knows how many ports there are, and unrolls its loops: a quarter less time. */
-static int of_size(const problem *at, const double *z, const double *w, double *V, double *q, double *F,
-                   double *through)
+static INLINE int of_size(const problem *at, int64_t first)
 {
     switch (at->n_ports) {
-    case 1: return derivatives(at, 1, z, w, V, q, F, through);
-    case 2: return derivatives(at, 2, z, w, V, q, F, through);
-    case 3: return derivatives(at, 3, z, w, V, q, F, through);
-    case 4: return derivatives(at, 4, z, w, V, q, F, through);
-    default: return derivatives(at, at->n_ports, z, w, V, q, F, through);
+    case 1: return derivatives(at, 1, first);
+    case 2: return derivatives(at, 2, first);
+    case 3: return derivatives(at, 3, first);
+    case 4: return derivatives(at, 4, first);
+    default: return derivatives(at, at->n_ports, first);
     }
 }
 
@@ -365,15 +386,13 @@ static int fits(const problem *at)
 }
 
 /* Samples that were differentiated: `count`, or fewer where a fixed point is not found. */
-int64_t robthermal_derivatives(const problem *at)
+WIDEST int64_t robthermal_derivatives(const problem *at)
 {
-    const int64_t per_V = NODES * (at->n_ports + at->n_w), per_q = NODES * at->n_q, n = at->n_free;
-    if (!fits(at) || n > at->n_z)
+    if (!fits(at) || at->n_free > at->n_z)
         return 0;
-    for (int64_t k = 0; k < at->count; k++)
-        if (!of_size(at, at->z + k * at->n_z, at->w + k * at->n_w, at->V + k * per_V, at->q + k * per_q,
-                     at->F + k * n * n, at->through + k * n * DEGREE * at->n_ports))
-            return k;
+    for (int64_t first = 0; first < at->count; first += TOGETHER)
+        if (!of_size(at, first))
+            return first;
     return at->count;
 }
 

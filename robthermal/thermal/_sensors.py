@@ -47,8 +47,8 @@ def read_sensors(eq: Equations, states: Array, rates: Rates, w: Array, h: float)
 
 
 def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes: Array, rate_slopes: Rates,
-                   held: Mapping[str, Array], names: Sequence[str], h: float) -> Array:
-    """Derivative (n, n_sensors, n_parameters) of the readings.
+                   held: Mapping[str, Array], names: Sequence[str], h: float, scale: Array) -> Array:
+    """Derivative (n, n_sensors, n_parameters) of the readings, times `scale` (n_parameters,).
 
     Given are that of the states (n, n_states, n_parameters), and by name that of the drives (n, n_w) of every sample.
     """
@@ -56,10 +56,10 @@ def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes:
     layout, volts = Layout(eq), voltages(eq)
     for i, (name, sensor) in enumerate(eq.system.sensors.items()):
         if name in volts:
-            out[:, i] = _voltage_slopes(eq, name, states, w, slopes, held, names)
+            out[:, i] = _voltage_slopes(eq, name, states, w, slopes, held, names) * scale
         else:
-            np.multiply(sensor.gain, seen(layout, name, slopes, rate_slopes, sensor.delay, h), out=out[:, i])
-            _add_own_slopes(out[:, i], layout, name, states, rates, names, h)
+            np.multiply(sensor.gain * scale, seen(layout, name, slopes, rate_slopes, sensor.delay, h), out=out[:, i])
+            _add_own_slopes(out[:, i], layout, name, states, rates, names, h, scale)
     return out
 
 
@@ -85,24 +85,25 @@ def _voltage_slopes(eq: Equations, name: str, states: Array, w: Array, slopes: A
 
 
 def _add_own_slopes(out: Array, layout: Layout, name: str, states: Array, rates: Rates, names: Sequence[str],
-                    h: float) -> None:
+                    h: float, scale: Array) -> None:
     """Add what the parameters of a thermometer, and the reference, change at fixed states (n, n_states)."""
     eq, sensor = layout.eq, layout.eq.system.sensors[name]
     T_ref, first = reference(eq), eq.system.ambient_names[0]
-    for column, parameter in enumerate(names):
+    for column, (parameter, times) in enumerate(zip(names, scale.tolist(), strict=True)):
         if parameter == f"sensors.{name}.offset":
-            out[:, column] += 1.0
+            out[:, column] += times
         elif parameter == f"sensors.{name}.gain":
-            out[:, column] += seen(layout, name, states, rates, sensor.delay, h) - T_ref
+            out[:, column] += times * (seen(layout, name, states, rates, sensor.delay, h) - T_ref)
         elif parameter == f"sensors.{name}.delay" and rates is not None:
             step = 1e-4 * h
             later = seen(layout, name, states, rates, sensor.delay + step, h)
             sooner = seen(layout, name, states, rates, max(sensor.delay - step, 0.0), h)
-            out[:, column] += sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
+            out[:, column] += times * sensor.gain * (later - sooner) / (step + min(step, sensor.delay))
         elif parameter == f"sensors.{name}.time_constant" and not sensor.time_constant and rates is not None:
-            out[1:, column] -= sensor.gain * _rate_seen(layout, name, states, rates, h)  # a short lag τ reads x - τ ẋ
+            # a short lag τ reads x - τ ẋ
+            out[1:, column] -= times * sensor.gain * _rate_seen(layout, name, states, rates, h)
         elif parameter == f"ambients.{first}.temperature":
-            out[:, column] += 1.0 - sensor.gain
+            out[:, column] += times * (1.0 - sensor.gain)
 
 
 def seen(layout: Layout, name: str, states: Array, rates: Rates, delay: float, h: float) -> Array:

@@ -51,7 +51,8 @@ class Trajectory:
     parameters : tuple of str
         Names of the sensitivities.
     derivative : callable
-        Parameter names to the derivative of the readings, (n, n_sensors, n_parameters).
+        Parameter names, and numbers to multiply the derivatives by if any, to those of the readings, (n, n_sensors,
+        n_parameters).
     method : str
         "exponential" or "implicit".
     """
@@ -66,7 +67,7 @@ class Trajectory:
     electrical_energy: Array
     source_heat: Array
     parameters: tuple[str, ...]
-    derivative: Callable[[Sequence[str]], Array] = field(repr=False)
+    derivative: Callable[..., Array] = field(repr=False)
     method: str
 
     @cached_property
@@ -246,7 +247,7 @@ def _keep_first(eq: Equations, record: Record, readings: Array) -> None:
         readings[0, column] = record[name][0]
 
 
-def _refuse_large(system: System, names: Sequence[str]) -> NoReturn:
+def _refuse_large(system: System, names: Sequence[str], scale: Array | None = None) -> NoReturn:
     raise InputError(f"sensitivities of a network of {len(system.lumps)} lumps", where="argument sensitivities",
                      expected=f"at most {_DENSE_STATES} states",
                      remedy="Reduce the model first (rt.thermal.reduce), or difference two simulations.")
@@ -278,7 +279,7 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
 
 @dataclass(frozen=True)
 class _Derivative:
-    """Derivative (n, n_sensors, n_parameters) of the readings of a run by named parameters."""
+    """Derivative (n, n_sensors, n_parameters) of the readings of a run by named parameters, each times a number."""
 
     record: Record
     initial: Initial
@@ -291,7 +292,7 @@ class _Derivative:
         """Whether a sensor reads what was between the samples."""
         return any(sensor.delay for sensor in self.by.eq.system.sensors.values())
 
-    def __call__(self, names: Sequence[str]) -> Array:
+    def __call__(self, names: Sequence[str], scale: Array | None = None) -> Array:
         by, plan, eq, at = self.by, self.plan, self.by.eq, self.plan.samples
         states = self.path.z[at, :by.layout.n_free]
         by_rate = self.delayed or any(name.startswith("sensors.") and name.endswith((".delay", ".time_constant"))
@@ -303,7 +304,8 @@ class _Derivative:
             slopes = slopes[at]
         out = reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
                               _rate_slopes(along, states, plan, slopes) if self.delayed else None,
-                              {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time)
+                              {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time,
+                              np.ones(len(names)) if scale is None else scale)
         out[0, [column for column, _ in _first_measured(eq, self.record)]] = 0.0
         return out
 

@@ -71,6 +71,25 @@ def test_derivatives_by_session_gains_are_those_of_the_simulation(plant: rt.Syst
         assert not slopes[1 - own][..., k].any()
 
 
+@pytest.mark.parametrize("session_gain", [False, True])
+@pytest.mark.parametrize("known_room", [False, True])
+def test_derivatives_by_all_unknowns_are_those_of_the_simulation(plant, day, session_gain, known_room):
+    """Also where a gain is one of all days and of each, and where the room of every day is unknown."""
+    room = plant.ambient_names
+    records = [one if known_room else one.select(inputs=[name for name in one.input_names if name not in room])
+               for one in days(day)[:2]]
+    parameters = {"inputs.heater.gain": (0.5, 2.0), f"lumps.{plant.lump_names[0]}.capacity": (1.0, 1e4)}
+    structure = (fit := rt.diagnosis.refit(plant, records, parameters=parameters, session_gain=session_gain)).structure
+    rng = np.random.default_rng(3)
+    v = fit.v + 0.01 * rng.standard_normal(fit.v.size)
+    slopes = structure.slopes(v)
+    for k in range(v.size):
+        ends = [structure.paths(v + step * np.eye(v.size)[k]) for step in (-1e-3, 1e-3)]
+        for own, (before, after) in enumerate(zip(*ends, strict=True)):
+            change = -(after.residual - before.residual) / 2e-3
+            np.testing.assert_allclose(slopes[own][..., k], change, atol=1e-3 * np.abs(change).max() + 1e-9)
+
+
 @pytest.mark.parametrize("wrong", ["yes", {"fan": 0.05}, {"heater": -0.1}, {"heater": True}])
 def test_bad_session_gain_is_refused(plant: rt.System, day: Callable, wrong: object) -> None:
     with pytest.raises(rt.InputError, match="session_gain|gain of 'heater'|no input 'fan'"):

@@ -96,10 +96,7 @@ def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) ->
 
 
 def _signature(record: RecordContext, where: tuple[str, ...], values: Mapping[str, float]) -> Response:
-    rate = 2.0 * np.pi / values["period"]
-    start, end = np.zeros_like(record.x), np.zeros_like(record.x)
-    for lump, slope in conductances(record.system, where[0]).items():
-        i = record.system.lump_names.index(lump)
-        start[:, i] = slope * np.sin(rate * record.time + values["phase"])
-        end[:, i] = slope * np.sin(rate * (record.time + record.h) + values["phase"])
-    return Response(heat=(start, end))
+    time = record.time
+    wave = np.sin(2.0 * np.pi / values["period"] * np.append(time, time[-1] + record.h) + values["phase"])
+    return Response(heat={record.system.lump_names.index(lump): (slope * wave[:-1], slope * wave[1:])
+                          for lump, slope in conductances(record.system, where[0]).items()})

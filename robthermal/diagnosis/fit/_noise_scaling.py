@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -129,8 +130,12 @@ def refined(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: Noi
     if not heated and not levels.share:
         return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
-        levels = _lowest([replace(levels, noise={**levels.noise, name: factor}) for factor in factors], cost)
-    return _lowest([replace(levels, disturbance=factor) for factor in factors], cost) if heated else levels
+        levels = _lowest([replace(levels, noise={**levels.noise, name: factor}) for factor in factors], cost,
+                         _nearest(factors, levels.noise.get(name, 1.0)))
+    if not heated:
+        return levels
+    return _lowest([replace(levels, disturbance=factor) for factor in factors], cost,
+                   _nearest(factors, levels.disturbance))
 
 
 def with_slow_part(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling
@@ -188,10 +193,18 @@ def _best(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float]) -> N
     return min(tried, key=cost)
 
 
-def _lowest(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float]) -> NoiseScaling:
-    """As `_best` along a cost with one minimum, such as that of a single level: half of it is dropped at every step."""
-    low, high = 0, len(tried) - 1
-    while low < high:
-        middle = (low + high) // 2
-        low, high = (low, middle) if cost(tried[middle]) <= cost(tried[middle + 1]) else (middle + 1, high)
-    return tried[low]
+def _nearest(factors: Sequence[float], now: float) -> int:
+    """Place of the factor that comes nearest."""
+    return min(range(len(factors)), key=lambda i: abs(math.log(factors[i] / now)))
+
+
+def _lowest(tried: list[NoiseScaling], cost: Callable[[NoiseScaling], float], near: int) -> NoiseScaling:
+    """As `_best` along a cost with one minimum, such as that of a single level: downhill from a place near it."""
+    least = cost(tried[near])
+    for way in (1, -1):
+        start = near
+        while 0 <= near + way < len(tried) and (found := cost(tried[near + way])) < least:
+            near, least = near + way, found
+        if near != start:
+            break
+    return tried[near]

@@ -39,7 +39,7 @@ _FAR = 3.0  # times the decrease that chance promises: from less the whole recor
 
 def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEstimate | None = None, *,
           parameters: Choice = None, operating_point: Mapping[str, float] | None = None,
-          session_gain: SessionGain = False) -> Refit:
+          session_gain: SessionGain = False, near: Refit | None = None) -> Refit:
     """Refit the nominal parameters and the initial temperatures to the records, with their priors.
 
     Parameters
@@ -58,6 +58,8 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEs
     session_gain : bool or mapping
         Whether every record has a gain of its own of every heater and module: True, with a prior of 5 %, or a mapping
         from input to the standard deviation of its gain [-].
+    near : Refit, optional
+        Fit of the same parameters to much the same records: it starts from theirs.
 
     Returns
     -------
@@ -95,7 +97,8 @@ def refit(system: System, records: Measured | Sequence[Measured], floor: NoiseEs
         raise InputError(f"{structure.n_readings} readings for {n_unknown} unknowns", where="argument records",
                          expected="more than two readings per unknown", remedy="Measure longer, or fix parameters.")
     try:
-        found = fitted(structure, structure.start(ranges.start, []), floor, NoiseScaling(1.0, {}))
+        start = ranges.start if near is None else ranges.values(near.v[:len(ranges.names)])
+        found = fitted(structure, structure.start(start, []), floor, NoiseScaling(1.0, {}))
         return found if structure.at_rest().n_own == structure.n_own else extended(found, structure, found.v)
     except Diverged as error:
         raise InputError(f"the nominal model runs away: {error}", where="argument system",

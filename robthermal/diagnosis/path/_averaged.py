@@ -72,13 +72,14 @@ class AveragedRecord:
         return np.concatenate(whole, axis=1) if whole and len(whole) == len(parts) else None
 
     def _some(self, trials: Sequence[Candidate]) -> Array | None:
-        q, mean = np.empty((*self.pushed.shape[::2], len(trials))), np.full(self.length, 0.5 / self.length)
+        q = np.zeros((*self.pushed.shape[::2], len(trials)))
         for j, trial in enumerate(trials):
             response = None if trial.effect.signature is None else trial.effect.signature(self.path, trial.where,
                                                                                           trial.shape)
             if response is None or response.heat is None or response.reading is not None:
                 return None
-            q[..., j] = mean @ _in_blocks(response.heat[0] + response.heat[1], self.length)
+            for lump, (first, last) in response.heat.items():
+                q[:, lump, j] = _in_blocks(first + last, self.length).sum(axis=1) * (0.5 / self.length)
         states = recursion(self.passed, self.pushed @ q)[:-1]
         return np.asarray(self.seen @ states + self.felt @ q).reshape(-1, len(trials))
 

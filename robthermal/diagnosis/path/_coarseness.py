@@ -61,9 +61,7 @@ def coarse_responses(path: RecordContext, base: System) -> Iterator[Response]:
     T, rate, C = path.x, (path.end - path.x) / path.h, path.equations.capacity
 
     def heat(into: str, out_of: str, q: Array) -> Response:
-        held = np.zeros(T.shape)
-        held[:, at[into]], held[:, at[out_of]] = q, -q
-        return Response(heat=(held, held))
+        return Response(heat={at[into]: (q, q), at[out_of]: (-q, -q)})
 
     def reading(sensor: str, change: Array) -> Response:
         out = np.zeros(path.readings.shape)

@@ -25,7 +25,7 @@ from ._exact_steps import exact_steps, over_steps
 from ._heat_splines import heat_splines
 from ._late_means import LATE_MEANS, late_means
 from ._linearized import Unknowns
-from ._rates import each, heat_slopes, heats_of
+from ._rates import each, heat_slopes, heats_of, is_diagonal, kinds_of
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
@@ -181,24 +181,27 @@ class LinearizedRecord:
             Where, and what they are.
         """
         names, chain = unknowns.names, unknowns.chain
-        own = [number for number in unknowns.gain_names if number not in names and number != LATE_MEANS]
         initial = unknowns.initial.names if unknowns.initial.n_free else ()
-        J = self.run.derivative([*names, *own, *initial])
-        if not np.array_equal(self.one.columns, np.arange(J.shape[1])):
-            J = J[:, self.one.columns]
+        sigma = unknowns.initial.sigma[:unknowns.initial.n_free]
+        if unknowns.v.size == len(names) + len(initial) and is_diagonal(chain):  # one number each, and then the start
+            return self._derivative([*names, *initial], np.concatenate([np.diag(chain), sigma]))
+        own = [number for number in unknowns.gain_names if number not in names and number != LATE_MEANS]
+        J = self._derivative([*names, *own, *initial])
         out = np.zeros((*J.shape[:2], unknowns.v.size))
-        if chain.shape == (len(names),) * 2 and not np.any(chain - np.diag(np.diag(chain))):  # one number each
-            np.multiply(J[..., :len(names)], np.diag(chain), out=out[..., :len(names)])
-        else:
-            common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
-            out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
-        out[..., unknowns.start] = J[..., len(names) + len(own):] * unknowns.initial.sigma[:unknowns.initial.n_free]
+        common = np.ascontiguousarray(J[..., :len(names)]).reshape(len(J) * J.shape[1], -1) @ chain  # one product
+        out[..., :chain.shape[1]] = common.reshape(*J.shape[:2], -1)
+        out[..., unknowns.start] = J[..., len(names) + len(own):] * sigma
         at = {number: J[..., place] for place, number in enumerate([*names, *own])}
-        for i, (number, sigma) in enumerate(zip(unknowns.gain_names, unknowns.gain_sigma, strict=True)):
-            out[..., unknowns.gains.start + i] = sigma * (self.late_columns if number == LATE_MEANS else at[number])
+        for i, (number, std) in enumerate(zip(unknowns.gain_names, unknowns.gain_sigma, strict=True)):
+            out[..., unknowns.gains.start + i] = std * (self.late_columns if number == LATE_MEANS else at[number])
         if self.coarse is not None and unknowns.coarse.stop > unknowns.coarse.start:
             out[..., unknowns.coarse] = self.coarse
         return out
+
+    def _derivative(self, names: list[str], scale: Array | None = None) -> Array:
+        """Derivative (n, n_sensors, k) of the record's sensors by numbers of the system, each times a number."""
+        J = np.asarray(self.run.derivative(names, scale), np.float64)
+        return J if np.array_equal(self.one.columns, np.arange(J.shape[1])) else J[:, self.one.columns]
 
     def columns(self, trials: Sequence[Candidate]) -> Array:
         """As `Linearized.columns`: by signatures, or by simulating again with a small effect.
@@ -292,10 +295,7 @@ class LinearizedRecord:
 
         Rates that differ by less than 1e-4 of a sample are one: a held current has one matrix, not one per sample.
         """
-        M = self.M
-        rounded = np.round(M * (self.h / _SAME)).reshape(len(M), -1)
-        _, first, kind = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-        return M[first], kind.reshape(-1)
+        return kinds_of(M := self.M, np.round(M * (self.h / _SAME)))
 
     @cached_property
     def steps(self) -> tuple[Array, Array, Array]:

@@ -19,6 +19,23 @@ def each(kinds: Array, kind: Places) -> Array:
     return kinds[kind] if len(kinds) > 1 else np.broadcast_to(kinds[0], (len(kind), *kinds.shape[1:]))
 
 
+def kinds_of(each: Array, rounded: Array) -> tuple[Array, Places]:
+    """One each of those matrices (n, ...) whose rounded ones, of whole numbers, differ, and which one each is.
+
+    These are distinguished by their sums with fixed random factors modulo 2^64, which are sooner sorted: two different
+    ones have the same sum with a chance of 2^-63.
+    """
+    rows = rounded.astype(np.int64).reshape(len(rounded), -1)
+    factors = np.random.default_rng(0).integers(-2**62, 2**62, rows.shape[1]) * 2 + 1
+    _, first, kind = np.unique(rows @ factors, return_index=True, return_inverse=True)
+    return each[first], kind
+
+
+def is_diagonal(A: Array) -> bool:
+    """Whether a matrix is square, with nothing beside its diagonal."""
+    return A.shape[0] == A.shape[1] and not np.any(A - np.diag(np.diag(A)))
+
+
 def heat_slopes(equations: Equations, x: Array, u: Array) -> Array:
     """Derivative (n, n_lumps, n_lumps) of the heats by the temperatures x (n, n_lumps) [W/K]."""
     nl = x.shape[1]
@@ -47,6 +64,6 @@ def heats_of(responses: Sequence[Response], shape: tuple[int, ...], some: slice)
     start = np.zeros((*shape, len(responses)))
     end = np.zeros_like(start)
     for j, response in enumerate(responses):
-        if response.heat is not None:
-            start[..., j], end[..., j] = response.heat[0][some], response.heat[1][some]
+        for lump, (first, last) in (response.heat or {}).items():
+            start[:, lump, j], end[:, lump, j] = first[some], last[some]
     return start, end

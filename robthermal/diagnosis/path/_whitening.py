@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
+from ..._recursion import recursion
 from ...thermal import Equations
 from ._riccati import filtered, settled, spread
 
@@ -163,9 +164,7 @@ class Whitener:
         readings[:n] = r
         given = np.zeros((len(carry), carry.shape[2], columns))  # state, then readings, of every block
         given[:, n_z:] = readings.reshape(len(carry), -1, columns)
-        pushed, decay = carry[:, :, n_z:] @ given[:, n_z:], np.ascontiguousarray(carry[:, :, :n_z])
-        for k in range(len(carry) - 1):
-            given[k + 1, :n_z] = decay[k] @ given[k, :n_z] + pushed[k]
+        given[:, :n_z] = recursion(carry[:, :, :n_z], carry[:, :, n_z:] @ given[:, n_z:])[:-1]
         return (out @ given).reshape(readings.shape)[:n]
 
     @cached_property

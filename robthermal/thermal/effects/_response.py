@@ -84,13 +84,13 @@ class Response:
 
     Parameters
     ----------
-    heat : tuple of ndarray, optional
-        Heat into the lumps at the start and at the end of every sample, both (n, n_lumps) [W].
+    heat : mapping of int to tuple of ndarray, optional
+        Heat into lumps, by their place, at the start and at the end of every sample, both (n,) [W]; 0 into the others.
     reading : ndarray, optional
         Change of all sensors of the system (n, n_sensors) [K].
     """
 
-    heat: tuple[Array, Array] | None = None
+    heat: Mapping[int, tuple[Array, Array]] | None = None
     reading: Array | None = None
 
 

@@ -22,9 +22,9 @@ def _periods(context: TrialContext, where: Where) -> list[float]:
 
 def _sine(record: RecordContext, where: Where, values: Values) -> Response:
     """A sine of one watt."""
-    rate = 2.0 * np.pi / values["period"]
-    return into(record, {where[0]: (np.sin(rate * record.time + values["phase"]),
-                                    np.sin(rate * (record.time + record.h) + values["phase"]))})
+    time = record.time
+    wave = np.sin(2.0 * np.pi / values["period"] * np.append(time, time[-1] + record.h) + values["phase"])
+    return into(record, {where[0]: (wave[:-1], wave[1:])})
 
 
 EFFECT = Effect(
