@@ -27,6 +27,7 @@ from ._whitened import Whitened
 Array = NDArray[np.float64]
 LIMIT = 40  # evaluations of a refit
 ENOUGH = 3e-5  # relative: a tenth of a unit of BIC on a thousand samples of three sensors
+_ENOUGH_LONG = 1e-3  # of long records beside what a finer network changes, of which a few percent say nothing
 _ROUNDS = 3  # of filter and noise levels
 _PART = 1500  # samples of a long record that are fitted first
 _LONG = 3  # times as many: a long record
@@ -195,6 +196,11 @@ def _least(at: Point, structure: Structure) -> float:
     return float(at.z @ at.z) - decrease(at, structure.bounds)
 
 
+def promised_from(fit: Refit) -> float:
+    """Sum of squares that the linearization at a fit that may not have converged promises."""
+    return _least(Point(Whitened(fit.structure, fit.whiteners), fit.v), fit.structure)
+
+
 def coarsened(fit: Refit) -> Refit:
     """The same structure where the network may be too coarse: what a finer one would change is unknown, of usual size.
 
@@ -254,8 +260,10 @@ def _refined(paths: Sequence[Linearized], floor: NoiseEstimate, levels: NoiseSca
 
 def minimized(structure: Structure, v: Array, whiteners: Sequence[White], limit: int = LIMIT) -> Descent:
     """Gauss-Newton with fixed filters."""
+    long = structure.n_readings >= _LONG * structure.first(_PART).n_readings
+    enough = _ENOUGH_LONG if long and structure.n_coarse else ENOUGH
     return ended(structure, v, whiteners, limit,
-                 lambda: descend(Whitened(structure, whiteners), v, structure.bounds, limit, ENOUGH))
+                 lambda: descend(Whitened(structure, whiteners), v, structure.bounds, limit, enough))
 
 
 def _outcome(found: Descent) -> Outcome:
