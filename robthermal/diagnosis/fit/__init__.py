@@ -15,7 +15,6 @@ from ._refitting import extended as extended
 from ._refitting import filters as filters
 from ._refitting import fitted as fitted
 from ._refitting import only_heated as only_heated
-from ._refitting import promised_from as promised_from
 from ._refitting import refit as refit
 from ._refitting import relinearized as relinearized
 from ._sessions import SessionGain as SessionGain
@@ -34,6 +33,6 @@ from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "extended", "filters",
-           "fitted", "found_ambients", "only_heated", "orthonormal", "promised_from", "refit", "relinearized",
+           "fitted", "found_ambients", "only_heated", "orthonormal", "refit", "relinearized",
            "sessions_of", "structure_of", "too_warm", "turned", "with_late_means", "with_slow_part",
            "with_unknown_ambients"]

@@ -17,6 +17,7 @@ from ._structure import Structure
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
+_DIGITS = 10  # of a start: of the same one that was computed in another order, roundings differ
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +52,8 @@ def ended(structure: Structure, v: Array, whiteners: Sequence[White], limit: int
     shared = structure.base, structure.ranges, structure.sessions
     others = [*structure.data, *structure.coarse, *(white for white, own in zip(whiteners, numbers, strict=True)
                                                     if not own)]
-    key = (_digest(v, *structure.bounds, *structure.prior(v), *(start.mean for start in structure.starts),
-                   *(start.sigma for start in structure.starts)),
+    key = (_digest(*(np.round(one, _DIGITS) for one in (v, *structure.prior(v))), *structure.bounds,
+                   *(start.mean for start in structure.starts), *(start.sigma for start in structure.starts)),
            limit, structure.tolerance, structure.only_heated, tuple(start.names for start in structure.starts),
            tuple((one.key, tuple(one.shape.items())) for one in structure.effects), *numbers,
            *map(id, shared), *map(id, others))

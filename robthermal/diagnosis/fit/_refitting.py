@@ -196,11 +196,6 @@ def _least(at: Point, structure: Structure) -> float:
     return float(at.z @ at.z) - decrease(at, structure.bounds)
 
 
-def promised_from(fit: Refit) -> float:
-    """Sum of squares that the linearization at a fit that may not have converged promises."""
-    return _least(Point(Whitened(fit.structure, fit.whiteners), fit.v), fit.structure)
-
-
 def coarsened(fit: Refit) -> Refit:
     """The same structure where the network may be too coarse: what a finer one would change is unknown, of usual size.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...errors import Diverged, InputError
 from ..effects import Candidate
 from ..evidence import BIC_GAP
-from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended, promised_from, turned
+from ..fit import ENOUGH, Refit, Structure, Whitened, descend, extended, turned
 
 Array = NDArray[np.float64]
 _SETTLING = 2  # evaluations before what shapes an effect is moved
@@ -142,14 +142,13 @@ def held(structure: Structure, v: Array) -> tuple[Array, Array]:
 def _further_iterations(fit: Refit, tried: list[Refit], least: float, stands: float) -> Refit | None:
     """The best of the starts iterated on, where a start from nothing stands still and much more is promised.
 
-    A capacity beside a capacity lies in a curved valley: from nothing no step along its tangent survives. A start from
-    which even the linearization promises no less than without the candidate is too far away.
+    A capacity beside a capacity lies in a curved valley: from nothing no step along its tangent survives.
     """
     promised = fit.rss - least
     if not tried or fit.rss - stands > _MOVES * promised or fit.n_readings * np.log(fit.rss / least) < 2.0 * BIC_GAP:
         return None
     best = min(tried, key=lambda new: new.rss)
-    return extended(best, best.structure, best.v, _MANY) if promised_from(best) < fit.rss else None
+    return extended(best, best.structure, best.v, _MANY)
 
 
 def _linear(fit: Refit, candidate: Candidate, size: float) -> tuple[Array, float, float]:
