@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,14 +84,21 @@ class Response:
 
     Parameters
     ----------
-    heat : mapping of int to tuple of ndarray, optional
-        Heat into lumps, by their place, at the start and at the end of every sample, both (n,) [W]; 0 into the others.
+    heat : tuple of ndarray, or mapping of int to tuple of ndarray, optional
+        Heat into the lumps at the start and at the end of every sample, both (n, n_lumps) [W]; or into some of them, by
+        their place, both (n,). It is kept in the second form.
     reading : ndarray, optional
         Change of all sensors of the system (n, n_sensors) [K].
     """
 
-    heat: Mapping[int, tuple[Array, Array]] | None = None
+    heat: Any = None
     reading: Array | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.heat, tuple):
+            start, end = self.heat
+            some = np.flatnonzero(start.any(axis=0) | end.any(axis=0)).tolist()
+            object.__setattr__(self, "heat", {lump: (start[:, lump], end[:, lump]) for lump in some})
 
 
 Signature = Callable[[RecordContext, Where, Values], Response]

@@ -45,12 +45,6 @@ def into(record: RecordContext, flows: Mapping[str, tuple[Array, Array]]) -> Res
     return Response(heat={lumps.index(name): flow for name, flow in flows.items() if name in record.system.lumps})
 
 
-def of_all(start: Array, end: Array) -> Response:
-    """Heat at the start and at the end of every sample, both (n, n_lumps) [W]."""
-    heated = np.flatnonzero(start.any(axis=0) | end.any(axis=0)).tolist()
-    return Response(heat={i: (start[:, i], end[:, i]) for i in heated})
-
-
 def exchanged(flow: Callable[[Array, Array, Values], Array]) -> Signature:
     """Heat flow(T_a, T_b) that flows into a and out of b, `where` = (a, b)."""
 
@@ -72,7 +66,7 @@ def by_heat(add: Callable[[System, Where, Values], System], size: str, step: flo
 
     def signature(record: RecordContext, where: Where, values: Values) -> Response:
         start, end = record.heat_of(add(record.system, where, {**values, size: step}))
-        return of_all(start / step, end / step)
+        return Response(heat=(start / step, end / step))
 
     return signature
 
@@ -96,7 +90,7 @@ def driven_by(record: RecordContext, name: str, v: Array, size: float) -> Respon
     u = record.u.copy()
     u[:, record.system.exogenous_names.index(name)] = v
     heat, (start, end) = record.equations.heat, record.own_heat
-    return of_all((heat(record.x, u) - start) / size, (heat(record.end, u) - end) / size)
+    return Response(heat=((heat(record.x, u) - start) / size, (heat(record.end, u) - end) / size))
 
 
 def reading(record: RecordContext, sensor: str, change: Array) -> Response:
