@@ -83,6 +83,7 @@ def test_derivatives_by_all_unknowns_are_those_of_the_simulation(plant, day, ses
     rng = np.random.default_rng(3)
     v = fit.v + 0.01 * rng.standard_normal(fit.v.size)
     slopes = structure.slopes(v)
+    assert len(slopes) == 2 and v.size == 2 + 4 + (0 if known_room else 2) + (2 if session_gain else 0)
     for k in range(v.size):
         ends = [structure.paths(v + step * np.eye(v.size)[k]) for step in (-1e-3, 1e-3)]
         for own, (before, after) in enumerate(zip(*ends, strict=True)):
