@@ -337,7 +337,7 @@ static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
     by_ports(at, n_ports, at->M + nodes * NODES * n_q, n, G, at_end);
     for (int64_t i = 0; i < nodes; i++) { /* transposed: as many right sides as states */
         for (int64_t j = 0; j < nodes; j++)
-            rows[width * i + j] = (i == j) - at_nodes[columns * j + n_ports + i];
+            rows[width * i + j] = (i == j ? 1.0 : 0.0) - at_nodes[columns * j + n_ports + i];
         for (int64_t j = 0; j < n; j++)
             rows[width * i + nodes + j] = at_end[columns * j + n_ports + i];
     }
