@@ -8,8 +8,8 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Samples that are differentiated at a time, in vectors that every processor has in some width; with GNU's library the
- * widest that this one has is chosen where it runs. */
+/* Samples that are differentiated at a time, in one vector, or two of half its width where the processor has no more:
+ * with GNU's library that is decided where it runs. */
 enum { TOGETHER = 4 };
 typedef double vec __attribute__((vector_size(32)));
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
@@ -17,7 +17,7 @@ typedef double vec __attribute__((vector_size(32)));
 #else
 #define WIDEST
 #endif
-#define PIVOT 1e-2
+#define PIVOT 1e-2 /* in size, from which a row is divided by it; every diagonal entry is about 1 */
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
 #define INLINE inline __attribute__((always_inline))
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
@@ -263,7 +263,7 @@ static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M,
                     out[n_ports * node + i] += M[n_q * node + j] * G[n_ports * (n_q * node + j) + i];
 }
 
-/* Numbers of TOGETHER samples from `first` on, `apart` from one to the next; what is beyond the last one is left out. */
+/* Numbers of TOGETHER samples from `first` on, `apart` from one to the next; beyond the last one they are left out. */
 static INLINE void store(const problem *at, double *to, int64_t apart, int64_t first, vec numbers)
 {
     for (int64_t lane = 0; lane < TOGETHER && first + lane < at->count; lane++)
@@ -316,8 +316,8 @@ static INLINE int solve(vec *rows, int64_t n, int64_t width)
     return 1;
 }
 
-/* Derivatives of TOGETHER samples from `first` on, F of their ends by their starts and `through` of these by what is added
- * at the nodes; at the end of the samples the last one takes the places that are left. */
+/* Derivatives of TOGETHER samples from `first` on, F of their ends by their starts and `through` of these by what is
+ * added at the nodes; at the end of the samples the last one takes the places that are left. */
 static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
 {
     const int64_t n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;

@@ -119,6 +119,28 @@ def test_derivatives_are_those_of_numpy(every: rt.System, drive: Any, monkeypatc
     assert (np.abs(slopes[0] - slopes[1]).max(axis=(0, 1)) <= 1e-8 * scale + 1e-12).all()
 
 
+def test_what_a_small_pivot_stops_is_left_to_numpy(every: rt.System, drive: Any, monkeypatch: pytest.MonkeyPatch,
+                                                   tmp_path: Path) -> None:
+    """Every pivot counts as small there: no sample is differentiated in C, and the derivatives are numpy's."""
+    compiled.steps()  # skips without a compiler
+    text, small = _march.SOURCE.read_text(encoding="utf-8"), "#define PIVOT 1e-2"
+    assert text.count(small) == 1
+    other = tmp_path / _march.SOURCE.name
+    other.write_text(text.replace(small, "#define PIVOT 1e9"), encoding="utf-8")
+    compiled.hook()["build"](other, tmp_path / compiled.name_of(_march.SOURCE))
+    found = _march.library(tmp_path)
+    assert found is not None
+    done, slopes = [], []
+    run = rt.thermal.trajectory(every, drive(30, system=every, sample_time=0.5))
+    tried = replace(found, derivatives=lambda problem: done.append(found.derivatives(problem)) or done[-1])
+    for built in (tried, None):
+        monkeypatch.setattr(_exponential, "library", lambda built=built: built)
+        run.derivative.by._compiled.clear()
+        slopes.append(run.derivative(["modules.tem.seebeck.value", "modules.tem.conductance.value"]))
+    assert done and not any(done)
+    np.testing.assert_allclose(slopes[0], slopes[1], rtol=1e-9, atol=1e-9 * np.abs(slopes[1]).max())
+
+
 def test_runaway_is_an_error_no_later(lumps: Any) -> None:
     system = rt.System(
         ambients={"room": {"temperature": 300.0}}, lumps={"hot": {"capacity": 5.0}, "cold": {"capacity": 5.0}},
