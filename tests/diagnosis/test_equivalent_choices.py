@@ -17,8 +17,8 @@ import robthermal as rt
 from robthermal.diagnosis import Entry, Refit
 from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis._rivals import predicting
-from robthermal.diagnosis.evidence import validation_data
-from robthermal.diagnosis.fit import extended, only_heated
+from robthermal.diagnosis.evidence import hold_out, validation_data
+from robthermal.diagnosis.fit import coarsened, exact, extended, only_heated
 from robthermal.diagnosis.search import Accepted, begin, refit_short_list, without_contradicted
 from robthermal.diagnosis.search._exchange import with_exchanged
 
@@ -168,6 +168,25 @@ def test_what_the_free_run_needs_is_not_contradicted(monkeypatch: pytest.MonkeyP
     assert without_contradicted(rounds, path.fit, nominal, data) == (rounds, path.fit)
     no_path = validation_data(path.fit, other_day(path=0.0), None)
     assert without_contradicted(rounds, path.fit, nominal, no_path) == ((), nominal)
+
+
+def test_the_free_run_is_that_of_networks_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a finer network changes is in no free run: fits beside one would be compared without it."""
+    nominal = coarsened(rt.diagnosis.refit(board(path=True), measured(stairs(4), 4)))
+    lag = entry(nominal, "sensor_lag")
+    data = validation_data(lag.fit, measured(stairs(5), 5), None)
+    compared = []
+
+    def watched(less: Refit, fit: Refit, records: list[rt.Record]) -> object:
+        compared.append((less, fit))
+        return hold_out(less, fit, records)
+
+    monkeypatch.setattr("robthermal.diagnosis.search._contradicted.hold_out", watched)
+    monkeypatch.setattr("robthermal.diagnosis.search._contradicted.negative_log_predictive_density",
+                        lambda fits, *_: [100.0 * (fit is lag.fit) for fit in fits])
+    rounds = (Accepted(nominal, best=lag),)
+    assert without_contradicted(rounds, lag.fit, nominal, data) == (rounds, lag.fit)
+    assert nominal.structure.n_coarse > 0 and compared == [(exact(nominal), exact(lag.fit))]
 
 
 def test_days_of_a_machine_with_late_thermometers_are_compared() -> None:

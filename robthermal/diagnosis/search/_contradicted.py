@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import Diverged, InputError
 from ..data import DataSet, records_of
 from ..evidence import BIC_GAP, NEEDED, hold_out, left, negative_log_predictive_density
-from ..fit import Refit, fitted
+from ..fit import Refit, exact, fitted
 from ._decide import Accepted
 from ._revise import without
 
@@ -53,11 +53,16 @@ def _worst(fit: Refit, lesser: Sequence[Refit | None], densities: Sequence[float
 
 
 def _needed(fit: Refit, less: Refit | None, data: Sequence[DataSet]) -> bool:
-    """Whether an effect removes much of the excess mean square that the free run leaves of the validation records."""
+    """Whether an effect removes much of the excess mean square that the free run leaves of the validation records.
+
+    Of the networks as they are: a free run leaves out what a finer network would change.
+    """
     records = [one.record for one in records_of(data)]
     if less is None or len(records) < len(data):
         return False
     try:
+        if fit.structure.coarse:
+            less, fit = exact(less), exact(fit)
         return left(hold_out(less, fit, records).gap).share_explained >= NEEDED
     except (Diverged, InputError):  # a model that runs away predicts nothing
         return False
