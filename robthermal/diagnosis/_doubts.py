@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from .._celsius import ZERO_CELSIUS
 from ..thermal import System
+from ._found import Found
 from ._judge import Name, Verdict
 from .effects import AMBIENT_DRIFT, Candidate
 from .fit import FoundAmbient, Refit, found_ambients
@@ -15,6 +16,7 @@ from .search import Accepted, other_periods
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
 _LISTED = 4  # records by name
+_STEFAN_BOLTZMANN = 5.670374419e-8  # W/(m² K⁴)
 
 
 def doubts(system: System, remainder: bool) -> list[str]:
@@ -66,6 +68,29 @@ def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Nam
             said.append(f"The records do not tell whether this path goes between {places}: neighboring lumps are one "
                         "answer, because where a lump ends is the model's choice. The augmented model has the first.")
     return said
+
+
+def surfaces(effects: Sequence[Found]) -> list[str]:
+    """How large a surface must be that radiates as much as is named, a sentence each.
+
+    A conductance to surroundings that the file lacks, or a second radiating lump, can hide in its coefficient; an area
+    is what a user can look up.
+
+    Parameters
+    ----------
+    effects : sequence of Found
+        Named effects.
+    """
+    return [f"Radiation of this size needs a surface of at least {_area(one.values['coefficient'][0])} (black): if "
+            f"{one.where[0]} has less, another loss hides in it."
+            for one in effects if one.effect == "radiation" and "coefficient" in one.values]
+
+
+def _area(coefficient: float) -> str:
+    """Of a black surface with this coefficient [W/K⁴]."""
+    square_meters = coefficient / _STEFAN_BOLTZMANN
+    size, unit = (square_meters, "m²") if square_meters >= 0.1 else (1e4 * square_meters, "cm²")
+    return f"{float(f'{size:.2g}'):g} {unit}"
 
 
 def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ._judge import Name
@@ -27,6 +27,9 @@ class Found:
         Against the model without it; above 10 is very strong.
     evidence : Evidence, optional
         Share of the gap, blocks and segments; None for a provisional effect.
+    augmented : dict
+        Quantity to its value in the augmented system, where something is left: `values` are then those beside what a
+        finer network would change, and the augmented system is fitted without that. Empty where both are the same.
     """
 
     effect: str
@@ -35,6 +38,7 @@ class Found:
     p_value: float
     delta_bic: float
     evidence: Evidence | None = None
+    augmented: dict[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> Name:
@@ -57,6 +61,6 @@ class Found:
         graded = {} if one is None else {"share": one.share, "reproducible": one.reproducible,
                                          "stability": vars(one.stability)}
         return {"effect": self.effect, "where": list(self.where), "p_value": self.p_value, "delta_bic": self.delta_bic,
-                **graded,
+                **graded, **({"augmented": self.augmented} if self.augmented else {}),
                 "parameters": {name: {"value": value, "std": std, "unit": unit}
                                for name, (value, std, unit) in self.values.items()}}

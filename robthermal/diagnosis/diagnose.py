@@ -25,6 +25,7 @@ from ._doubts import (
     nothing_fitted,
     periods_undecided,
     place_undecided,
+    surfaces,
     within_the_body,
 )
 from ._each_record import asked_of_each
@@ -48,12 +49,12 @@ from .evidence import (
     Evidence,
     Gap,
     Remainder,
+    deviations,
     expected_rms,
     left,
     locate,
     refuse_seen,
     remainder,
-    sandwich,
     unknown_heat,
 )
 from .fit import Refit, SessionGain, exact, found_ambients, only_heated, refit, too_warm
@@ -292,6 +293,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     if verdict in ("named", "named_with_remainder", "ambiguous"):
         said += periods_undecided(state.rounds, verdict != "named")
         said += late_by_rows(state.fit)
+        said += surfaces(found.effects)
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     said += may_be_the_supply(nominal.system, state.fit.structure.effects)
@@ -313,7 +315,7 @@ def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:
     state, evidence = judged.state, judged.evidence
     if named and not evidence:
         evidence = evidence_of(state.rounds, state.fit, state.nominal)
-    return tuple(_found(state.fit, i, round_, evidence[i] if named else None, judged.plain is not None)
+    return tuple(_found(judged, i, evidence[i] if named else None)
                  for i, round_ in enumerate(state.rounds))
 
 
@@ -324,24 +326,29 @@ def _hidden(state: SearchState) -> dict[Name, str]:
             if c.key not in tested and (why := state.nominal.structure.hides(c))}
 
 
-def _found(fit: Refit, place: int, round_: Accepted, evidence: Evidence | None, rest: bool) -> Found:
-    best, values = round_.best, quantities_of(fit, place)
-    if rest:
-        values = _with_remainder(fit, place, values)
+def _found(judged: Judged, place: int, evidence: Evidence | None) -> Found:
+    fit, plain, best = judged.state.fit, judged.plain, judged.state.rounds[place].best
+    values, augmented = quantities_of(fit, place), {}
+    if plain is not None:
+        values = _with_remainder(fit, None if judged.compared else plain, place, values)
+        if fit.structure.coarse:
+            augmented = {name: value for name, (value, _) in quantities_of(plain, place).items()}
     units = {q.name: q.unit for q in best.candidate.effect.quantities}
     said = {name: (value, std, units[name]) for name, (value, std) in values.items()}
     if best.candidate.effect.name == NAME:
         said = relative(said)
-    return Found(best.candidate.effect.name, best.candidate.where, said, best.p_value, best.delta_bic, evidence)
+    return Found(best.candidate.effect.name, best.candidate.where, said, best.p_value, best.delta_bic, evidence,
+                 augmented)
 
 
-def _with_remainder(fit: Refit, place: int, values: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+def _with_remainder(fit: Refit, plain: Refit | None, place: int, values: dict[str, tuple[float, float]]
+                    ) -> dict[str, tuple[float, float]]:
     """Values with standard deviations that include the remainder."""
     structure = fit.structure
     free = structure.effects[place].effect.free
     at = structure.column_of(place)
     out = dict(values)
-    for quantity, std in zip(free, sandwich(fit, range(at, at + len(free))), strict=True):
+    for quantity, std in zip(free, deviations(fit, plain, range(at, at + len(free))), strict=True):
         value = values[quantity.name][0]
         out[quantity.name] = value, float(std * value if quantity.lower > 0 else std)
     return out

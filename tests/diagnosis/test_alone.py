@@ -62,6 +62,9 @@ def test_a_steady_supply_leaves_radiation_alone() -> None:
     assert found.verdict == "named" and [one.label for one in found.effects] == ["radiation(plate, room)"]
     value, std, _ = found.effects[0].values["coefficient"]
     assert abs(value - 1e-9) < 4.0 * std < 2e-11
+    (area,) = [text.partition("at least ")[2] for text in found.caveats if text.startswith("Radiation of this size")]
+    assert float(area.partition(" cm²")[0]) == pytest.approx(1e4 * 1e-9 / 5.67e-8, rel=0.05)
+    assert area.endswith("if plate has less, another loss hides in it.") and area in found.outcome.text
 
 
 def test_beside_a_wandering_supply_radiation_is_said_to_predict_the_other_day(unexplained: Diagnosis) -> None:

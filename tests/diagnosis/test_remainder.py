@@ -13,8 +13,8 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
-from robthermal.diagnosis.evidence import left, reproducible, sandwich, stability
-from robthermal.diagnosis.fit import coarsened, exact
+from robthermal.diagnosis.evidence import deviations, left, reproducible, stability
+from robthermal.diagnosis.fit import Refit, coarsened, exact
 from robthermal.diagnosis.path import coarse_names
 from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
@@ -168,9 +168,44 @@ def test_a_size_that_changes_is_not_stable_and_its_deviation_says_so():
     log_or_not = [stability(fit, column).spread / abs(fit.v[column] or 1.0) for fit in (steady, moving)]
     assert log_or_not[1] > 5.0 * log_or_not[0]
     white = [np.sqrt(fit.covariance[column, column]) for fit in (steady, moving)]
-    wide = [sandwich(fit, [column])[0] for fit in (steady, moving)]
+    wide = [deviations(fit, fit, [column])[0] for fit in (steady, moving)]
     assert wide[0] < 2.0 * white[0]
     assert wide[1] > 1.5 * white[1]
+
+
+def _repeated(times: int, mass: float) -> Refit:
+    """A lump with a mass behind a conductance, by scipy, as one lump; the same hour of heating again and again."""
+    C, G, inside, h = 100.0, 0.5, 0.4, 10.0
+    A = np.array([[-(G + inside) / C, inside / C], [inside / mass, -inside / mass]])
+    M = expm(h * np.block([[A, np.array([[1.0 / C], [0.0]])], [np.zeros((1, 3))]]))[:2]
+    u = np.tile(np.repeat(np.random.default_rng(3).uniform(0.0, 9.0, 18), 20), times + 1)
+    x, rows = np.zeros(2), []
+    for heat in u:
+        rows.append(x[0])
+        x = M @ [*x, heat]
+    n = times * 360
+    readings = 300.0 + np.array(rows)[-n:] + 0.02 * np.random.default_rng(4).standard_normal(n)
+    system = rt.System(ambients={"room": {"temperature": 300.0}}, lumps={"x": {"capacity": C}},
+                       links=[{"between": ("x", "room"), "conductance": 0.4}], inputs={"q": {"lump": "x"}},
+                       sensors={"T": {"lump": "x", "noise": 0.02}},
+                       fit={"links.x-room.conductance": {"lower": 0.05, "upper": 5.0},
+                            "lumps.x.capacity": {"lower": 20.0, "upper": 500.0}})
+    record = rt.Record(sample_time=h, inputs=u[-n:], outputs=readings[:, None], input_names=["q"], output_names=["T"])
+    return rt.diagnosis.refit(system, record)
+
+
+@pytest.mark.parametrize(("mass", "least", "most"), [(1e-3, 0.4, 0.65), (20.0, 0.9, 1.1)])
+def test_a_longer_record_makes_a_size_no_surer_than_its_remainder_allows(mass, least, most):
+    """Four times the data: the deviation of noise alone is halved; a remainder that comes again stays."""
+    short, long = _repeated(8, mass), _repeated(32, mass)
+    column = short.structure.ranges.names.index("links.x-room.conductance")
+    white = [np.sqrt(fit.covariance[column, column]) for fit in (short, long)]
+    stated = [deviations(fit, fit, [column])[0] for fit in (short, long)]
+    off = [abs(fit.v[column] - np.log(0.5)) for fit in (short, long)]  # at rest the conductance is that of the truth
+    assert white[1] / white[0] == pytest.approx(0.5, rel=0.05)
+    assert least < stated[1] / stated[0] < most
+    assert all(one < 3.0 * deviation for one, deviation in zip(off, stated, strict=True))
+    assert (off[1] > 10.0 * white[1]) == (mass > 1.0)  # noise alone would say something else
 
 
 def test_blocks_prefer_the_better_fit_and_doubt_equal_ones():

@@ -170,6 +170,16 @@ def test_gaps_split_or_are_filled(tmp_path: Path, stage: Any) -> None:
     assert [part.n_samples for part in rt.read_records(path, stage, shortest=15)] == [18, 19]
 
 
+def test_rows_that_could_be_interpolated_are_said_to_be_once(tmp_path: Path, stage: Any) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(HEADER + rows(plain, skip=(10, 20, 21, 40, 41, 42, 43)))
+    said = [one["text"] for one in rt.read_records(path, stage)[0].imported.actions if one["what"] == "split"]
+    assert len(said) == 3 and ["gaps=fill" in text for text in said] == [True, False, False]
+    path.write_text(HEADER + rows(plain, skip=(40, 41, 42, 43)))  # more than are interpolated
+    (text,) = [one["text"] for one in rt.read_records(path, stage)[0].imported.actions if one["what"] == "split"]
+    assert "gaps=fill" not in text
+
+
 def test_inputs_that_change_across_a_gap_are_not_filled(tmp_path: Path, stage: Any) -> None:
     path = tmp_path / "run.csv"
     path.write_text(HEADER + rows(lambda k: f"{k},20.{k:02d},{0.5 if k < 10 else 0.7},1", skip=(10,)))

@@ -8,9 +8,9 @@ from ._blocks import Evidence as Evidence
 from ._blocks import Stability as Stability
 from ._blocks import Wandering as Wandering
 from ._blocks import reproducible as reproducible
-from ._blocks import sandwich as sandwich
 from ._blocks import stability as stability
 from ._blocks import wandering as wandering
+from ._deviations import deviations as deviations
 from ._hold_out import Gap as Gap
 from ._hold_out import HoldOut as HoldOut
 from ._hold_out import ValidationResiduals as ValidationResiduals
@@ -41,6 +41,7 @@ from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
            "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "Wandering",
-           "adequacy", "expected_rms", "explains", "hold_out", "left", "locate", "negative_log_predictive_density",
-           "promised", "promising", "refuse_seen", "remainder", "reproducible", "sandwich", "score", "score_candidates",
-           "square_beyond_noise", "stability", "unknown_heat", "validation_data", "wandering"]
+           "adequacy", "deviations", "expected_rms", "explains", "hold_out", "left", "locate",
+           "negative_log_predictive_density", "promised", "promising", "refuse_seen", "remainder", "reproducible",
+           "score", "score_candidates", "square_beyond_noise", "stability", "unknown_heat", "validation_data",
+           "wandering"]

@@ -6,7 +6,6 @@ experiment; what differs between them is the scatter that a statement has to exc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -186,7 +185,7 @@ def _below(share: float, limit: float) -> str:
 
 def _segments(fit: Refit, column: int) -> tuple[Array, Array]:
     """By how much each segment would move an unknown, and what it tells of it; of those that tell anything."""
-    own = _alone(fit, column)
+    own = alone(fit, column)
     weight = block_sums(fit, own**2, SEGMENTS)
     told = weight > 0.02 * weight.sum() / max(weight.size, 1)
     return block_sums(fit, own * fit.z, SEGMENTS)[told] / weight[told], weight[told]
@@ -197,35 +196,18 @@ def _deviations(moved: Array, weight: Array) -> float:
     return float(np.sum(weight * (moved - (weight @ moved) / weight.sum()) ** 2))
 
 
-def sandwich(fit: Refit, columns: Sequence[int]) -> Array:
-    """Standard deviations of unknowns in the optimizer's coordinates that include the remainder.
-
-    The scores of blocks, which a remainder makes larger than noise would, take the place of the information (White
-    1980; blocks as clusters); never below that of the model.
-
-    Parameters
-    ----------
-    fit : Refit
-        Fit with the unknowns.
-    columns : sequence of int
-        Places of the unknowns.
-    """
-    out = []
-    for column in columns:
-        own = _alone(fit, column)
-        power = float(own @ own)
-        scores = block_sums(fit, own * fit.z)
-        free = scores.size / max(scores.size - 1, 1)
-        model = float(np.sqrt(max(fit.covariance[column, column], 0.0)))
-        out.append(max(model, float(np.sqrt(free * np.sum(scores**2))) / power if power > 0 else 0.0))
-    return np.array(out)
-
-
-def _alone(fit: Refit, column: int) -> Array:
+def alone(fit: Refit, column: int) -> Array:
     """Whitened derivative by one unknown, without what all others can explain (m,).
 
     Parameters that are known but for the scatter of healthy days are no others: they would explain a change of
     themselves, at the price of their prior, which is in no segment.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with the unknown.
+    column : int
+        Place of the unknown.
     """
     others = np.delete(fit.J, [*fit.structure.known, column], axis=1)
     scale = np.linalg.norm(others, axis=0)

@@ -168,11 +168,15 @@ def _candidate_tables(ranked: pd.DataFrame) -> tuple[Table, ...]:
 
 def _effect_section(found: Diagnosis) -> Section:
     listed = found.effects or found.provisional
-    rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std, "unit": unit,
+    rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std,
+             **({"in augmented.toml": effect.augmented[name]} if name in effect.augmented else {}), "unit": unit,
              "ΔBIC": effect.delta_bic, "p": chance(effect.p_value), **_evidence(effect)}
             for effect in listed for name, (value, std, unit) in effect.values.items()]
     text = f"{_own_words(found)}\n\n"
     text += "augmented.toml holds these effects." if found.effects else "augmented.toml holds the system refitted."
+    if found.effects and found.effects[0].augmented:
+        text += (" Sizes are those beside what a finer network would change, their standard deviations include the "
+                 "remainder; augmented.toml has the sizes with which the network as it is fits best.")
     if found.provisional:
         text += " The effects below help, but do not explain everything: they are not names."
     tables = [Table(pd.DataFrame(rows), "Effects, in order of acceptance.")] if rows else []

@@ -19,6 +19,7 @@ _GAP = 1.5  # of the median step
 _NEGLIGIBLE = 1e-3  # of a step: stamps this close to the grid are on it
 _EPS = 1e-6
 _ROUNDING = 1e-9  # of a mean square
+_FILLABLE = '; gaps = "fill" in [record] (--record gaps=fill) interpolates such rows'
 
 
 @dataclass(frozen=True)
@@ -215,11 +216,14 @@ def _segments(
                 remedy='Write gaps = "split" or gaps = "fill".',
             )
         same = all(column[first] == column[second] for _, column in driven)
-        if options.gaps == "fill" and lost <= options.fill_up_to and good[first] and good[second] and same:
+        fillable = lost <= options.fill_up_to and good[first] and good[second] and same
+        if options.gaps == "fill" and fillable:
             text = f"{lost} missing rows after {times[0]:.10g} s interpolated"
             table.actions.append(Action("filled", lost, text, "", lines, times))
             continue
         why = "" if options.gaps == "split" or same else "; inputs change across it, so that it is not filled"
+        if options.gaps == "split" and fillable and not any(_FILLABLE in one.text for one in table.actions):
+            why = _FILLABLE
         text = f"{lost} sample{'s' * (lost != 1)} missing after {times[0]:.10g} s; a new part begins{why}"
         table.actions.append(Action("split", lost, text, "", lines, times))
         begins[k + 1] = True

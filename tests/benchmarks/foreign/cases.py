@@ -128,6 +128,13 @@ class _Bench:
             out[:, cells] = (s / np.sqrt(H / SUB) * rng.standard_normal(len(out)) / len(cells))[:, None]
         return out
 
+    def as_cataloged(self, size: float) -> float:
+        """A slope of S that the legs have relative, in V/K² and with that of the plain machine."""
+        if self.case.effect != "seebeck_slope":
+            return size
+        (legs,) = self.machine().plant.legs
+        return legs.S * (legs.S_slope + size)
+
     def record(self, Y: Array, number: int, noise: float) -> rt.Record:
         """With sensor noise."""
         rng = np.random.default_rng(self.noise_seed + number)
@@ -167,7 +174,7 @@ def made(case: Case) -> Made:
             if 0.7 < ratio / strong < 1.4:
                 break
             size = min(size * float(np.clip(np.sqrt(strong / ratio), 0.25, 4.0)), 8.0 * bench.guess)
-    truth = [(case.effect, bench.where, size)] if case.group == "hidden" else []
+    truth = [(case.effect, bench.where, bench.as_cataloged(size))] if case.group == "hidden" else []
     return Made(system(noise), bench.record(Y[0], 0, noise), bench.record(Y[1], 1, noise), truth, base + 1.0, ratio,
                 float(np.sqrt(base)) * noise)
 

@@ -39,8 +39,20 @@ def judged(case: Case, compare: bool = False) -> Row:
             "names": [[e["effect"], e["where"]] for e in answer["effects"]],
             "others": [[[o["effect"], o["where"]] for o in others] for others in answer["alternatives"]],
             "provisional": [[e["effect"], e["where"]] for e in answer["provisional"]],
+            "sizes": sizes(answer["effects"], one.truth),
             "verdict": found.verdict, "gap": answer["gap"], "remainder": answer.get("remainder"),
             "text": found.outcome.text, "seconds": time.process_time() - start, **peers}
+
+
+def sizes(effects: list[dict[str, Any]], truth: list[tuple[str, tuple[str, ...], float]]) -> list[dict[str, float]]:
+    """Of right names: what was found, its stated standard deviation, and what is true; first quantity."""
+    out = []
+    for one in effects:
+        for name, where, size in truth:
+            if same([one["effect"], one["where"]], [name, list(where)]):
+                first = next(iter(one["parameters"].values()))
+                out.append({"found": first["value"], "std": first["std"], "true": size})
+    return out
 
 
 def within(row: Row) -> bool:
@@ -121,6 +133,7 @@ def print_tables(rows: list[Row]) -> None:
     stated = [row for row in hidden if answer(row) == "unique" and row["remainder"]]
     print(f"remainder within a factor 2 of the truth      "
           f"{rate(stated, lambda r: 0.5 <= r['remainder']['train']['rms'] / r['coarse'] <= 2.0)}")
+    print_sizes([one for row in hidden for one in row.get("sizes", []) if row["remainder"]])
     seconds = sorted(row["seconds"] for row in rows)
     print(f"CPU seconds: median {seconds[len(seconds) // 2]:.1f}, worst {seconds[-1]:.1f}")
     print_peers([row for row in hidden if "peers" in row])
@@ -130,6 +143,18 @@ def print_tables(rows: list[Row]) -> None:
                               for one, others in zip(row["names"], row["others"], strict=True))
             names = names or row["text"][:90]
             print(f"  {row['key']}: {answer(row)}, {row['verdict']}, strength {row['strength']:.1f}: {names}")
+
+
+def print_sizes(found: list[dict[str, float]]) -> None:
+    """How far sizes are from the truth, by the deviations stated with them: 95 % should be within 1.96."""
+    if not found:
+        return
+    far = np.array([abs(one["found"] - one["true"]) / one["std"] for one in found])
+    off = np.array([abs(one["found"] / one["true"] - 1.0) for one in found])
+    wide = np.array([one["std"] / abs(one["true"]) for one in found])
+    print(f"size within 1.96 stated deviations of the truth {100 * np.mean(far <= 1.96):.0f} % of {far.size}, within 3 "
+          f"{100 * np.mean(far <= 3.0):.0f} %; median off by {100 * np.median(off):.1f} %, stated "
+          f"{100 * np.median(wide):.1f} %")
 
 
 def print_peers(rows: list[Row]) -> None:
