@@ -52,7 +52,7 @@ def diagnose(system: SystemFile,
     """
     there(system, *records, *(validation or []), *(reference or []))
     found = rt.read_system(system)
-    tables = reading(record, column)
+    tables = rt.jobs.measured.single_rows_filled(found, reading(record, column))
     point = rt.jobs.request.point_from_text(found, operating_point or [])
     free(out)
     with progress() as stage:

@@ -79,7 +79,7 @@ def surfaces(effects: Sequence[Found]) -> list[str]:
     Parameters
     ----------
     effects : sequence of Found
-        Named effects.
+        Named effects with their sizes.
     """
     return [f"Radiation of this size needs a surface of at least {_area(one.values['coefficient'][0])} (black): if "
             f"{one.where[0]} has less, another loss hides in it."

@@ -221,6 +221,18 @@ def test_a_model_that_moves_beside_readings_that_do_not_gets_no_name(run: Run, t
 
 
 @pytest.mark.usefixtures("few")
+def test_single_missing_rows_do_not_cut_a_log_into_parts(run: Run, tmp_path: Path) -> None:
+    """Rows 50 and 130, where the heater is steady, are interpolated and said to be; 200 to 202 begin a new part."""
+    u, y = oven(stepped())
+    kept = np.setdiff1d(np.arange(N), [50, 130, 200, 201, 202])
+    status, _, said = diagnosed(run, tmp_path, u[kept], y[kept], TIME[kept])
+    assert status == 0 and said.count("1 missing row after") == 2 and said.count("a new part begins") == 1
+    status, _, err = run("diagnose", tmp_path / "oven.toml", tmp_path / "log.csv", "--out", tmp_path / "split",
+                         "--record", "gaps=split", "--json")
+    assert status == 0 and " ".join(err.split()).count("a new part begins") == 3
+
+
+@pytest.mark.usefixtures("few")
 def test_one_column_twice_and_counts_are_said(run: Run, tmp_path: Path) -> None:
     u, y = oven(stepped())
     status, found, _ = diagnosed(run, tmp_path, 2.55 * u, y[:, [0, 0]])

@@ -27,6 +27,8 @@ LENGTH = 7
 _FIRST = 2  # evaluations before those out of reach are dropped
 _LAST = 15  # more evaluations, for the others
 _PROMISED = 0.1  # of the best ΔBIC reached: below it, a candidate's linearization would have to be very wrong
+_LIKELY = 0.5  # of the best ΔBIC reached: promised by a candidate that may well get there
+_GAINED = 0.1  # of what is left of the promise, by a few more evaluations
 _NEAR = 0.7  # of the best ΔBIC: from another time constant it may be the best
 _LARGE = 1.5  # whitened variance
 _MOST = 0.7  # of the excess sum of squares: one of three equal effects removes about a third
@@ -169,11 +171,12 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
     entries: list[Entry] = []
     for i in picked:
         best = max((entry.delta_bic for entry in entries), default=0.0)
-        if fit.n_readings * math.log(fit.rss / promised(fit, scores, i)) < _PROMISED * best - BEHIND:
+        promise = fit.n_readings * math.log(fit.rss / promised(fit, scores, i))
+        if promise < _PROMISED * best - BEHIND:
             continue
         try:
             entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
-                                    scores.twins(i), best))
+                                    scores.twins(i), best, promise))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
     likely = []
@@ -253,12 +256,29 @@ def replaced(entry: Entry, fit: Refit) -> Entry:
 
 
 def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,
-             twins: tuple[Twin, ...] = (), best: float = 0.0) -> Entry:
+             twins: tuple[Twin, ...] = (), best: float = 0.0, promise: float = 0.0) -> Entry:
     """Refit one candidate from the better of its starts; not to the end yet. Another has reached the `best` ΔBIC."""
     new = started(origin, candidate, size, best)
+    if promise > _LIKELY * best:
+        new = _into_reach(origin.fit, new, best, promise)
     if in_reach(delta_bic(origin.fit, new), best):
         new = extended(new, new.structure, new.v, _FIRST)
     return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, twins)
+
+
+def _into_reach(fit: Refit, new: Refit, best: float, promise: float) -> Refit:
+    """More evaluations of a candidate that promises about what the best has reached, as long as it gets nearer to it.
+
+    Along a curved valley a few evaluations say little of where it ends.
+    """
+    reached = delta_bic(fit, new)
+    while not in_reach(reached, best):
+        further = extended(new, new.structure, new.v, _FIRST)
+        gained = delta_bic(fit, further) - reached
+        if gained < _GAINED * (promise - reached):
+            break
+        new, reached = further, reached + gained
+    return new
 
 
 def delta_bic(before: Refit, after: Refit) -> float:

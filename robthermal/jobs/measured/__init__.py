@@ -11,6 +11,7 @@ from ._import import ReadTable as ReadTable
 from ._import import import_reports as import_reports
 from ._import import read_files as read_files
 from ._import import reading_from_text as reading_from_text
+from ._import import single_rows_filled as single_rows_filled
 
 if TYPE_CHECKING:  # what type checkers and editors see of the table below
     from ._calibrate import calibrate_files as calibrate_files
@@ -31,7 +32,7 @@ _HOME = {  # name: the module it lives in
 
 __all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_report_beside",
            "import_reports", "instruments_from_text", "noise_from_text", "read_files", "read_measured",
-           "reading_from_text", "write_excitation"]
+           "reading_from_text", "single_rows_filled", "write_excitation"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
 

@@ -40,6 +40,37 @@ def reading_from_text(record: Sequence[str], column: Sequence[str]) -> tuple[Rea
     return ((options, columns, "command line"),) if options or columns else ()
 
 
+def single_rows_filled(system: System, tables: Sequence[ReadTable]) -> tuple[ReadTable, ...]:
+    """Tables by which single missing rows are interpolated, unless the system or one of them says what gaps do.
+
+    A diagnosis takes every part as a record that begins anywhere: a log of parts says less of what is slow.
+
+    Parameters
+    ----------
+    system : System
+        With its own [record].
+    tables : sequence
+        How the files are read, from `reading_from_text`.
+
+    Returns
+    -------
+    tuple
+        For `read_files` and `read_measured`.
+
+    Examples
+    --------
+    >>> import robthermal as rt
+    >>> rt.jobs.measured.single_rows_filled(rt.systems.two_module(), ())
+    (({'gaps': 'fill', 'fill_up_to': 1}, {}, 'diagnose'),)
+    >>> rt.jobs.measured.single_rows_filled(rt.systems.two_module(), [({"gaps": "split"}, {}, "command line")])
+    (({'gaps': 'split'}, {}, 'command line'),)
+    """
+    said = {key for record in (system.record or {}, *(table[0] for table in tables)) for key in record}
+    if said & {"gaps", "fill_up_to"}:
+        return tuple(tables)
+    return (({"gaps": "fill", "fill_up_to": 1}, {}, "diagnose"), *tables)
+
+
 def read_files(paths: Sequence[Path], system: System | None = None, *, tables: Sequence[ReadTable] = (),
                inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
                median_filter: float | None = None) -> list[Record]:

@@ -218,7 +218,7 @@ def _segments(
         same = all(column[first] == column[second] for _, column in driven)
         fillable = lost <= options.fill_up_to and good[first] and good[second] and same
         if options.gaps == "fill" and fillable:
-            text = f"{lost} missing rows after {times[0]:.10g} s interpolated"
+            text = f"{lost} missing row{'s' * (lost != 1)} after {times[0]:.10g} s interpolated"
             table.actions.append(Action("filled", lost, text, "", lines, times))
             continue
         why = "" if options.gaps == "split" or same else "; inputs change across it, so that it is not filled"
