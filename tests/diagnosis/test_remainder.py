@@ -110,8 +110,9 @@ def test_a_report_with_a_remainder_passes_with_the_remark():
     assert (report.verdict, report.holds) == ("PASS WITH REMARKS", True)
     assert [(one.code, one.text) for one in report.reasons] == [("remainder", str(found.remainder))]
     (table,) = next(one for one in report.sections if one.anchor == "effects").tables
-    assert list(table.frame["in augmented.toml"]) == [found.effects[0].augmented["slope"]]
-    assert found.effects[0].augmented["slope"] == found.system.parameter(f"inputs.{found.effects[0].where[0]}.power_slope")
+    (effect,) = found.effects
+    assert list(table.frame["in augmented.toml"]) == [effect.augmented["slope"]]
+    assert effect.augmented["slope"] == found.system.parameter(f"inputs.{effect.where[0]}.power_slope")
     doubted = diagnosis_report(Diagnosed(replace(found, caveats=("Record the room.",)), (), (), ()))
     assert not found.caveats and doubted.headline == f"{report.headline} Record the room."  # on the first screen
     unexplained = rt.diagnosis.DiagnosisCode.UNEXPLAINED.outcome()
@@ -124,7 +125,8 @@ def test_the_file_holds_what_the_contract_asks_for():
     answer = diagnosed("hidden", "heater_power_slope", 0).to_dict()
     assert answer["format"] == "robthermal-diagnosis/2"
     effect, rest = answer["effects"][0], answer["remainder"]
-    assert {"share", "reproducible", "stability", "augmented"} <= set(effect) and set(effect["stability"]) == {"segments", "spread"}
+    assert {"share", "reproducible", "stability", "augmented"} <= set(effect)
+    assert set(effect["stability"]) == {"segments", "spread"}
     assert set(rest) == {"train", "validation", "sensors", "where", "band", "heat"}
     assert set(rest["train"]) == {"rms", "share_explained"} and set(rest["band"]) == {"low", "high", "share"}
     assert [set(place) for place in rest["where"]] == [{"lump", "share"}] * len(rest["where"])
