@@ -16,6 +16,7 @@ from robthermal.diagnosis.evidence import Scores, explains
 from robthermal.diagnosis.fit import Point, Refit, descend, extended
 from robthermal.diagnosis.fit._descent import _solve
 from robthermal.diagnosis.search import _revise, _short_list
+from robthermal.diagnosis.search._implausible import implausible
 from robthermal.diagnosis.search._stages import too_much_left
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
@@ -269,6 +270,19 @@ def test_a_candidate_that_promises_what_the_best_has_reached_is_followed(
     assert _short_list._into_reach(start, start, 13000.0, 10600.0).bic == reached
     assert len(asked) == evaluations
     assert _short_list._into_reach(start, start, 1000.0, 10600.0) is start and len(asked) == evaluations
+
+
+def test_no_water_condenses_from_air_colder_than_its_dew_point(plant: rt.System, convected: rt.Record) -> None:
+    """A board that was warmer than all about it had "condensation" at 42 °C, in a room of 23 °C."""
+    fit = rt.diagnosis.refit(plant, convected)
+    one = rt.diagnosis.candidates(plant, ["condensation"])[0]
+    warmest = max(fit.paths[0].x.max(), *(room.temperature for room in plant.ambients.values()))
+    coldest = fit.paths[0].x.min()
+    why = implausible(one, fit, {"conductance": 0.1, "dew_point": warmest + 2.0}, ())
+    assert f"{warmest + 2.0 - 273.15:.3g} °C: no air holds that much water" in why
+    room = min(room.temperature for room in plant.ambients.values())
+    for dew_point in (room - 1.0, coldest - 1.0):
+        assert implausible(one, fit, {"conductance": 0.1, "dew_point": dew_point}, ()) == ""
 
 
 def test_leaving_an_effect_out_starts_from_what_is_known(plant: rt.System, convected: rt.Record) -> None:

@@ -1,6 +1,6 @@
 """Refitted candidates that no machine shows: a room faster than rooms are, a heat "periodic" within less than a period.
 
-A lag longer than the record is a sensor that is stuck.
+A lag longer than the record is a sensor that is stuck. Water condenses from air that is as warm as its dew point.
 
 Bounds of single quantities cannot say this. Such a candidate is an approximation of something else, and as flexible as
 it is it often beats the effect that is really there.
@@ -11,12 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+import numpy as np
+
+from ..._celsius import ZERO_CELSIUS
 from ..data import moves
 from ..effects import AMBIENT_DRIFT, Candidate
 from ..evidence import Twin
 from ..fit import Refit
 
 _LAGS = ("sensor_lag", "input_lag")
+_HALF, _MARGIN = 0.5, 1.0  # of the heat of condensation, and K by which all must be colder than its dew point
 _BY_ITSELF = 0.25  # relative: by so much radiation and natural convection change a conductance over tens of kelvins
 FASTEST = 3.0 / 60.0  # K/s: air that is cooled or heated by cycling equipment changes by 1 to 2 K per minute
 
@@ -45,6 +49,9 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
             moves(fit.structure.base, path.one.record) for path in fit.records):
         return ("no input changes in the records, and while everything only settles a conductance that depends on "
                 "temperature looks like one that changes at some time")
+    if candidate.effect.name == "condensation" and _from_no_air(candidate.where[0], fit, values["dew_point"]) > _HALF:
+        return (f"most of its heat comes while nothing beside {candidate.where[0]} is as warm as its dew point of "
+                f"{values['dew_point'] - ZERO_CELSIUS:.3g} °C: no air holds that much water")
     if not candidate.effect.paired:
         return ""
     if candidate.effect.name == AMBIENT_DRIFT:
@@ -53,6 +60,19 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     if values["period"] <= span or any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
         return ""
     return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
+
+
+def _from_no_air(lump: str, fit: Refit, dew_point: float) -> float:
+    """Share of the heat of condensation that comes while lumps and ambients are all colder than the dew point."""
+    heat, none = 0.0, 0.0
+    for path in fit.records:
+        record, at = path.one.record, path.system.lump_names.index(lump)
+        rooms = [record[name].max() if name in record.input_names else room.temperature
+                 for name, room in path.system.ambients.items()]
+        cold = np.maximum(dew_point - path.x[:, at], 0.0)
+        heat += float(cold.sum())
+        none += float(cold[np.maximum(path.x.max(axis=1), max(rooms)) < dew_point - _MARGIN].sum())
+    return none / heat if heat > 0 else 0.0
 
 
 def implausible_names(fit: Refit, twins: Mapping[tuple[str, tuple[str, ...]], Sequence[Twin]]) -> Iterator[str]:
