@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects import effects
 from ..fit import Refit
 from ..path import LinearizedRecord
 
 Array = NDArray[np.float64]
-_FIRST = 30  # cycles in a record: slower ones are tried as periodic heats
+_TRIED = "periodic_load"  # slower ones are tried as periodic heats
 _LOBE = 2  # bins on each side that a sine fills behind a Hann window
 _MOST = 0.5  # of the power of what is left at a thermometer
 _DRIVEN = 0.02  # of the power of an input: it cycles as often
@@ -57,16 +59,23 @@ def single_period(fit: Refit) -> Line | None:
 
 
 def _of_sensor(path: LinearizedRecord, name: str, r: Array) -> Line | None:
-    power = _spectrum(r)
-    if power.size < 2 * _FIRST or not power.any():
+    power, first = _spectrum(r), _cycles_tried(path)
+    if power.size < 2 * first or not power.any():
         return None
-    peak = _FIRST + int(np.argmax(power[_FIRST:power.size - _LOBE]))
+    peak = first + int(np.argmax(power[first:power.size - _LOBE]))
     own = slice(peak - _LOBE, peak + _LOBE + 1)
     share = float(power[own].sum() / power.sum())
     if share < _MOST or any(_share(u, own) > _DRIVEN for u in path.one.record.inputs.T):
         return None
     bins = np.arange(power.size)[own]
     return Line(name, len(r) * path.h / float(power[own] @ bins / power[own].sum()), share)
+
+
+def _cycles_tried(path: LinearizedRecord) -> int:
+    """Cycles in the record beyond which no periodic heat is tried."""
+    grid = effects()[_TRIED].quantities[1].grid
+    periods = grid(path, ()) if callable(grid) else grid
+    return math.ceil(path.span / min(periods))
 
 
 def _share(u: Array, own: slice) -> float:

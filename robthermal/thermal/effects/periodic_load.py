@@ -10,14 +10,17 @@ from ._places import lumps_without
 from ._response import RecordContext, Response, TrialContext, Values, Where
 from ._signatures import altered, into
 
-_FASTEST = 30  # periods in a record: faster ones are left to the whiteness test
+_CYCLES = 30  # in any record: faster ones are left to the whiteness test
+_SAMPLES = 100  # of a cycle: a long record tries down to it, as a shorter one of the same sample time does
+_MOST = 120  # cycles, whatever its length
 _add = subtable("lumps", "periodic", ("heat", "period", "phase"), period=600.0, phase=0.0)
 
 
 def _periods(context: TrialContext, where: Where) -> list[float]:
     """Half a cycle of the whole record apart: closer ones are the same to it (Davies 1977)."""
-    length = len(context.x) * context.h
-    return [length / (0.5 * halves) for halves in range(3, 2 * _FASTEST)]
+    n = len(context.x)
+    cycles = min(max(_CYCLES, n // _SAMPLES), _MOST)
+    return [n * context.h / (0.5 * halves) for halves in range(3, 2 * cycles)]
 
 
 def _sine(record: RecordContext, where: Where, values: Values) -> Response:
