@@ -49,11 +49,13 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
             moves(fit.structure.base, path.one.record) for path in fit.records):
         return ("no input changes in the records, and while everything only settles a conductance that depends on "
                 "temperature looks like one that changes at some time")
-    if candidate.effect.name == "condensation" and _from_no_air(candidate.where[0], fit, values["dew_point"]) > _HALF:
-        return (f"most of its heat comes while nothing beside {candidate.where[0]} is as warm as its dew point of "
-                f"{values['dew_point'] - ZERO_CELSIUS:.3g} °C: no air holds that much water")
-    if not candidate.effect.paired:
-        return ""
+    if candidate.effect.name == "condensation":
+        return _from_no_air(candidate.where[0], fit, values["dew_point"])
+    return _slow_or_fast(candidate, span, values, twins) if candidate.effect.paired else ""
+
+
+def _slow_or_fast(candidate: Candidate, span: float, values: Mapping[str, float], twins: Sequence[Twin]) -> str:
+    """Why something does not come and go like this."""
     if candidate.effect.name == AMBIENT_DRIFT:
         rate = 2.0 * math.pi * abs(values["difference"]) / values["period"]
         return "" if rate <= FASTEST else f"{candidate.where[0]} would change by {60.0 * rate:.2g} K per minute"
@@ -62,8 +64,8 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
     return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
 
 
-def _from_no_air(lump: str, fit: Refit, dew_point: float) -> float:
-    """Share of the heat of condensation that comes while lumps and ambients are all colder than the dew point."""
+def _from_no_air(lump: str, fit: Refit, dew_point: float) -> str:
+    """Why water does not condense like this: most of it while lumps and ambients are all colder than the dew point."""
     heat, none = 0.0, 0.0
     for path in fit.records:
         record, at = path.one.record, path.system.lump_names.index(lump)
@@ -72,7 +74,9 @@ def _from_no_air(lump: str, fit: Refit, dew_point: float) -> float:
         cold = np.maximum(dew_point - path.x[:, at], 0.0)
         heat += float(cold.sum())
         none += float(cold[np.maximum(path.x.max(axis=1), max(rooms)) < dew_point - _MARGIN].sum())
-    return none / heat if heat > 0 else 0.0
+    return "" if none <= _HALF * heat else (
+        f"most of its heat comes while nothing beside {lump} is as warm as its dew point of "
+        f"{dew_point - ZERO_CELSIUS:.3g} °C: no air holds that much water")
 
 
 def implausible_names(fit: Refit, twins: Mapping[tuple[str, tuple[str, ...]], Sequence[Twin]]) -> Iterator[str]:
