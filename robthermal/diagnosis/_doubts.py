@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from scipy.constants import Stefan_Boltzmann
+
 from .._celsius import ZERO_CELSIUS
 from ..thermal import System
 from ._found import Found
@@ -16,7 +18,6 @@ from .search import Accepted, other_periods
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
 _LISTED = 4  # records by name
-_STEFAN_BOLTZMANN = 5.670374419e-8  # W/(m² K⁴)
 
 
 def doubts(system: System, remainder: bool) -> list[str]:
@@ -88,7 +89,7 @@ def surfaces(effects: Sequence[Found]) -> list[str]:
 
 def _area(coefficient: float) -> str:
     """Of a black surface with this coefficient [W/K⁴]."""
-    square_meters = coefficient / _STEFAN_BOLTZMANN
+    square_meters = coefficient / Stefan_Boltzmann
     size, unit = (square_meters, "m²") if square_meters >= 0.1 else (1e4 * square_meters, "cm²")
     return f"{float(f'{size:.2g}'):g} {unit}"
 

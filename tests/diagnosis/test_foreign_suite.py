@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 import robthermal as rt
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
-from foreign.cases import SUB, Case, H, all_cases, made  # noqa: E402 - beside the benchmarks
+from foreign.cases import SUB, Case, H, _Bench, all_cases, made  # noqa: E402 - beside the benchmarks
 from foreign.hidden import CATALOG, MAKE, OUTSIDE, Hidden, lagged  # noqa: E402
-from foreign.judge import answer, one_path, wilson  # noqa: E402
+from foreign.judge import answer, one_path, print_sizes, sizes, wilson  # noqa: E402
 from foreign.machines import MACHINES, ROOM  # noqa: E402
 from foreign.march import march  # noqa: E402
 from foreign.peers import beta_of, risks, unfalsified  # noqa: E402
@@ -110,6 +110,26 @@ def test_a_path_at_neighboring_lumps_is_one_answer(names, others, one):
     row = {"key": "stack/hidden/missing_link/1", "verdict": "ambiguous", "names": names, "others": others,
            "truth": [["missing_link", ["sample", "sink"]]]}
     assert one_path(row) is one
+
+
+def test_sizes_are_compared_with_the_truth(capsys):
+    """Of right names only; 0.4 off is 4 deviations of the first, 0.3 off 0.3 of the second."""
+    named = [{"effect": name, "where": where, "parameters": {"first": {"value": value, "std": std}, "other": {}}}
+             for (name, where), value, std in ((LINK, 1.4, 0.1), (LAG, 9.0, 0.1), (LINK, 0.7, 1.0))]
+    found = sizes(named, [("missing_link", ("x4", "x1"), 1.0)])
+    assert found == [{"found": 1.4, "std": 0.1, "true": 1.0}, {"found": 0.7, "std": 1.0, "true": 1.0}]
+    print_sizes(found)
+    assert capsys.readouterr().out == ("size within 1.96 stated deviations of the truth 50 % of 2, within 3 50 %; "
+                                       "median off by 35.0 %, stated 55.0 %\n")
+
+
+def test_a_slope_of_legs_is_in_the_unit_of_the_catalog():
+    """Relative in the legs, absolute in the catalog; the plain machine has one already."""
+    bench = _Bench(Case("stack", "hidden", "seebeck_slope", 3))
+    (legs,) = bench.machine().plant.legs
+    assert bench.as_cataloged(0.0) == legs.S * legs.S_slope != 0.0
+    assert bench.as_cataloged(1e-3) - bench.as_cataloged(0.0) == pytest.approx(1e-3 * legs.S)
+    assert _Bench(Case("stack", "hidden", "sensor_lag", 3)).as_cataloged(12.0) == 12.0
 
 
 @pytest.mark.parametrize(("r", "v"), [(1.0, 0.5), (0.2, 1e-4), (5.0, 8.0), (3.0, 0.4)])
