@@ -19,7 +19,7 @@ def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 7, 50, 1025])
-@pytest.mark.parametrize(("columns", "states"), [(1, 3), (5, 3), (1, 6)])
+@pytest.mark.parametrize(("columns", "states"), [(1, 3), (5, 3), (1, 6), (8, 4), (13, 3), (16, 6), (7, 5), (9, 9)])
 def test_is_what_a_loop_gives(n: int, columns: int, states: int) -> None:
     rng = np.random.default_rng(n)
     A = 0.5 * np.eye(states) + 0.1 * rng.standard_normal((n, states, states))

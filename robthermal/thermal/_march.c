@@ -8,28 +8,33 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Samples that are differentiated at a time, in one vector, or two of half its width where the processor has no more:
- * with GNU's library that is decided where it runs. */
-enum { TOGETHER = 4 };
-typedef double vec __attribute__((vector_size(32)));
+/* Numbers of a vector, or of some narrower ones where the processor has no more: with GNU's library that is decided
+ * where it runs. So many samples are differentiated at a time. */
+enum { TOGETHER = 8 };
+typedef double vec __attribute__((vector_size(64)));
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
-#define WIDEST __attribute__((target_clones("fma", "default")))
+#define WIDEST __attribute__((target_clones("avx512f", "fma", "default")))
 #else
 #define WIDEST
 #endif
 #define PIVOT 1e-2 /* in size, from which a row is divided by it; every diagonal entry is about 1 */
-enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12 };
+enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12, MOST_PAIRS = 64 };
+enum { ROWS = DEGREE * MOST + MOST + 2 * TOGETHER, HEATS = NODES * MOST + TOGETHER };
 #define INLINE inline __attribute__((always_inline))
+#define APART __attribute__((noinline))
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
 typedef struct {
     int64_t n_z, n_w, n_ports, n_q, n_pairs, count;
     const double *K, *Ku, *M;             /* (rows, n_z), (rows, n_w), (rows, NODES n_q); rows = DEGREE n_ports + n_z */
+    const double *Kt, *Kut, *Mt;          /* transposed, each row filled up with zeros to `padded` numbers */
+    int64_t padded;
     const int64_t *ports;                 /* (n_ports,) */
     const int64_t *pairs;                 /* (n_pairs, 4): kind of a heat, ends and drive in [ports, w], -1 for none */
     const double *numbers;                /* (n_pairs, NUMBERS) of every heat */
-    const double *scatter;                /* (2 n_pairs, n_q): what flows into both ends of a pair, by target */
+    const double *scatter;                /* (2 n_pairs, padded_q): what flows into both ends of a pair, by target */
+    int64_t padded_q;                     /* numbers of a row, of which those after the first n_q are 0 */
     const double *gain, *tail;            /* (n_q,) and (2, NODES) */
     double goal, roughest, hottest;       /* all [K]; nothing at the ports is as hot as the last */
     const double *w;                      /* (count, n_w) */
@@ -142,40 +147,52 @@ static void slopes(int64_t kind, const double *p, double a, double b, double dri
         by[1][k] = -by[0][k];
 }
 
-/* Heats by target at one node, V = [ports, w]. */
-static void heats(const problem *at, const double *V, double *q)
+/* y += A x of TOGETHER rows, or of twice as many, from the first of A on, which is given by columns `apart` numbers from
+ * one to the next: even and odd ones are summed up by themselves, for sums that do not wait for each other. */
+static INLINE void add_some(int vectors, const double *A, int64_t apart, const double *x, int64_t columns, double *y)
 {
-    memset(q, 0, sizeof(double) * at->n_q);
-    for (int64_t pair = 0; pair < at->n_pairs; pair++) {
-        const int64_t *place = at->pairs + 4 * pair;
-        double into[2];
-        flow(place[0], at->numbers + NUMBERS * pair, V[place[1]], V[place[2]], place[3] < 0 ? 0.0 : V[place[3]], into);
-        for (int side = 0; side < 2; side++) {
-            const double *to = at->scatter + at->n_q * (2 * pair + side);
-            for (int64_t j = 0; j < at->n_q; j++)
-                q[j] += to[j] * into[side];
+    vec even[2], odd[2] = {{0.0}, {0.0}}, own;
+    memcpy(even, y, sizeof(vec) * vectors);
+    int64_t j = 0;
+    for (; j + 2 <= columns; j += 2, A += 2 * apart)
+        for (int v = 0; v < vectors; v++) {
+            memcpy(&own, A + TOGETHER * v, sizeof(vec));
+            even[v] += own * x[j];
+            memcpy(&own, A + apart + TOGETHER * v, sizeof(vec));
+            odd[v] += own * x[j + 1];
         }
+    for (int v = 0; v < vectors; v++) {
+        if (j < columns) {
+            memcpy(&own, A + TOGETHER * v, sizeof(vec));
+            even[v] += own * x[j];
+        }
+        even[v] += odd[v];
     }
+    memcpy(y, even, sizeof(vec) * vectors);
 }
 
-/* y += A x for A (rows, columns); four rows at a time, whose sums do not wait for each other. */
-static void add(const double *A, const double *x, int64_t rows, int64_t columns, double *y)
+/* y += A x for A (rows, columns) given by columns, `apart` numbers from one to the next: up to TOGETHER - 1 numbers of y
+ * after the last row are written too. */
+static INLINE void add(const double *A, int64_t apart, const double *x, int64_t rows, int64_t columns, double *y)
 {
     int64_t i = 0;
-    for (; i + 4 <= rows; i += 4, A += 4 * columns) {
-        double sums[4] = {0.0, 0.0, 0.0, 0.0};
-        for (int64_t j = 0; j < columns; j++)
-            for (int row = 0; row < 4; row++)
-                sums[row] += A[columns * row + j] * x[j];
-        for (int row = 0; row < 4; row++)
-            y[i + row] += sums[row];
+    for (; i + TOGETHER < rows; i += 2 * TOGETHER)
+        add_some(2, A + i, apart, x, columns, y + i);
+    if (i < rows)
+        add_some(1, A + i, apart, x, columns, y + i);
+}
+
+/* Heats by target at one node, V = [ports, w]; up to TOGETHER - 1 numbers after them are written too. */
+static INLINE void heats(const problem *at, const double *V, double *q)
+{
+    double into[2 * MOST_PAIRS];
+    memset(q, 0, sizeof(double) * (at->n_q + TOGETHER - 1));
+    for (int64_t pair = 0; pair < at->n_pairs; pair++) {
+        const int64_t *place = at->pairs + 4 * pair;
+        flow(place[0], at->numbers + NUMBERS * pair, V[place[1]], V[place[2]], place[3] < 0 ? 0.0 : V[place[3]],
+             into + 2 * pair);
     }
-    for (; i < rows; i++, A += columns) {
-        double sum = 0.0;
-        for (int64_t j = 0; j < columns; j++)
-            sum += A[j] * x[j];
-        y[i] += sum;
-    }
+    add(at->scatter, at->padded_q, into, at->n_q, 2 * at->n_pairs, q);
 }
 
 /* What the last coefficients of the heats of a sample are worth [K]: little where the heats are smooth. */
@@ -197,13 +214,13 @@ static double roughness(const problem *at, const double *q)
 
 /* Heats q at all nodes of a sample from z, where the temperatures there are V; 0 where the fixed point is not found.
  * base: what rows of K and Ku make of state and drives. */
-static int fixed_point(const problem *at, const double *z, const double *w, double *V, double *q, double *base)
+static WIDEST APART int fixed_point(const problem *at, const double *z, const double *w, double *V, double *q, double *base)
 {
     const int64_t n_ports = at->n_ports, n_q = at->n_q, width = n_ports + at->n_w, nodes = DEGREE * n_ports;
-    double now[DEGREE * MOST], before = HUGE_VAL;
-    memset(base, 0, sizeof(double) * (nodes + at->n_z));
-    add(at->K, z, nodes + at->n_z, at->n_z, base);
-    add(at->Ku, w, nodes + at->n_z, at->n_w, base);
+    double now[DEGREE * MOST + TOGETHER], before = HUGE_VAL;
+    memset(base, 0, sizeof(double) * (nodes + at->n_z + TOGETHER));
+    add(at->Kt, at->padded, z, nodes + at->n_z, at->n_z, base);
+    add(at->Kut, at->padded, w, nodes + at->n_z, at->n_w, base);
     for (int64_t node = 0; node < NODES; node++) {
         for (int64_t i = 0; i < n_ports; i++)
             V[width * node + i] = z[at->ports[i]];
@@ -214,8 +231,8 @@ static int fixed_point(const problem *at, const double *z, const double *w, doub
         memcpy(q + n_q * node, q, sizeof(double) * n_q);
     for (int k = 0; k < ITERATIONS; k++) {
         double change = 0.0;
-        memcpy(now, base, sizeof(double) * nodes);
-        add(at->M, q, nodes, NODES * n_q, now);
+        memcpy(now, base, sizeof(double) * (nodes + TOGETHER));
+        add(at->Mt, at->padded, q, nodes, NODES * n_q, now);
         for (int64_t node = 1; node < NODES; node++)
             for (int64_t i = 0; i < n_ports; i++) {
                 const double T = now[n_ports * (node - 1) + i];
@@ -236,18 +253,18 @@ static int fixed_point(const problem *at, const double *z, const double *w, doub
 }
 
 /* One sample from z to the n_z numbers after it; 0 where it is left to the caller. worst: its roughness, if larger. */
-static int sample(const problem *at, const double *z, const double *w, double *end, double *worst)
+static INLINE int sample(const problem *at, const double *z, const double *w, double *end, double *worst)
 {
     const int64_t nodes = DEGREE * at->n_ports, columns = NODES * at->n_q;
-    double V[NODES * MOST], q[NODES * MOST], base[DEGREE * MOST + MOST];
+    double V[NODES * MOST], q[HEATS], base[ROWS];
     if (!fixed_point(at, z, w, V, q, base))
         return 0;
     const double rough = roughness(at, q);
     if (!(rough <= at->roughest))
         return 0;
     *worst = fmax(*worst, rough);
+    add(at->Mt + nodes, at->padded, q, at->n_z, columns, base + nodes);
     memcpy(end, base + nodes, sizeof(double) * at->n_z);
-    add(at->M + nodes * columns, q, at->n_z, columns, end);
     return 1;
 }
 
@@ -281,7 +298,7 @@ static void heat_slopes(const problem *at, const double *V, double *G)
         slopes(place[0], at->numbers + NUMBERS * pair, V[place[1]], V[place[2]], place[3] < 0 ? 0.0 : V[place[3]], by);
         for (int side = 0; side < 2; side++)
             for (int64_t j = 0; j < at->n_q; j++) {
-                const double to = at->scatter[at->n_q * (2 * pair + side) + j];
+                const double to = at->scatter[at->padded_q * (2 * pair + side) + j];
                 for (int k = 0; k < 3; k++)
                     if (to != 0.0 && place[1 + k] >= 0 && place[1 + k] < at->n_ports)
                         G[TOGETHER * (at->n_ports * j + place[1 + k])] += to * by[side][k];
@@ -322,14 +339,15 @@ static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
 {
     const int64_t n_q = at->n_q, n = at->n_free, nodes = DEGREE * n_ports;
     const int64_t columns = NODES * n_ports, width = nodes + n, per_node = n_ports + at->n_w;
-    double base[DEGREE * MOST + MOST];
+    double base[ROWS], q[HEATS];
     vec G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
     vec at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
     for (int64_t lane = 0; lane < TOGETHER; lane++) {
         const int64_t k = first + lane < at->count ? first + lane : at->count - 1;
         double *V = at->V + NODES * per_node * k;
-        if (!fixed_point(at, at->z + at->n_z * k, at->w + at->n_w * k, V, at->q + NODES * n_q * k, base))
+        if (!fixed_point(at, at->z + at->n_z * k, at->w + at->n_w * k, V, q, base))
             return 0;
+        memcpy(at->q + NODES * n_q * k, q, sizeof(double) * NODES * n_q);
         for (int64_t node = 0; node < NODES; node++)
             heat_slopes(at, V + per_node * node, (double *)(G + n_q * n_ports * node) + lane);
     }
@@ -382,7 +400,7 @@ int64_t robthermal_march_size(void)
 
 static int fits(const problem *at)
 {
-    return at->n_ports <= MOST_PORTS && at->n_ports + at->n_w <= MOST && at->n_q <= MOST && at->n_z <= MOST;
+    return at->n_ports <= MOST_PORTS && at->n_pairs <= MOST_PAIRS && at->n_ports + at->n_w <= MOST && at->n_q <= MOST && at->n_z <= MOST;
 }
 
 /* Samples that were differentiated: `count`, or fewer where a fixed point is not found. */
@@ -398,7 +416,7 @@ WIDEST int64_t robthermal_derivatives(const problem *at)
 
 /* Segments that were computed, at most `count` of the first: segment k is as long as a step of kinds[kind[k]].
  * worst: the largest roughness of them. */
-int64_t robthermal_march(const problem *kinds, const int64_t *kind, double *worst)
+WIDEST int64_t robthermal_march(const problem *kinds, const int64_t *kind, double *worst)
 {
     const int64_t count = kinds->count, n_z = kinds->n_z, n_w = kinds->n_w;
     *worst = 0.0;

@@ -23,7 +23,7 @@ from ._ports import PortHeat
 from ._terms import Array, NaturalTerm, RadiationTerm
 
 SOURCE = Path(__file__).with_name("_march.c")
-_MOST, _MOST_PORTS, _NUMBERS = 64, 12, 8  # as in the source
+_MOST, _MOST_PORTS, _MOST_PAIRS, _NUMBERS, _BEYOND = 64, 12, 64, 8, 8  # as in the source
 _FINEST = 1e-11  # K: below it a change of a temperature is rounding
 _FEW = 20  # segments, whose kinds are sooner compared one by one
 _CLOSER = 0.01  # of the change at which numpy stops: one iteration more costs little here
@@ -75,7 +75,11 @@ class _Problem(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("n_z", "n_w", "n_ports", "n_q", "n_pairs", "count")),
-        *((name, ctypes.c_void_p) for name in ("K", "Ku", "M", "ports", "pairs", "numbers", "scatter", "gain", "tail")),
+        *((name, ctypes.c_void_p) for name in ("K", "Ku", "M", "Kt", "Kut", "Mt")),
+        ("padded", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("ports", "pairs", "numbers", "scatter")),
+        ("padded_q", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("gain", "tail")),
         *((name, ctypes.c_double) for name in ("goal", "roughest", "hottest")),
         *((name, ctypes.c_void_p) for name in ("w", "z")),
         ("n_free", ctypes.c_int64),
@@ -122,10 +126,15 @@ class Marching:
         pairs, numbers = _described(heat)
         n_z, n_w = step.K.shape[1], step.Ku.shape[1]
         self._built, self._size = built, (n_z, n_w, heat.ports.size, heat.scatter.shape[1], len(pairs))
-        self._arrays = [np.ascontiguousarray(a, float) for a in (step.K, step.Ku, step.M)]
-        self._arrays += [np.ascontiguousarray(a, np.int64) for a in (heat.ports, pairs)]
-        self._arrays += [np.ascontiguousarray(a, float) for a in (numbers, _in_pairs(heat), gain, TAIL)]
-        self._of_step = (*(one.ctypes.data for one in self._arrays), max(_CLOSER * goal, _FINEST), roughest, hottest)
+        matrices = [np.ascontiguousarray(a, float) for a in (step.K, step.Ku, step.M)]
+        by_columns = [_filled_up(a.T) for a in matrices]
+        places = [np.ascontiguousarray(a, np.int64) for a in (heat.ports, pairs)]
+        scattered = [np.ascontiguousarray(numbers, float), _filled_up(_in_pairs(heat))]
+        rough = [np.ascontiguousarray(a, float) for a in (gain, TAIL)]
+        self._arrays = *matrices, *by_columns, *places, *scattered, *rough
+        self._of_step = (*_pointers(matrices), *_pointers(by_columns), by_columns[0].shape[1], *_pointers(places),
+                         *_pointers(scattered), scattered[1].shape[1], *_pointers(rough), max(_CLOSER * goal, _FINEST),
+                         roughest, hottest)
 
     def linearized(self, z: Array, w: Array, n_free: int) -> Linearized | None:
         """Steps from states z (S, n_z) with drives w (S, n_w) and their derivatives; None where one does not converge.
@@ -139,7 +148,7 @@ class Marching:
         out = Linearized(np.empty((S, DEGREE + 1, n_ports + n_w)), np.empty((S, DEGREE + 1, n_q)),
                          np.empty((S, n_free, n_free)), np.empty((S, n_free, DEGREE * n_ports)))
         problem = self._problem(held, starts, n_free,
-                                *(one.ctypes.data for one in (out.V, out.q, out.F, out.through)))
+                                *_pointers([out.V, out.q, out.F, out.through]))
         return out if self._built.derivatives(ctypes.byref(problem)) == S else None
 
     def _problem(self, w: Array, z: Array, *rest: int) -> _Problem:
@@ -197,7 +206,20 @@ def holds(heat: PortHeat, n_z: int) -> bool:
         Number of its states.
     """
     most = max(n_z, heat.ports.size + heat.eq.drives.width, heat.scatter.shape[1])
-    return most <= _MOST and heat.ports.size <= _MOST_PORTS and all(type(term) in _KINDS for term in heat.eq.terms)
+    pairs = sum(len(term.a) for term in heat.eq.terms)
+    return (most <= _MOST and heat.ports.size <= _MOST_PORTS and pairs <= _MOST_PAIRS
+            and all(type(term) in _KINDS for term in heat.eq.terms))
+
+
+def _filled_up(rows: Array) -> Array:
+    """Rows with as many zeros behind each as the source may read beyond its end."""
+    out = np.zeros((len(rows), rows.shape[1] + _BEYOND))
+    out[:, :rows.shape[1]] = rows
+    return out
+
+
+def _pointers(arrays: Sequence[NDArray[Any]]) -> list[int]:
+    return [one.ctypes.data for one in arrays]
 
 
 def _described(heat: PortHeat) -> tuple[Array, Array]:

@@ -98,7 +98,7 @@ def test_samples_of_a_delayed_current_are_computed_in_parts(every: rt.System, dr
     np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize("n", [3, 60, 61, 62, 63])
+@pytest.mark.parametrize("n", [3, 57, 58, 60, 61, 62, 63, 64])
 def test_derivatives_are_those_of_numpy(every: rt.System, drive: Any, monkeypatch: pytest.MonkeyPatch, n: int) -> None:
     """Along one path, by every number of the system; numpy's are tested against differences elsewhere.
 

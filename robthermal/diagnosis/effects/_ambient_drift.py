@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..._sine import sine
 from ...thermal import Link, System
 from ...thermal.effects import Effect, Quantity, RecordContext, Response, TrialContext, effects
 
@@ -96,7 +97,7 @@ def _add(system: System, where: tuple[str, ...], values: Mapping[str, float]) ->
 
 
 def _signature(record: RecordContext, where: tuple[str, ...], values: Mapping[str, float]) -> Response:
-    time = record.time
-    wave = np.sin(2.0 * np.pi / values["period"] * np.append(time, time[-1] + record.h) + values["phase"])
+    rate = 2.0 * np.pi / values["period"]
+    wave = sine(len(record.time) + 1, rate * record.h, rate * record.time[0] + values["phase"])
     return Response(heat={record.system.lump_names.index(lump): (slope * wave[:-1], slope * wave[1:])
                           for lump, slope in conductances(record.system, where[0]).items()})

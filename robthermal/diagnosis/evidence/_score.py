@@ -257,15 +257,16 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
          np.zeros((fit.z.size, 0)))
     explained = fit.basis.T @ J
     J -= fit.basis @ explained
-    little = np.linalg.norm(J, axis=0) < _LITTLE * np.linalg.norm(explained, axis=0)
+    little = _lengths(J) < _LITTLE * _lengths(explained)
     J[:, little] = fit.project(J[:, little])  # rounding counts there alone
     trials, turn, n_columns = turned(fit, trials, J)
-    rest = turn(J)
-    own = np.linalg.norm(rest, axis=0)
-    length = np.hypot(own, np.linalg.norm(turn(explained), axis=0))
+    unit = turn(J)
+    own = _lengths(unit)
+    length = np.hypot(own, _lengths(turn(explained)))
     visible = (length > 0) & (own > 1e-9 * length)
     own_safe = np.where(visible, own, 1.0)
-    unit = np.where(visible, rest / own_safe, 0.0)
+    unit /= own_safe
+    unit[:, ~visible] = 0.0
     along = unit.T @ fit.rest
     power = float(fit.rest @ fit.rest)
     variance = np.maximum(power - along**2, 1e-12 * power) / max(fit.degrees_of_freedom - 1, 1)
@@ -278,6 +279,11 @@ def _tried(fit: Refit, trials: list[Trial]) -> _Tried:
     return _Tried([trials[i] for i in best], n_columns[best], size[best], std[best], statistic[best],
                   (possible & visible)[best], identifiability[best], np.where(visible, own, 0.0)[best],
                   unit[:, best])
+
+
+def _lengths(columns: Array) -> Array:
+    """Length of every column, without a copy of them."""
+    return np.sqrt(np.einsum("mk,mk->k", columns, columns))
 
 
 def promising(fit: Refit, scores: Scores) -> bool:

@@ -72,14 +72,14 @@ class AveragedRecord:
         return np.concatenate(whole, axis=1) if whole and len(whole) == len(parts) else None
 
     def _some(self, trials: Sequence[Candidate]) -> Array | None:
-        q = np.zeros((*self.pushed.shape[::2], len(trials)))
+        q, mean = np.zeros((*self.pushed.shape[::2], len(trials))), np.full(self.length, 0.5 / self.length)
         for j, trial in enumerate(trials):
             response = None if trial.effect.signature is None else trial.effect.signature(self.path, trial.where,
                                                                                           trial.shape)
             if response is None or response.heat is None or response.reading is not None:
                 return None
             for lump, (first, last) in response.heat.items():
-                q[:, lump, j] = _in_blocks(first + last, self.length).sum(axis=1) * (0.5 / self.length)
+                q[:, lump, j] = _in_blocks(first + last, self.length) @ mean
         states = recursion(self.passed, self.pushed @ q)[:-1]
         return np.asarray(self.seen @ states + self.felt @ q).reshape(-1, len(trials))
 

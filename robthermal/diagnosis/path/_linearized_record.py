@@ -25,7 +25,7 @@ from ._exact_steps import exact_steps, over_steps
 from ._heat_splines import heat_splines
 from ._late_means import LATE_MEANS, late_means
 from ._linearized import Unknowns
-from ._rates import each, heat_slopes, heats_of, is_diagonal, kinds_of
+from ._rates import each, heat_slopes, heats_of, is_diagonal, kinds_of, sliced
 from ._whitening import Whitener, whitener
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ class LinearizedRecord:
         """Sample time [s]."""
         return self.one.record.sample_time
 
-    @property
+    @cached_property
     def time(self) -> Array:
         """Time of every sample [s]."""
         return self.one.record.time
@@ -217,7 +217,7 @@ class LinearizedRecord:
         out = np.zeros((*self.one.readings.shape, len(trials)))
         for first in range(0, len(linear), _BLOCK):
             some = linear[first:first + _BLOCK]
-            out[..., [i for i, _, _ in some]] = self.readings_of(
+            out[..., sliced([i for i, _, _ in some])] = self.readings_of(
                 [signature(self, trial.where, trial.shape) for _, trial, signature in some])
         for i, trial, signature in signed:
             if signature is None:

@@ -31,6 +31,11 @@ def kinds_of(each: Array, rounded: Array) -> tuple[Array, Places]:
     return each[first], kind
 
 
+def sliced(places: list[int]) -> list[int] | slice:
+    """The same places, as a slice where they follow each other: columns there are copied at once."""
+    return slice(places[0], places[-1] + 1) if places[-1] - places[0] < len(places) else places
+
+
 def is_diagonal(A: Array) -> bool:
     """Whether a matrix is square, with nothing beside its diagonal."""
     return A.shape[0] == A.shape[1] and not np.any(A - np.diag(np.diag(A)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..._sine import sine
 from ._builders import subtable
 from ._effect import Effect, Quantity
 from ._places import lumps_without
@@ -25,8 +26,8 @@ def _periods(context: TrialContext, where: Where) -> list[float]:
 
 def _sine(record: RecordContext, where: Where, values: Values) -> Response:
     """A sine of one watt."""
-    time = record.time
-    wave = np.sin(2.0 * np.pi / values["period"] * np.append(time, time[-1] + record.h) + values["phase"])
+    rate = 2.0 * np.pi / values["period"]
+    wave = sine(len(record.time) + 1, rate * record.h, rate * record.time[0] + values["phase"])
     return into(record, {where[0]: (wave[:-1], wave[1:])})
 
 
