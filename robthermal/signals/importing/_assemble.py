@@ -13,7 +13,8 @@ from .._means import as_means, block_means
 from .._record import Record
 from .._shift import shift_inputs
 from .._stated import KEY
-from ._columns import Channel, SystemLike
+from ._channel import Channel
+from ._columns import SystemLike
 from ._options import Declared
 from ._parts import Part
 from ._report import Import, ImportedColumn

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
-from ._columns import Channel, kept_factor
+from ._channel import Channel, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
 from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short, thousands_of
@@ -180,6 +180,9 @@ def to_si(channel: Channel, raw: Array) -> None:
 
 
 def _in_si(channel: Channel, raw: Array) -> Array:
+    if channel.resistance is not None and channel.unit_read is not None:
+        across = channel.unit_read.to_si(channel.scale * raw + channel.offset)
+        return across**2 * (channel.resistance if channel.unit_read.quantity == "current" else 1 / channel.resistance)
     if channel.scaled:
         values = channel.scale * raw + channel.offset
         return channel.unit_read.to_si(values) if channel.unit == "K" and channel.unit_read else values
@@ -190,7 +193,7 @@ def _in_si(channel: Channel, raw: Array) -> Array:
     return channel.unit_read.to_si(raw) * kept_factor(channel)
 
 
-def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:
+def mapped_actions(table: Table, channels: Sequence[Channel], of_means: bool) -> list[Action]:
     """What is said of names that differ from their headers and of units that are converted."""
     found = []
     for c in channels:
@@ -199,6 +202,11 @@ def mapped_actions(table: Table, channels: Sequence[Channel]) -> list[Action]:
             found.append(Action("mapped", 1, f"{c.name} is column {header!r}", header))
         if c.thermistor is not None:
             found.append(Action("converted", len(table.lines), f"{c.name} to K: {c.thermistor}", header))
+        elif c.resistance is not None and c.unit_read is not None:
+            law = f"I² · {c.resistance:g} Ω" if c.unit_read.quantity == "current" else f"U² / {c.resistance:g} Ω"
+            steady = ", right where it is steady within a step" if of_means else ""
+            text = f"{c.name} from {c.unit_read.name} to W: {law}{steady}"
+            found.append(Action("converted", len(table.lines), text, header))
         elif c.scaled:
             found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
         elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:

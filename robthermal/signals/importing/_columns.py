@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from ...errors import InputError
 from .._names import misspelt, suggestion
 from .._thermistor import Thermistor
+from ._channel import Channel
+from ._heater import heater_channel, resistive_channel
 from ._options import ColumnChoice, Declared
 from ._table import Table
 from ._tokens import short
@@ -45,41 +46,6 @@ class SystemLike(Protocol):
     def current_limits(self) -> Mapping[str, Limits]: ...
     @property
     def input_limits(self) -> Mapping[str, Limits]: ...
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One column that is used.
-
-    Parameters
-    ----------
-    name : str
-        In the record.
-    role : str
-        "input", "current", "ambient", "sensor" or "voltage" (of a module).
-    place : int
-        Column of the table.
-    unit_read : Unit or None
-        Unit of the cells; None where neither header nor declaration says one.
-    unit : str
-        Unit that is kept: "K", "A", "V", "W", or the input's own; "" where nobody says.
-    scale, offset : float
-        Value = scale · cell + offset, before a unit is converted; declared, or 1 and 0.
-    scaled : bool
-        Whether scale or offset were declared.
-    thermistor : Thermistor or None
-        Characteristic of what the cells are read from.
-    """
-
-    name: str
-    role: str
-    place: int
-    unit_read: Unit | None
-    unit: str
-    scale: float = 1.0
-    offset: float = 0.0
-    scaled: bool = False
-    thermistor: Thermistor | None = None
 
 
 def channels_of_system(table: Table, system: SystemLike, choice: Declared, time: Sequence[int]) -> tuple[Channel, ...]:
@@ -132,6 +98,9 @@ def channels_of_names(
             raise _missing(table, name, "", _unknown(table, places, time))
         place = places[name]
         picked = choice.columns.get(name)
+        if picked is not None and picked.resistance is not None:
+            found.append(_channel(table, name, "input" if name in inputs else "output", place, choice, "K", None, 1.0))
+            continue
         written = split_header(table.headers[place])[1]
         own = written is not None and unit_of(written) is None and (picked is None or picked.unit is None)
         unit = None if own else _unit(table, name, place, picked)
@@ -216,6 +185,8 @@ def _channel(
     if text is not None and unit_of(text) is None and text == (own or (text if gain == 0.0 else None)):
         return Channel(name, role, place, None, text, *scaling)  # rpm: the system says so, or it is no heat
     unit = _unit(table, name, place, picked, role)
+    if picked is not None and picked.resistance is not None:
+        return _resistive(name, role, place, unit, own, picked.resistance, scaling, where)
     if picked is not None and picked.thermistor is not None:
         return _thermistor(name, role, place, unit, picked.thermistor, scaling, where)
     if role in ("sensor", "ambient"):
@@ -241,7 +212,15 @@ def _channel(
                 remedy=f"Another column? Write --column '{name}=HEADER'.",
             )
         return Channel(name, role, place, unit, kept, *scaling)
-    return _input(name, place, unit, own, gain, scaling, where)
+    return heater_channel(name, place, unit, own, gain, scaling, where)
+
+
+def _resistive(name: str, role: str, place: int, unit: Unit | None, own: str | None, resistance: float,
+               scaling: tuple[float, float, bool], where: str) -> Channel:
+    if role != "input":
+        raise InputError(f"{name!r} is a {_KINDS.get(role, role)}, and a resistance is declared for it", where=where,
+                         expected="a heater, cells in V or A", remedy="Remove resistance.")
+    return resistive_channel(name, place, unit, own, resistance, scaling, where)
 
 
 def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteristic: Thermistor,
@@ -255,45 +234,6 @@ def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteris
         raise InputError(f"{what}, and a thermistor is declared for it", where=where,
                          expected=f"a sensor or ambient, cells in {wanted}", remedy="Remove thermistor, or the unit.")
     return Channel(name, role, place, unit, "K", *scaling, characteristic)
-
-
-def _input(
-    name: str,
-    place: int,
-    unit: Unit | None,
-    own: str | None,
-    gain: float,
-    scaling: tuple[float, float, bool],
-    where: str,
-) -> Channel:
-    """A heater's column: in W, or in the unit the system file gives the input."""
-    kept = unit_of(own) if own else None
-    if scaling[2]:
-        return Channel(name, "input", place, None, own or "W", *scaling)
-    if own is None:
-        if gain == 0.0 and unit is not None:  # no heat: the numbers as they are
-            return Channel(name, "input", place, unit, unit.name, *scaling)
-        if unit is None or unit.name == "W":
-            return Channel(name, "input", place, unit, "W" if gain == 1.0 or unit else "", *scaling)
-        if unit.quantity == "power" and gain == 1.0:
-            return Channel(name, "input", place, unit, "W", *scaling)
-        raise InputError(
-            f"{name!r} is in {unit.name} and the system does not say so (gain = {gain:g} W per unit)",
-            where=where,
-            expected="W, or a declared conversion",
-            remedy=f'Write unit = "{unit.name}" in [inputs.{name}], or [columns] {name} = {{ column = …, unit = '
-            f'"{unit.name}", scale = (W per {unit.name}) }}.',
-        )
-    if unit is None or unit.name == (kept.name if kept else own):
-        return Channel(name, "input", place, kept, own, *scaling)
-    if kept is not None and unit.quantity == kept.quantity:
-        return Channel(name, "input", place, unit, own, *scaling)
-    raise InputError(
-        f"the column is in {unit.name} and [inputs.{name}] in {own}",
-        where=where,
-        expected=own,
-        remedy="Correct one of the two, or declare scale.",
-    )
 
 
 def _written(table: Table, name: str, place: int, picked: ColumnChoice | None) -> str | None:
@@ -387,9 +327,3 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
         expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
         remedy=remedy.strip(),
     )
-
-
-def kept_factor(channel: Channel) -> float:
-    """Factor from SI to the unit an input is kept in: 1 except for inputs with a unit of their own."""
-    own: Any = unit_of(channel.unit) if channel.unit else None
-    return 1.0 if own is None or channel.role != "input" or own.factor == 0 else 1.0 / own.factor

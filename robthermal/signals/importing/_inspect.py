@@ -14,7 +14,7 @@ from .._stated import KEY
 from ._assemble import make_report, say_declared, say_dropped
 from ._cells import NumberReader, take_codes
 from ._clock import time_columns, time_reader
-from ._columns import Channel
+from ._channel import Channel
 from ._open import open_source
 from ._options import Declared, declared, with_own_word
 from ._report import Import, ImportedColumn

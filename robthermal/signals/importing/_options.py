@@ -37,6 +37,9 @@ class ColumnChoice(_Table):
         Value = scale · cell + offset, in the unit of the system (W for heaters, A, K); ohms before a `thermistor`.
     thermistor : Thermistor, optional
         The cells are resistances, or readings of a divider, and become temperatures.
+    resistance : float, optional
+        The cells are the voltage or the current of a heater of this resistance [Ω], and become its power, U²/R or
+        I² R; `scale` and `offset` act before.
     """
 
     column: str
@@ -44,6 +47,7 @@ class ColumnChoice(_Table):
     scale: Finite | None = None
     offset: Finite | None = None
     thermistor: Thermistor | None = None
+    resistance: Positive | None = None
 
 
 class ImportOptions(_Table):

@@ -47,7 +47,8 @@ def read_records(
     inputs, outputs : sequence of str, optional
         Without a system: the columns to read.
     columns : mapping, optional
-        Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …}``.
+        Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …,
+        "thermistor": …, "resistance": …}``.
     median_filter : float, optional
         Width of a running median over the outputs [s]; default none, glitches are only reported.
     max_bytes : float, optional
@@ -112,7 +113,8 @@ def read_record(
     inputs, outputs : sequence of str, optional
         Without a system: the columns to read.
     columns : mapping, optional
-        Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …}``.
+        Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …,
+        "thermistor": …, "resistance": …}``.
     median_filter : float, optional
         Width of a running median over the outputs [s].
     max_bytes : float, optional

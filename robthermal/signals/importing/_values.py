@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from .._plausible import check_temperature, limit_notes
 from ._cells import NumberReader, from_thermistor, mapped_actions, refuse_codes, refuse_faults, take_codes, to_si
-from ._columns import Channel, SystemLike
+from ._channel import Channel
+from ._columns import SystemLike
 from ._jitter import settled
 from ._options import Declared
 from ._parts import Part, parts_of, say_resampled
@@ -93,7 +94,7 @@ def read_values(
     U, Y = U[:n], Y[:n]
     clock = times.clock()
     refuse_faults(readers)
-    table.actions.extend(mapped_actions(table, ordered))
+    table.actions.extend(mapped_actions(table, ordered, choice.record.averaged in ("before", "after")))
     values = Values(ordered, U, Y, {}, {})
     for channel in ordered:
         raw = values.column(channel)
