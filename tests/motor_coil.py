@@ -1,7 +1,7 @@
 """Coils of a linear motor in an iron core on a cold plate, 600 cells in two dimensions, and what its drive logs.
 
-A log has the current with its sign, a thermistor in ohms that averages the winding, and no room temperature. The resistance of
-copper rises with temperature; that is what the network of three lumps lacks.
+A log has the current with its sign, a thermistor in ohms that averages the winding, and no room temperature. The
+resistance of copper rises with temperature; that is what the network of three lumps lacks.
 """
 
 from __future__ import annotations
@@ -79,10 +79,10 @@ class Motor:
         step = STEP / 4
         lu = splu(sparse.csc_matrix(sparse.diags(self.capacity / step) - self._K))
         x, out = np.full(self.capacity.size, water[0]), []
-        for I, T in zip(current, water, strict=True):
+        for ampere, T in zip(current, water, strict=True):
             out.append(self.read @ x)
             for _ in range(4):
-                heat = R * (1.0 + self.alpha * (x - 20.0)) * self.share * I**2
+                heat = R * (1.0 + self.alpha * (x - 20.0)) * self.share * ampere**2
                 x = lu.solve(self.capacity / step * x + heat + self.water * T + self.air * room)
         return np.array(out)
 
@@ -90,12 +90,13 @@ class Motor:
 def log(path: Path, motor: Motor, seed: int, n: int, water: float, room: float) -> Path:
     """A day of a machine: currents of both signs, held for three minutes, and a cooler that swings."""
     rng, k = np.random.default_rng(seed), np.arange(n)
-    I = np.repeat(rng.choice([0.0, 1.5, 2.5, 3.5, 4.5, 5.5], n // 90 + 1), 90)[:n] * np.where(k // 7 % 2, 1.0, -1.0)
+    held = np.repeat(rng.choice([0.0, 1.5, 2.5, 3.5, 4.5, 5.5], n // 90 + 1), 90)[:n]
+    current = held * np.where(k // 7 % 2, 1.0, -1.0)
     flow = water + 0.6 * np.sin(2 * np.pi * k * STEP / 2700.0) + 0.003 * np.cumsum(rng.standard_normal(n))
-    T = motor.run(I, flow, room)
+    T = motor.run(current, flow, room)
     ohm = 1e4 * np.exp(3950.0 * (1.0 / (T[:, 0] + 273.15) - 1.0 / 298.15)) * (1.0 + 8e-4 * rng.standard_normal(n))
     noisy = np.column_stack([T[:, 1:], flow]) + 0.03 * rng.standard_normal((n, 3))
-    rows = np.column_stack([STEP * k, 1e3 * I, ohm, noisy])
+    rows = np.column_stack([STEP * k, 1e3 * current, ohm, noisy])
     np.savetxt(path, rows, fmt="%.2f", delimiter=",", comments="",
                header="time,Current [mA],NTC [ohm],T_core [degC],T_plate [degC],water [degC]")
     return path

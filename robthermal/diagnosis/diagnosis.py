@@ -130,8 +130,8 @@ class Diagnosis:
         for name, gap in self._gaps():
             lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
                          f"[{gap.unit}]")
-        unseen = len(self.not_testable)
-        lines.append(f"could not have been seen: {unseen} candidate{'s' * (unseen != 1)}")
+        silent = len(self.not_testable)
+        lines.append(f"could not have been seen: {silent} candidate{'s' * (silent != 1)}")
         lines += [] if self.refinement is None else [f"finer network: {self.refinement}"]
         return "\n".join([*lines, str(self.outcome)])
 

@@ -24,7 +24,7 @@ def test_copper_is_named_by_its_coefficient(tmp_path: Path) -> None:
     assert found.alternatives == ((),)
     slope, std, unit = found.effects[0].values["slope"]
     assert unit == "1/K" and abs(slope - ALPHA) < 1.96 * std and std < 0.2 * ALPHA
-    assert found.validation is not None and found.validation.after < 0.75 * found.validation.before
+    assert found.gap["validation"].after < 0.4 * found.gap["validation"].before
 
 
 @pytest.mark.exhaustive

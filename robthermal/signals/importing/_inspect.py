@@ -13,8 +13,8 @@ from .._glitches import glitch_rows
 from .._stated import KEY
 from ._assemble import make_report, say_declared, say_dropped
 from ._cells import NumberReader, take_codes
-from ._clock import time_columns, time_reader
 from ._channel import Channel
+from ._clock import time_columns, time_reader
 from ._open import open_source
 from ._options import Declared, declared, with_own_word
 from ._report import Import, ImportedColumn
