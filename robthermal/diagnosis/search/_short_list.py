@@ -19,7 +19,7 @@ from ._implausible import implausible
 from ._periods import on_all_records
 from ._ramp import as_ramp
 from ._scan import retried, scanned
-from ._starts import BEHIND, Origin, in_reach, started
+from ._starts import BEHIND, Origin, elsewhere, in_reach, started
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
@@ -179,6 +179,7 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
                                     scores.twins(i), best, promise))
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
+    entries = _from_the_best(origin, entries)
     likely = []
     for entry in _reconsidered(fit, map(finished, competitive(entries)), tried):
         why = implausible(entry.candidate, entry.fit, entry.found, entry.twins)
@@ -187,6 +188,20 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
         else:
             likely.append(entry)
     return ShortList(fit, tuple(likely), failed)
+
+
+def _from_the_best(origin: Origin, entries: list[Entry]) -> list[Entry]:
+    """Entries, those of the best's effect at other places from its values too, where these shape the effect."""
+    best = max(entries, key=lambda entry: entry.delta_bic, default=None)
+    if best is None or len(best.candidate.effect.free) < 2:
+        return entries
+    out = []
+    for entry in entries:
+        behind = entry.candidate.effect.name == best.candidate.effect.name and not in_reach(entry.delta_bic,
+                                                                                             best.delta_bic)
+        new = elsewhere(origin, entry.candidate, best.found) if behind else None
+        out.append(entry if new is None or new.rss >= entry.fit.rss else replaced(entry, new))
+    return out
 
 
 def beside(short: ShortList, found: Entry) -> ShortList:

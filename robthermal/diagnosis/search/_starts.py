@@ -7,7 +7,7 @@ truth. The declared parameters are wrong by their priors only.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -78,6 +78,31 @@ def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0
     if worth and not any(new.rss < fit.rss for new in tried):
         tried += _from_nothing(fit, candidate, size, tried, least)
     return min(tried, key=lambda new: new.rss)
+
+
+def elsewhere(origin: Origin, candidate: Candidate, values: Mapping[str, float]) -> Refit | None:
+    """The candidate refitted from the declared parameters and the values that the same effect has at another place.
+
+    There it has pulled the parameters to where a body that is in another place needs them; along a curved valley a few
+    evaluations from the nominal fit do not lead out of it. None where it does not survive its simulation.
+
+    Parameters
+    ----------
+    origin : Origin
+        Fit without the candidate.
+    candidate : Candidate
+        The effect at its place.
+    values : mapping of str to float
+        Value of every quantity of the effect.
+    """
+    try:
+        at = origin.declared
+    except (Diverged, InputError):
+        return None
+    shape = {name: values[name] for name in candidate.shape if name in values}
+    size = values[candidate.effect.size.name]
+    new = _refitted(origin.fit, _Start(at, replace(candidate, shape=shape), at.v, size, origin.fit.rss))
+    return None if new is None else extended(new, new.structure, new.v, _MANY)
 
 
 def _from_nothing(fit: Refit, candidate: Candidate, size: float, tried: list[Refit], least: float) -> list[Refit]:
