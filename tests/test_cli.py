@@ -21,7 +21,7 @@ from commands import Run, Said
 from rich.console import Console
 
 import robthermal as rt
-from robthermal.cli.terminal import duration, progress, progress_bar, show_report
+from robthermal.cli.terminal import duration, noted, progress, progress_bar, show_report
 
 pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
@@ -499,6 +499,13 @@ def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Run, s
     assert [one["what"] for one in understood["actions"] if one["what"] != "converted"] == ["split"]
     assert "note: gap.csv" in done.err
     refused(run("check", system, file, "--record", "gaps=refuse"), "gap.csv", *words, 'gaps = "split"')
+
+
+def test_what_several_stages_say_of_one_file_is_noted_once(capsys: pytest.CaptureFixture[str]) -> None:
+    show = noted()
+    for text in ("log.csv: split", "log.csv: split", "other.csv: split"):
+        show(UserWarning(text), UserWarning, "file", 1)
+    assert capsys.readouterr().err.splitlines() == ["note: log.csv: split", "note: other.csv: split"]
 
 
 def test_check_refuses_celsius_declared_kelvin(run: Run, tmp_path: Path) -> None:

@@ -88,6 +88,10 @@ def test_what_later_stages_cannot_do_is_refused_at_once(tables: str, words: tupl
     ("setpoint = { lover = 5.0 }\n", ("[certify] setpoint: there is no module 'lover'",)),
     ("current = { lower = [1.0, 0.0] }\n", ("[certify] current.lower: [1, 0]", "Write [0, 1].")),
     ('[gate]\ntolerance = "0.1"\n', ("gate.tolerance = '0.1'",)),
+    ("heats = { cold = [0.0, 1.0] }\n", ("unknown key 'certify.heats'", "Did you mean 'heat'?")),
+    ("inputs = { cold = [0.0, 1.0] }\n", ("unknown key 'certify.inputs'", "of another table", "Keys of [certify]")),
+    ("colour = 1\n", ("unknown key 'certify.colour'. Keys of [certify]: temperature, ambient, current, heat,",)),
+    ("[identify.one]\nrecord = []\n", ("unknown key 'identify.one.record'", "Did you mean 'records'?")),
     ('[system]\nname = "x"\n', ("unknown key 'system'", "is a key of another table"))])
 def test_the_project_is_checked_before_anything_is_computed(tables: str, words: tuple[str, ...], tmp_path: Path,
                                                              run: Run) -> None:

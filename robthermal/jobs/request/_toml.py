@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
@@ -65,10 +65,10 @@ def read_toml(path: Path, schema: type[T], remedy: str) -> T:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"is not valid TOML: {error}", where=str(path), remedy="Correct the line it names.") from None
     except ValidationError as error:
-        raise refusal(error, path, remedy, set(_keys(schema))) from None
+        raise refusal(error, path, remedy, schema) from None
 
 
-def refusal(error: ValidationError, path: Path, remedy: str, known: Collection[str] = ()) -> InputError:
+def refusal(error: ValidationError, path: Path, remedy: str, schema: type[BaseModel] | None = None) -> InputError:
     """One clear message for a table that does not fit; unknown keys come first.
 
     Parameters
@@ -79,20 +79,42 @@ def refusal(error: ValidationError, path: Path, remedy: str, known: Collection[s
         File that the table comes from.
     remedy : str
         Where the user finds the keys.
-    known : collection of str, optional
-        Keys of the file's tables, for the nearest one to an unknown key.
+    schema : type, optional
+        Of the file, for the nearest key to an unknown one and the keys of its table.
     """
     faults: list[Any] = error.errors(include_url=False)
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
     place = ".".join(str(word) for word in fault["loc"] if word not in _OF_UNIONS)
     what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
         fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
-    last = str(fault["loc"][-1])
-    if fault["type"] == "extra_forbidden" and last in known:
-        remedy = f"{last!r} is a key of another table: is this the right file, and the right table? {remedy}"
-    elif fault["type"] == "extra_forbidden" and (near := get_close_matches(last, known, n=1, cutoff=_NEAR)):
-        remedy = f"Did you mean {near[0]!r}? {remedy}"
+    if fault["type"] == "extra_forbidden" and schema is not None:
+        remedy = f"{_hint(fault['loc'], schema)}{remedy}"
     return InputError(what, where=str(path), remedy=remedy)
+
+
+def _hint(place: tuple[int | str, ...], schema: type[BaseModel]) -> str:
+    """What an unknown key may have been meant to be: a key of its own table first."""
+    *above, last = (str(word) for word in place)
+    own = list(_own_keys(schema, above))
+    near = get_close_matches(last, own, n=1, cutoff=_NEAR)
+    if near:
+        return f"Did you mean {near[0]!r}? "
+    listed = f"Keys of [{'.'.join(above)}]: {', '.join(own)}. " if above and own else ""
+    if last in (known := set(_keys(schema))):
+        return f"{last!r} is a key of another table: is this the right file, and the right table? {listed}"
+    near = get_close_matches(last, known, n=1, cutoff=_NEAR)
+    return listed or (f"Did you mean {near[0]!r}? " if near else "")
+
+
+def _own_keys(schema: type[BaseModel], above: Sequence[str]) -> Iterator[str]:
+    """Keys of the table below these names; a name that the user chose, as in [identify.NAME], is no key."""
+    tables: list[type[BaseModel]] = [schema]
+    for word in above:
+        inner = [table for own in tables for name, field in own.model_fields.items() if word in (name, field.alias)
+                 for table in _tables(field.annotation)]
+        tables = inner or tables
+    for table in tables:
+        yield from (field.alias or name for name, field in table.model_fields.items())
 
 
 def _keys(schema: type[BaseModel]) -> Iterator[str]:
