@@ -14,7 +14,7 @@ from ...signals import Record
 from ...thermal import Input
 from .._outcomes import DiagnosisCode
 from ..data import DataSet, RecordData, records_of
-from ..fit import Refit, Whitened, filters
+from ..fit import Refit, Whitened, filters, turned
 from ..path import LinearizedRecord
 from ._locate import locate
 
@@ -143,8 +143,9 @@ def unknown_heat(fit: Refit, lump: str | None = None) -> UnknownHeat:
     for _ in range(_ROUNDS):  # Gauss-Newton on parameters and heat together: the fit without heat may be far off
         H = _whitened_response(here, here.system.lump_names.index(lump), knots)
         seen = here.z + H @ heat
-        U, s, Vt = np.linalg.svd(here.project(H) @ root, full_matrices=False)
-        a = U.T @ here.project(seen)
+        rows, small = turned(here.project(H) @ root, here.project(seen))  # as many rows as knots, and one
+        U, s, Vt = np.linalg.svd(rows, full_matrices=False)
+        a = U.T @ small
         rate, gain = _most_likely(s, a)
         found = _posterior(lump, knots, root @ Vt.T, s, a, rate, gain)
         new = np.concatenate(found.heat)
