@@ -37,6 +37,7 @@ _INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resista
                                  "condensation": Condensation, "feedthrough": Feedthrough, "follow": Follow}
 _TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "sensors", "fit")
 
+_LISTED = 5  # further places in a message
 _EXPECTED = {
     "missing": "this key to be present", "greater_than": "a number above {gt}", "greater_than_equal": "at least {ge}",
     "less_than_equal": "at most {le}",
@@ -47,10 +48,22 @@ _EXPECTED = {
 
 
 def refusal(error: ValidationError) -> InputError:
-    """First fault of a pydantic error as an `InputError`."""
+    """First fault of a pydantic error as an `InputError`, whose remedy says where the others are."""
     faults = error.errors(include_url=False)
     # a misspelt key explains a missing one
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    first, own = _of(fault), _place(fault["loc"])
+    others = [place for place in dict.fromkeys(_place(one["loc"]) for one in faults) if place != own]
+    if not others:
+        return first
+    listed = "; ".join(f"{place} {key}".strip() for place, key in others[:_LISTED])
+    more = f"; and {len(others) - _LISTED} more" if len(others) > _LISTED else ""
+    return InputError(first.what, where=first.where, expected=first.expected,
+                      remedy=f"{first.remedy} Not right either: {listed}{more}.")
+
+
+def _of(fault: ErrorDetails) -> InputError:
+    """One fault as a message of its own."""
     place, key = _place(fault["loc"])
     kind = fault["type"]
     if kind == "extra_forbidden":

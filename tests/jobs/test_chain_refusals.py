@@ -91,6 +91,7 @@ def test_what_later_stages_cannot_do_is_refused_at_once(tables: str, words: tupl
     ("heats = { cold = [0.0, 1.0] }\n", ("unknown key 'certify.heats'", "Did you mean 'heat'?")),
     ("inputs = { cold = [0.0, 1.0] }\n", ("unknown key 'certify.inputs'", "of another table", "Keys of [certify]")),
     ("colour = 1\n", ("unknown key 'certify.colour'. Keys of [certify]: temperature, ambient, current, heat,",)),
+    ("heats = 1\n[gate]\nconfidence = true\n", ("'certify.heats'", "Not right either: gate.confidence.")),
     ("[identify.one]\nrecord = []\n", ("unknown key 'identify.one.record'", "Did you mean 'records'?")),
     ('[system]\nname = "x"\n', ("unknown key 'system'", "is a key of another table"))])
 def test_the_project_is_checked_before_anything_is_computed(tables: str, words: tuple[str, ...], tmp_path: Path,

@@ -240,6 +240,18 @@ BAD = {
 }
 
 
+def test_all_places_that_are_not_right_are_listed() -> None:
+    text = BENCH.replace("noise = 0.01", "nois = 0.01").replace("capacity = 50.0", "capacity = -50.0")
+    with pytest.raises(rt.InputError, match="unknown key 'nois'") as refused:
+        parse_system(text.replace("conductance = 0.02", 'conductance = "0.02"'))
+    assert refused.value.remedy == ("Did you mean 'noise'? Not right either: [lumps.hot] capacity; [[links]] number 2 "
+                                    "conductance.")
+    with pytest.raises(rt.InputError, match="capacity = -50.0") as one:
+        parse_system(BENCH.replace("capacity = 50.0", "capacity = -50.0"))
+    assert "either" not in str(one.value)
+
+
+
 @pytest.mark.parametrize("fault", BAD)
 def test_bad_files_are_refused_with_file_place_and_remedy(tmp_path: Path, fault: str) -> None:
     text, message = BAD[fault]

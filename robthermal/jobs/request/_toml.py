@@ -16,6 +16,7 @@ _MAX_BYTES = 10_000_000
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 T = TypeVar("T", bound=BaseModel)
 _NEAR = 0.7  # likeness of a key that is offered for an unknown one
+_LISTED = 5  # further places in a message
 _OF_UNIONS = ("float", "constrained-float", "str", "list[str]")  # where pydantic says which of several types it tried
 
 
@@ -84,12 +85,19 @@ def refusal(error: ValidationError, path: Path, remedy: str, schema: type[BaseMo
     """
     faults: list[Any] = error.errors(include_url=False)
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
-    place = ".".join(str(word) for word in fault["loc"] if word not in _OF_UNIONS)
+    place = _place(fault)
     what = {"missing": f"key {place!r} is missing", "extra_forbidden": f"unknown key {place!r}"}.get(
         fault["type"], f"{place} = {str(fault['input'])[:60]!r}: {fault['msg']}")
     if fault["type"] == "extra_forbidden" and schema is not None:
         remedy = f"{_hint(fault['loc'], schema)}{remedy}"
-    return InputError(what, where=str(path), remedy=remedy)
+    others = [one for one in dict.fromkeys(map(_place, faults)) if one != place]
+    more = f"; and {len(others) - _LISTED} more" if len(others) > _LISTED else ""
+    also = f" Not right either: {'; '.join(others[:_LISTED])}{more}." if others else ""
+    return InputError(what, where=str(path), remedy=remedy + also)
+
+
+def _place(fault: Any) -> str:
+    return ".".join(str(word) for word in fault["loc"] if word not in _OF_UNIONS and "[" not in str(word))
 
 
 def _hint(place: tuple[int | str, ...], schema: type[BaseModel]) -> str:
