@@ -14,6 +14,7 @@ from scipy.linalg import expm
 import robthermal as rt
 from robthermal.diagnosis.plan import resolving
 from robthermal.jobs.diagnose import Diagnosed
+from robthermal.jobs.diagnose._answer import answer_sentence
 
 pytestmark = pytest.mark.usefixtures("sketched")
 ROOM, STEP, NOISE = 295.0, 5.0, 0.02
@@ -109,6 +110,7 @@ def test_gusts_are_no_matter_of_the_network() -> None:
     assert found.verdict == "unexplained" and found.refinement is not None
     one = found.refinement
     assert not one.outcome.ok and "does not remove the remainder" in one.outcome.text
+    assert "the remainder falls" not in answer_sentence(found)
     assert one.after["validation"] > 0.7 * one.before["validation"]
 
 
@@ -124,13 +126,15 @@ def test_a_name_that_stands_for_the_split_is_said_to_do_so() -> None:
                         refine=True)
     assert found.verdict == "named_with_remainder" and found.refinement is not None
     assert found.refinement.verdict == "consistent"
+    assert ", without any effect, the remainder falls from " in answer_sentence(found)
     assert "Without any effect: sensor_lag(T_" in found.refinement.outcome.text
     assert "may stand for the split only" in found.refinement.outcome.text
 
 
 def test_the_folder_holds_the_split_network(halves: rt.diagnosis.Diagnosis, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    rt.jobs.write_diagnosis(Diagnosed(halves, (), (), ()), out)
+    report = rt.jobs.write_diagnosis(Diagnosed(halves, (), (), ()), out)
+    assert "With block in two halves, q at the other one, the remainder falls from " in report.headline
     split = rt.read_system(out / "refined.toml")
     assert split.inputs["q"].lump == "block_2"
     assert split.parameter("links.block-block_2.conductance") == pytest.approx(1.0, rel=0.05)

@@ -22,7 +22,7 @@ def answer_sentence(found: Diagnosis) -> str:
             f"The model lacks {accepted_in_words(found)}{log}")
         both = f"{gap.before:.2g} to {gap.after:.2g} {gap.unit}"
         falls = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records} falls from {both}."
-        return " ".join([f"{said}. {falls}", *map(labels_in_words, found.caveats)])
+        return " ".join([f"{said}. {falls}", *_finer(found), *map(labels_in_words, found.caveats)])
     if found.verdict == "consistent":
         if found.reference:
             return " ".join([nothing_changed(found), *found.caveats])
@@ -42,8 +42,18 @@ def answer_sentence(found: Diagnosis) -> str:
         f"{what}: the error on {records} is {gap.before:.2g} {gap.unit}, noise alone would give {gap.noise:.2g} "
         f"{gap.unit}.")
     last = str(differ) if differ is not None and differ.needed else ""
-    return " ".join([first, *([untried] if unfitted else []), *remarks,
+    return " ".join([first, *_finer(found), *([untried] if unfitted else []), *remarks,
                      *filter(None, [found.means, labels_in_words(found.nearest), last])])
+
+
+def _finer(found: Diagnosis) -> list[str]:
+    """What a lump split in two does to what is left, where that was asked for and helps."""
+    finer = found.refinement
+    if finer is None or not finer.outcome.ok:
+        return []
+    kind = "validation" if "validation" in finer.before else "train"
+    alone = ", without any effect," if found.effects and not finer.effects else ","
+    return [f"With {finer.best}{alone} the remainder falls from {finer.before[kind]:.2g} to {finer.after[kind]:.2g} K."]
 
 
 def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
