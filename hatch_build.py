@@ -33,6 +33,7 @@ FLAGS = ("-std=c11", "-O2", "-fpeel-loops", "-ffp-contract=fast", "-fno-math-err
 X86 = {  # by the width of a vector; the first has to succeed
     4: ("-mavx2", "-mfma"),
     8: ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mfma", "-mprefer-vector-width=512"),
+    2: (),  # any processor
 }
 ARM: dict[int, tuple[str, ...]] = {2: ()}  # every 64-bit one has vectors of two
 PARTS = {"x86_64": X86, "amd64": X86, "aarch64": ARM, "arm64": ARM}
@@ -79,10 +80,10 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def build(source: Path, library: Path) -> None:
-    """Compile `source` to `library`, which appears whole or not at all; one without vectors once, for any processor."""
+    """Compile `source` to `library`, which appears whole or not at all."""
     parts = PARTS.get(platform.machine().lower())
-    if parts and "LANES" not in source.read_text():
-        parts = {1: ("-O3",)}
+    if parts is X86 and '#include "_vectors.h"' in source.read_text():
+        parts = {lanes: flags for lanes, flags in X86.items() if flags}  # 10 s each: numpy does for old processors
     if sys.platform == "win32" or not parts:
         raise RuntimeError(f"it is for x86-64 and ARM64, not Windows; this is {sys.platform} on {platform.machine()}")
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")

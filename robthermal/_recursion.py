@@ -15,19 +15,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._library import library
+from ._library import library, widest
 
 Array = NDArray[np.floating[Any]]
 SOURCE = Path(__file__).with_suffix(".c")
 
 
 @cache
-def compiled(folder: Path = SOURCE.parent) -> Callable[..., None] | None:
-    """The compiled recursion by the library in `folder`; None where it was not built, or from another source."""
+def compiled(folder: Path = SOURCE.parent, lanes: int | None = None) -> Callable[..., None] | None:
+    """The compiled recursion by the library in `folder`; None where it was not built, or from another source.
+
+    With vectors as wide as this processor has, or of so many `lanes`.
+    """
     found = library(SOURCE, folder)
-    if found is None:
+    wide = None if found is None else widest(found, lanes)
+    if found is None or wide is None:
         return None
-    run: Any = found.robthermal_recursion
+    run: Any = found[f"robthermal_recursion_{wide}"]
     run.restype, run.argtypes = None, [ctypes.c_int64] * 4 + [ctypes.c_void_p] * 3
     return run
 

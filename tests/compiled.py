@@ -48,18 +48,18 @@ def folder() -> Path:
 
 
 @cache
-def steps() -> _march.Steps:
-    """The compiled steps of a simulation, from beside their source, or compiled now."""
-    found = _march.library(_with_library(_march.SOURCE, name_of(_march.SOURCE)))
+def steps(lanes: int | None = None) -> _march.Steps:
+    """The compiled steps of a simulation, from beside their source or compiled now, with vectors of so many numbers."""
+    found = _march.library(_with_library(_march.SOURCE, name_of(_march.SOURCE)), lanes)
     if found is None:
         pytest.skip("no library of compiled steps for this compiler and processor")
     return found
 
 
 @cache
-def recursion() -> Callable[..., None]:
+def recursion(lanes: int | None = None) -> Callable[..., None]:
     """The compiled recursion, in the same way."""
-    found = _recursion.compiled(_with_library(_recursion.SOURCE, name_of(_recursion.SOURCE)))
+    found = _recursion.compiled(_with_library(_recursion.SOURCE, name_of(_recursion.SOURCE)), lanes)
     if found is None:
         pytest.skip("no library of the recursion for this compiler and processor")
     return found

@@ -8,13 +8,14 @@ import pytest
 
 from robthermal import _recursion
 from robthermal._all_pole import all_pole
+from robthermal._library import LANES
 from robthermal._recursion import recursion
 
 
-@pytest.fixture(autouse=True, params=["numpy", "C"])
+@pytest.fixture(autouse=True, params=["numpy", *LANES])
 def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both ways of a recursion."""
-    run = compiled.recursion() if request.param == "C" else None
+    """All ways of a recursion: without C, and with vectors of every width that this processor has."""
+    run = None if request.param == "numpy" else compiled.recursion(request.param)
     monkeypatch.setattr(_recursion, "compiled", lambda: run)
 
 

@@ -10,7 +10,6 @@ import ctypes
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
+from .._library import widest
 from ._basis import LocalBasis
 from ._kernel import BlockFit
 from ._normal import WEAK_BOTH, WEAK_PIVOT, WEAK_RESIDUAL, NormalKernel
@@ -25,7 +25,6 @@ from ._records import Spectrum
 
 SOURCE = Path(__file__).with_name("_moments.c")
 _MOST_SIZE, _MOST_COLUMNS = 5, 24  # as in the source
-LANES = (8, 4, 2)  # windows at a time: with AVX-512, with AVX2, on ARM
 _BINS = 9700  # of a chunk: long enough for what a call costs, short enough for two threads to end together
 
 
@@ -64,13 +63,12 @@ def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Solver | 
         found = ctypes.CDLL(os.fspath(folder / library_name(source_text())))
     except OSError:
         return None
-    for wide in LANES if lanes is None else (lanes,):
-        with suppress(AttributeError):  # the compiler had no such instructions
-            size, runs, solve = (found[f"robthermal_{name}_{wide}"] for name in ("problem_size", "runs_here", "solve"))
-            if size() == ctypes.sizeof(_Problem) and runs():
-                solve.argtypes, solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int
-                return solve
-    return None
+    wide = widest(found, lanes)
+    if wide is None or found[f"robthermal_problem_size_{wide}"]() != ctypes.sizeof(_Problem):
+        return None
+    solve: Solver = found[f"robthermal_solve_{wide}"]
+    solve.argtypes, solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int  # type: ignore[attr-defined]
+    return solve
 
 
 def interior_kernel(spectra: Sequence[Spectrum], basis: LocalBasis) -> NormalKernel | CompiledKernel:

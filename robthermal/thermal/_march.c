@@ -2,26 +2,23 @@
  * the derivatives of many samples, what _sensitivity.py does.
  *
  * Called through _march.py, which checks sizes. The heats of a sample are found by the fixed point T = base + M q(T) at
- * its nodes; a sample whose fixed point does not converge, or whose heats are not smooth, is left to the caller.
+ * its nodes; a sample whose fixed point does not converge, or whose heats are not smooth, is left to the caller. The
+ * build compiles this file once for every kind of processor, with vectors of LANES numbers; the names of what is called
+ * from outside end with LANES.
  */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-/* Numbers of a vector, or of some narrower ones where the processor has no more: with GNU's library that is decided
- * where it runs. So many samples are differentiated at a time. */
-enum { TOGETHER = 8 };
-typedef double vec __attribute__((vector_size(64)));
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
-#define WIDEST __attribute__((target_clones("avx512f", "fma", "default")))
-#else
-#define WIDEST
+#ifndef LANES
+#error "hatch_build.py says how wide a vector is"
 #endif
+
+typedef double vec __attribute__((vector_size(8 * LANES)));
 #define PIVOT 1e-2 /* in size, from which a row is divided by it; every diagonal entry is about 1 */
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12, MOST_PAIRS = 64 };
-enum { ROWS = DEGREE * MOST + MOST + 2 * TOGETHER, HEATS = NODES * MOST + TOGETHER };
+enum { ROWS = DEGREE * MOST + MOST + 2 * LANES, HEATS = NODES * MOST + LANES };
 #define INLINE inline __attribute__((always_inline))
-#define APART __attribute__((noinline))
 enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
@@ -147,46 +144,52 @@ static void slopes(int64_t kind, const double *p, double a, double b, double dri
         by[1][k] = -by[0][k];
 }
 
-/* y += A x of TOGETHER rows, or of twice as many, from the first of A on, which is given by columns `apart` numbers from
+static INLINE vec load(const double *from)
+{
+    vec out;
+    memcpy(&out, from, sizeof(vec));
+    return out;
+}
+
+/* y += A x of LANES rows, or of twice as many, from the first of A on, which is given by columns `apart` numbers from
  * one to the next: even and odd ones are summed up by themselves, for sums that do not wait for each other. */
 static INLINE void add_some(int vectors, const double *A, int64_t apart, const double *x, int64_t columns, double *y)
 {
-    vec even[2], odd[2] = {{0.0}, {0.0}}, own;
-    memcpy(even, y, sizeof(vec) * vectors);
+    vec even[2], odd[2];
+    for (int v = 0; v < vectors; v++) {
+        even[v] = load(y + LANES * v);
+        odd[v] = (vec){0.0};
+    }
     int64_t j = 0;
     for (; j + 2 <= columns; j += 2, A += 2 * apart)
         for (int v = 0; v < vectors; v++) {
-            memcpy(&own, A + TOGETHER * v, sizeof(vec));
-            even[v] += own * x[j];
-            memcpy(&own, A + apart + TOGETHER * v, sizeof(vec));
-            odd[v] += own * x[j + 1];
+            even[v] += load(A + LANES * v) * x[j];
+            odd[v] += load(A + apart + LANES * v) * x[j + 1];
         }
     for (int v = 0; v < vectors; v++) {
-        if (j < columns) {
-            memcpy(&own, A + TOGETHER * v, sizeof(vec));
-            even[v] += own * x[j];
-        }
+        if (j < columns)
+            even[v] += load(A + LANES * v) * x[j];
         even[v] += odd[v];
+        memcpy(y + LANES * v, &even[v], sizeof(vec));
     }
-    memcpy(y, even, sizeof(vec) * vectors);
 }
 
-/* y += A x for A (rows, columns) given by columns, `apart` numbers from one to the next: up to TOGETHER - 1 numbers of y
+/* y += A x for A (rows, columns) given by columns, `apart` numbers from one to the next: up to LANES - 1 numbers of y
  * after the last row are written too. */
 static INLINE void add(const double *A, int64_t apart, const double *x, int64_t rows, int64_t columns, double *y)
 {
     int64_t i = 0;
-    for (; i + TOGETHER < rows; i += 2 * TOGETHER)
+    for (; i + LANES < rows; i += 2 * LANES)
         add_some(2, A + i, apart, x, columns, y + i);
     if (i < rows)
         add_some(1, A + i, apart, x, columns, y + i);
 }
 
-/* Heats by target at one node, V = [ports, w]; up to TOGETHER - 1 numbers after them are written too. */
+/* Heats by target at one node, V = [ports, w]; up to LANES - 1 numbers after them are written too. */
 static INLINE void heats(const problem *at, const double *V, double *q)
 {
     double into[2 * MOST_PAIRS];
-    memset(q, 0, sizeof(double) * (at->n_q + TOGETHER - 1));
+    memset(q, 0, sizeof(double) * (at->n_q + LANES - 1));
     for (int64_t pair = 0; pair < at->n_pairs; pair++) {
         const int64_t *place = at->pairs + 4 * pair;
         flow(place[0], at->numbers + NUMBERS * pair, V[place[1]], V[place[2]], place[3] < 0 ? 0.0 : V[place[3]],
@@ -214,11 +217,11 @@ static double roughness(const problem *at, const double *q)
 
 /* Heats q at all nodes of a sample from z, where the temperatures there are V; 0 where the fixed point is not found.
  * base: what rows of K and Ku make of state and drives. */
-static WIDEST APART int fixed_point(const problem *at, const double *z, const double *w, double *V, double *q, double *base)
+static int fixed_point(const problem *at, const double *z, const double *w, double *V, double *q, double *base)
 {
     const int64_t n_ports = at->n_ports, n_q = at->n_q, width = n_ports + at->n_w, nodes = DEGREE * n_ports;
-    double now[DEGREE * MOST + TOGETHER], before = HUGE_VAL;
-    memset(base, 0, sizeof(double) * (nodes + at->n_z + TOGETHER));
+    double now[DEGREE * MOST + LANES], before = HUGE_VAL;
+    memset(base, 0, sizeof(double) * (nodes + at->n_z + LANES));
     add(at->Kt, at->padded, z, nodes + at->n_z, at->n_z, base);
     add(at->Kut, at->padded, w, nodes + at->n_z, at->n_w, base);
     for (int64_t node = 0; node < NODES; node++) {
@@ -231,7 +234,7 @@ static WIDEST APART int fixed_point(const problem *at, const double *z, const do
         memcpy(q + n_q * node, q, sizeof(double) * n_q);
     for (int k = 0; k < ITERATIONS; k++) {
         double change = 0.0;
-        memcpy(now, base, sizeof(double) * (nodes + TOGETHER));
+        memcpy(now, base, sizeof(double) * (nodes + LANES));
         add(at->Mt, at->padded, q, nodes, NODES * n_q, now);
         for (int64_t node = 1; node < NODES; node++)
             for (int64_t i = 0; i < n_ports; i++) {
@@ -280,18 +283,18 @@ static INLINE void by_ports(const problem *at, int64_t n_ports, const double *M,
                     out[n_ports * node + i] += M[n_q * node + j] * G[n_ports * (n_q * node + j) + i];
 }
 
-/* Numbers of TOGETHER samples from `first` on, `apart` from one to the next; beyond the last one they are left out. */
+/* Numbers of LANES samples from `first` on, `apart` from one to the next; beyond the last one they are left out. */
 static INLINE void store(const problem *at, double *to, int64_t apart, int64_t first, vec numbers)
 {
-    for (int64_t lane = 0; lane < TOGETHER && first + lane < at->count; lane++)
+    for (int64_t lane = 0; lane < LANES && first + lane < at->count; lane++)
         to[apart * (first + lane)] = numbers[lane];
 }
 
-/* Derivatives (n_q, n_ports) of the heats by target at one node: one of TOGETHER numbers each, the first at G. */
+/* Derivatives (n_q, n_ports) of the heats by target at one node: one of LANES numbers each, the first at G. */
 static void heat_slopes(const problem *at, const double *V, double *G)
 {
     for (int64_t j = 0; j < at->n_q * at->n_ports; j++)
-        G[TOGETHER * j] = 0.0;
+        G[LANES * j] = 0.0;
     for (int64_t pair = 0; pair < at->n_pairs; pair++) {
         const int64_t *place = at->pairs + 4 * pair;
         double by[2][3];
@@ -301,7 +304,7 @@ static void heat_slopes(const problem *at, const double *V, double *G)
                 const double to = at->scatter[at->padded_q * (2 * pair + side) + j];
                 for (int k = 0; k < 3; k++)
                     if (to != 0.0 && place[1 + k] >= 0 && place[1 + k] < at->n_ports)
-                        G[TOGETHER * (at->n_ports * j + place[1 + k])] += to * by[side][k];
+                        G[LANES * (at->n_ports * j + place[1 + k])] += to * by[side][k];
             }
     }
 }
@@ -313,7 +316,7 @@ static INLINE int solve(vec *rows, int64_t n, int64_t width)
     vec per_pivot[DEGREE * MOST_PORTS];
     for (int64_t k = 0; k < n; k++) {
         const vec pivot = rows[width * k + k];
-        for (int lane = 0; lane < TOGETHER; lane++)
+        for (int lane = 0; lane < LANES; lane++)
             if (!(fabs(pivot[lane]) > PIVOT))
                 return 0;
         per_pivot[k] = 1.0 / pivot;
@@ -333,7 +336,7 @@ static INLINE int solve(vec *rows, int64_t n, int64_t width)
     return 1;
 }
 
-/* Derivatives of TOGETHER samples from `first` on, F of their ends by their starts and `through` of these by what is
+/* Derivatives of LANES samples from `first` on, F of their ends by their starts and `through` of these by what is
  * added at the nodes; at the end of the samples the last one takes the places that are left. */
 static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
 {
@@ -342,7 +345,7 @@ static INLINE int derivatives(const problem *at, int64_t n_ports, int64_t first)
     double base[ROWS], q[HEATS];
     vec G[NODES * MOST * MOST_PORTS], at_nodes[DEGREE * MOST_PORTS * NODES * MOST_PORTS];
     vec at_end[MOST * NODES * MOST_PORTS], rows[DEGREE * MOST_PORTS * (DEGREE * MOST_PORTS + MOST)];
-    for (int64_t lane = 0; lane < TOGETHER; lane++) {
+    for (int64_t lane = 0; lane < LANES; lane++) {
         const int64_t k = first + lane < at->count ? first + lane : at->count - 1;
         double *V = at->V + NODES * per_node * k;
         if (!fixed_point(at, at->z + at->n_z * k, at->w + at->n_w * k, V, q, base))
@@ -393,7 +396,23 @@ static INLINE int of_size(const problem *at, int64_t first)
     }
 }
 
-int64_t robthermal_march_size(void)
+#define JOINED(name, lanes) name##lanes
+#define NAMED(name, lanes) JOINED(name, lanes)
+
+/* Whether this processor has the instructions that this part of the library was compiled for. */
+int NAMED(robthermal_runs_here_, LANES)(void)
+{
+#if defined(__AVX512F__)
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
+           && __builtin_cpu_supports("fma");
+#elif defined(__AVX2__)
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+    return 1;
+#endif
+}
+
+int64_t NAMED(robthermal_march_size_, LANES)(void)
 {
     return sizeof(problem);
 }
@@ -404,11 +423,11 @@ static int fits(const problem *at)
 }
 
 /* Samples that were differentiated: `count`, or fewer where a fixed point is not found. */
-WIDEST int64_t robthermal_derivatives(const problem *at)
+int64_t NAMED(robthermal_derivatives_, LANES)(const problem *at)
 {
     if (!fits(at) || at->n_free > at->n_z)
         return 0;
-    for (int64_t first = 0; first < at->count; first += TOGETHER)
+    for (int64_t first = 0; first < at->count; first += LANES)
         if (!of_size(at, first))
             return first;
     return at->count;
@@ -416,7 +435,7 @@ WIDEST int64_t robthermal_derivatives(const problem *at)
 
 /* Segments that were computed, at most `count` of the first: segment k is as long as a step of kinds[kind[k]].
  * worst: the largest roughness of them. */
-WIDEST int64_t robthermal_march(const problem *kinds, const int64_t *kind, double *worst)
+int64_t NAMED(robthermal_march_, LANES)(const problem *kinds, const int64_t *kind, double *worst)
 {
     const int64_t count = kinds->count, n_z = kinds->n_z, n_w = kinds->n_w;
     *worst = 0.0;

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._library import library as compiled_from
+from .._library import widest
 from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm, RippleTerm
@@ -88,12 +89,16 @@ class _Problem(ctypes.Structure):
 
 
 @cache
-def library(folder: Path = SOURCE.parent) -> Steps | None:
-    """Functions of the library in `folder`; None where it was not built, or from another source."""
+def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Steps | None:
+    """Functions of the library in `folder`; None where it was not built, or from another source.
+
+    With vectors as wide as this processor has, or of so many `lanes`.
+    """
     found = compiled_from(SOURCE, folder)
-    if found is None:
+    wide = None if found is None else widest(found, lanes)
+    if found is None or wide is None:
         return None
-    size, march, derivatives = found.robthermal_march_size, found.robthermal_march, found.robthermal_derivatives
+    size, march, derivatives = (found[f"robthermal_{name}_{wide}"] for name in ("march_size", "march", "derivatives"))
     for function in (size, march, derivatives):
         function.restype = ctypes.c_int64
     if size() != ctypes.sizeof(_Problem):

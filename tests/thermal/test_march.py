@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import robthermal as rt
-from robthermal._library import library_name
+from robthermal._library import LANES, library_name
 from robthermal.thermal import _exponential, _march
 
 PARTS = [("conductance_step", ["plate-hot"], {"relative": -0.3, "time": 40.5}),
@@ -32,11 +32,13 @@ def every(full: rt.System) -> rt.System:
     return full
 
 
-@pytest.fixture
-def lumps(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+@pytest.fixture(params=LANES)
+def lumps(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Temperatures of a simulation by the compiled steps, or without them, and how many segments these were asked for.
+
+    With vectors of every width that this processor has.
     """
-    found = compiled.steps()
+    found = compiled.steps(request.param)
 
     def simulated(system: rt.System, record: rt.Record, tolerance: float, built: bool) -> tuple[np.ndarray, list[int]]:
         counts: list[int] = []
@@ -98,13 +100,15 @@ def test_samples_of_a_delayed_current_are_computed_in_parts(every: rt.System, dr
     np.testing.assert_allclose(here, exact, rtol=0.0, atol=1e-4)
 
 
+@pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("n", [3, 57, 58, 60, 61, 62, 63, 64])
-def test_derivatives_are_those_of_numpy(every: rt.System, drive: Any, monkeypatch: pytest.MonkeyPatch, n: int) -> None:
+def test_derivatives_are_those_of_numpy(every: rt.System, drive: Any, monkeypatch: pytest.MonkeyPatch, n: int,
+                                        lanes: int) -> None:
     """Along one path, by every number of the system; numpy's are tested against differences elsewhere.
 
-    Four samples are differentiated at a time: none, one, two or three are left at the end.
+    As many samples as a vector has numbers are differentiated at a time: none, one or some are left at the end.
     """
-    found = compiled.steps()
+    found = compiled.steps(lanes)
     every = every.with_parameters({"modules.tem.drive.time_constant": 3.0})  # then a drive is a port, too
     names = [name for name in every.parameter_names if not name.endswith((".noise", ".disturbance"))]
     slopes, asked = [], []
