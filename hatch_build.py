@@ -21,9 +21,9 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 KERNELS = {  # sources, each with the headers that belong to it
-    Path("robthermal", "identify", "_moments.c"): ("_vectors.h",),
-    Path("robthermal", "_recursion.c"): (),
-    Path("robthermal", "thermal", "_march.c"): (),
+    Path("robthermal", "identify", "_moments.c"): ("_vectors.h", "../_lanes.h"),
+    Path("robthermal", "_recursion.c"): ("_lanes.h",),
+    Path("robthermal", "thermal", "_march.c"): ("../_lanes.h",),
 }
 # Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor
 # has instructions for. -O2 with peeled loops is as fast as -O3 and takes 10 s instead of 24. Not -ffast-math: numbers
@@ -63,7 +63,7 @@ class KernelHook(BuildHookInterface):  # type: ignore[type-arg]
 
     def _built(self, source: Path, headers: tuple[str, ...]) -> Path:
         """The library of a source: in a folder of its own, or beside the source, where it replaces older ones."""
-        text = b"".join(path.read_bytes() for path in (source, *map(source.with_name, headers)))
+        text = b"".join(path.read_bytes() for path in (source, *(source.parent / name for name in headers)))
         name = f"{source.stem}_{hashlib.sha256(text).hexdigest()[:16]}.so"  # as the package looks for it
         library = getattr(self, "_folder", source.parent) / name
         build(source, library)

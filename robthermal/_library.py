@@ -5,38 +5,46 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 LANES = (8, 4, 2)  # numbers of a vector: with AVX-512, with AVX2, on any processor
 
 
-def library_name(stem: str, text: bytes) -> str:
-    """Name of the library that belongs to a source, as hatch_build.py gives it.
+def library_name(source: Path, headers: Sequence[str]) -> str:
+    """Name of the library that belongs to a source and its headers, as hatch_build.py gives it.
 
     Parameters
     ----------
-    stem : str
-        Name of the source without its suffix.
-    text : bytes
-        What the source holds.
+    source : Path
+        Source in the package.
+    headers : sequence of str
+        What it includes, by their places from its folder.
+
+    Raises
+    ------
+    OSError
+        One of them cannot be read.
     """
-    return f"{stem}_{hashlib.sha256(text).hexdigest()[:16]}.so"
+    text = b"".join(path.read_bytes() for path in (source, *(source.parent / name for name in headers)))
+    return f"{source.stem}_{hashlib.sha256(text).hexdigest()[:16]}.so"
 
 
-def library(source: Path, folder: Path | None = None) -> ctypes.CDLL | None:
+def library(source: Path, headers: Sequence[str], folder: Path | None = None) -> ctypes.CDLL | None:
     """The library of a source; None where it was not built, or from another source.
 
     Parameters
     ----------
     source : Path
         Source in the package.
+    headers : sequence of str
+        What it includes, by their places from its folder.
     folder : Path, optional
         Where the library is; default beside the source.
     """
     try:
-        name = library_name(source.stem, source.read_bytes())
-        return ctypes.CDLL(os.fspath((source.parent if folder is None else folder) / name))
+        return ctypes.CDLL(os.fspath((source.parent if folder is None else folder) / library_name(source, headers)))
     except OSError:
         return None
 

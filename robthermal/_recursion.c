@@ -4,15 +4,11 @@
  * all are the same), b (count, n, m), x (count + 1, n, m) whose first is given. The build compiles this file once for
  * every kind of processor, with vectors of LANES numbers; the names of what is called from outside end with LANES.
  */
-#include <stdint.h>
 #include <string.h>
 
-#ifndef LANES
-#error "hatch_build.py says how wide a vector is"
-#endif
+#include "_lanes.h"
 
 enum { ROWS = 4, WIDE = 2 }; /* of a block, in rows and vectors */
-typedef double vec __attribute__((vector_size(8 * LANES)));
 #define INLINE inline __attribute__((always_inline))
 
 /* One column, four rows at a time, whose sums do not wait for each other. */
@@ -88,9 +84,6 @@ static INLINE void some(int wide, int64_t n, int64_t m, const double *A, const d
         block(1, wide, n, m, A + n * i, b + m * i, now, next + m * i);
 }
 
-#define JOINED(name, lanes) name##lanes
-#define NAMED(name, lanes) JOINED(name, lanes)
-
 void NAMED(robthermal_recursion_, LANES)(int64_t count, int64_t n, int64_t m, int64_t apart, const double *A,
                                          const double *b, double *x)
 {
@@ -110,17 +103,4 @@ void NAMED(robthermal_recursion_, LANES)(int64_t count, int64_t n, int64_t m, in
             }
         }
     }
-}
-
-/* Whether this processor has the instructions that this part of the library was compiled for. */
-int NAMED(robthermal_runs_here_, LANES)(void)
-{
-#if defined(__AVX512F__)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
-           && __builtin_cpu_supports("fma");
-#elif defined(__AVX2__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return 1;
-#endif
 }

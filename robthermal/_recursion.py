@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ._library import library, widest
 
 Array = NDArray[np.floating[Any]]
-SOURCE = Path(__file__).with_suffix(".c")
+SOURCE, HEADERS = Path(__file__).with_suffix(".c"), ("_lanes.h",)
 
 
 @cache
@@ -27,7 +27,7 @@ def compiled(folder: Path = SOURCE.parent, lanes: int | None = None) -> Callable
 
     With vectors as wide as this processor has, or of so many `lanes`.
     """
-    found = library(SOURCE, folder)
+    found = library(SOURCE, HEADERS, folder)
     wide = None if found is None else widest(found, lanes)
     if found is None or wide is None:
         return None

@@ -44,13 +44,13 @@ def built(lanes: int | None = None) -> _compiled.Solver:
 @cache
 def folder() -> Path:
     """Where the library is."""
-    return _with_library(_compiled.SOURCE, _compiled.library_name(_compiled.source_text()))
+    return _with_library(_compiled)
 
 
 @cache
 def steps(lanes: int | None = None) -> _march.Steps:
     """The compiled steps of a simulation, from beside their source or compiled now, with vectors of so many numbers."""
-    found = _march.library(_with_library(_march.SOURCE, name_of(_march.SOURCE)), lanes)
+    found = _march.library(_with_library(_march), lanes)
     if found is None:
         pytest.skip("no library of compiled steps for this compiler and processor")
     return found
@@ -59,21 +59,34 @@ def steps(lanes: int | None = None) -> _march.Steps:
 @cache
 def recursion(lanes: int | None = None) -> Callable[..., None]:
     """The compiled recursion, in the same way."""
-    found = _recursion.compiled(_with_library(_recursion.SOURCE, name_of(_recursion.SOURCE)), lanes)
+    found = _recursion.compiled(_with_library(_recursion), lanes)
     if found is None:
         pytest.skip("no library of the recursion for this compiler and processor")
     return found
 
 
-def name_of(source: Path) -> str:
-    """Name of the library of a source without headers."""
-    return library_name(source.stem, source.read_bytes())
+def name_of(kernel: ModuleType) -> str:
+    """Name of the library of a kernel's source and headers."""
+    return library_name(kernel.SOURCE, kernel.HEADERS)
 
 
-def _with_library(source: Path, name: str) -> Path:
+def copied(kernel: ModuleType, tree: Path, old: str = "", new: str = "") -> Path:
+    """The source of a kernel, its headers beside it, in another tree; with another text in it."""
+    text = kernel.SOURCE.read_text(encoding="utf-8")
+    assert not old or text.count(old) == 1
+    source = tree / kernel.SOURCE.relative_to(ROOT)
+    source.parent.mkdir(parents=True)
+    source.write_text(text.replace(old, new) if old else text + new, encoding="utf-8")
+    for header in kernel.HEADERS:
+        shutil.copy(kernel.SOURCE.parent / header, source.parent / header)
+    return source
+
+
+def _with_library(kernel: ModuleType) -> Path:
     """The folder of a source where its library is, or a new one."""
+    source, name = kernel.SOURCE, name_of(kernel)
     if source.with_name(name).exists():
-        return source.parent
+        return Path(source.parent)
     if shutil.which("cc") is None:
         pytest.skip("no C compiler, and the package was installed without its compiled kernel")
     made = Path(mkdtemp())

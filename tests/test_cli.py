@@ -21,7 +21,7 @@ from commands import Run, Said
 from rich.console import Console
 
 import robthermal as rt
-from robthermal.cli.terminal import duration, noted, progress, progress_bar, show_report
+from robthermal.cli.terminal import duration, progress, progress_bar, show_report
 
 pytestmark = pytest.mark.usefixtures("sketched")
 ROOT = Path(__file__).resolve().parents[1]
@@ -501,11 +501,13 @@ def test_check_splits_at_a_gap_and_says_so_or_refuses_it_where_asked(run: Run, s
     refused(run("check", system, file, "--record", "gaps=refuse"), "gap.csv", *words, 'gaps = "split"')
 
 
-def test_what_several_stages_say_of_one_file_is_noted_once(capsys: pytest.CaptureFixture[str]) -> None:
-    show = noted()
-    for text in ("log.csv: split", "log.csv: split", "other.csv: split"):
-        show(UserWarning(text), UserWarning, "file", 1)
-    assert capsys.readouterr().err.splitlines() == ["note: log.csv: split", "note: other.csv: split"]
+def test_what_is_said_of_two_files_of_one_name_is_said_twice(run: Run, system: Path, tmp_path: Path) -> None:
+    """Notes have the name of a file without its folder: the same text may be about another file."""
+    text = HEADER + "".join(ROWS[:9] + ROWS[13:])
+    for folder in "ab":
+        (tmp_path / folder).mkdir()
+    files = [write(tmp_path / folder / "log.csv", text) for folder in "ab"]
+    assert run("check", system, *files).err.count("note: log.csv: 4 samples") == 2
 
 
 def test_check_refuses_celsius_declared_kelvin(run: Run, tmp_path: Path) -> None:

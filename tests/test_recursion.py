@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import compiled
 import numpy as np
 import pytest
 
 from robthermal import _recursion
 from robthermal._all_pole import all_pole
-from robthermal._library import LANES
+from robthermal._library import LANES, library_name
 from robthermal._recursion import recursion
 
 
@@ -74,3 +76,11 @@ def test_filter_without_zeros_sample_by_sample(roots: list[complex], shape: tupl
     found = all_pole(a, signal)
     assert found.shape == shape
     np.testing.assert_allclose(found, y if np.iscomplexobj(a) else y.real, rtol=1e-12, atol=1e-12)
+
+
+def test_a_header_that_changes_is_another_library(tmp_path: Path) -> None:
+    source = compiled.copied(_recursion, tmp_path)
+    same = library_name(source, _recursion.HEADERS)
+    header = source.with_name("_lanes.h")
+    header.write_text(header.read_text(encoding="utf-8") + " ", encoding="utf-8")
+    assert same == compiled.name_of(_recursion) != library_name(source, _recursion.HEADERS)

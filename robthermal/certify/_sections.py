@@ -56,9 +56,9 @@ def _refuse_effects(system: System, forcing: bool) -> None:
             raise InputError(f"{name} = {system.parameter(name):g} is an effect that no certificate covers yet",
                              where="argument system", expected="a network of links, modules and lumps only",
                              remedy="Certify the system without it (set it to 0), a heat that it adds as a range of "
-                                    "heat, a conductance that it changes as a range of parameters. That covers the box "
-                                    "that is never left; contraction says nothing then of a heat that rises with "
-                                    "temperature.")
+                                    "heat and a conductance that it changes as a range of parameters, each wide enough "
+                                    "for every temperature in the box. That covers the box that is never left; "
+                                    "contraction says nothing then of a heat that rises with temperature.")
 
 
 def _breezy(system: System, lump: str) -> bool:

@@ -30,7 +30,6 @@ from .terminal import (
     calibrations,
     exit_unless,
     free,
-    noted,
     place,
     progress,
     progress_bar,
@@ -364,7 +363,7 @@ def main() -> None:
     """Entry point: one clear message on standard error and exit status 2 for bad input; with --json also as JSON."""
     gc.set_threshold(_OBJECTS)
     warnings.simplefilter("always", UserWarning)
-    warnings.showwarning = noted()
+    warnings.showwarning = lambda message, *rest, **kwargs: typer.echo(f"note: {message}", err=True)
     try:
         status = app(prog_name="robthermal", standalone_mode=False)  # the exit status, or None where all went well
     except _UsageError as error:

@@ -175,15 +175,3 @@ def exit_unless(good: bool) -> None:
     """Exit status 1 where the honest answer is no."""
     if not good:
         raise typer.Exit(1)
-
-
-def noted() -> Callable[..., None]:
-    """Shows every warning once, as a note: stages of a project read the same files."""
-    said: set[str] = set()
-
-    def show(message: Warning | str, *_: object, **__: object) -> None:
-        if str(message) not in said:
-            said.add(str(message))
-            typer.echo(f"note: {message}", err=True)
-
-    return show

@@ -7,8 +7,6 @@ layout of every array are checked here, for the other side trusts them.
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import os
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -17,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from .._arrays import Array
+from .._library import library as compiled_from
 from .._library import widest
 from ._basis import LocalBasis
 from ._kernel import BlockFit
 from ._normal import WEAK_BOTH, WEAK_PIVOT, WEAK_RESIDUAL, NormalKernel
 from ._records import Spectrum
 
-SOURCE = Path(__file__).with_name("_moments.c")
+SOURCE, HEADERS = Path(__file__).with_name("_moments.c"), ("_vectors.h", "../_lanes.h")
 _MOST_SIZE, _MOST_COLUMNS = 5, 24  # as in the source
 _BINS = 9700  # of a chunk: long enough for what a call costs, short enough for two threads to end together
 
@@ -43,28 +42,15 @@ class _Problem(ctypes.Structure):
     )
 
 
-def library_name(text: bytes) -> str:
-    """Name of the library that belongs to the text of a source and its header."""
-    return f"_moments_{hashlib.sha256(text).hexdigest()[:16]}.so"
-
-
-def source_text() -> bytes:
-    """The text that the library has to be compiled from."""
-    return SOURCE.read_bytes() + SOURCE.with_name("_vectors.h").read_bytes()
-
-
 @cache
 def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Solver | None:
     """What solves chunks by the library in `folder`, as many windows at a time as this processor can, or `lanes`.
 
     None where it was not built, or from another source, or for other processors.
     """
-    try:
-        found = ctypes.CDLL(os.fspath(folder / library_name(source_text())))
-    except OSError:
-        return None
-    wide = widest(found, lanes)
-    if wide is None or found[f"robthermal_problem_size_{wide}"]() != ctypes.sizeof(_Problem):
+    found = compiled_from(SOURCE, HEADERS, folder)
+    wide = None if found is None else widest(found, lanes)
+    if found is None or wide is None or found[f"robthermal_problem_size_{wide}"]() != ctypes.sizeof(_Problem):
         return None
     solve: Solver = found[f"robthermal_solve_{wide}"]
     solve.argtypes, solve.restype = [ctypes.POINTER(_Problem)], ctypes.c_int  # type: ignore[attr-defined]

@@ -351,9 +351,6 @@ INLINE int solve_sized(const problem *q, const int n_u, const int n_y, const int
     return 0;
 }
 
-#define JOINED(name, lanes) name##lanes
-#define NAMED(name, lanes) JOINED(name, lanes)
-
 int NAMED(robthermal_solve_, LANES)(const problem *q)
 {
     const int n_u = (int)q->n_u, n_y = (int)q->n_y;
@@ -370,17 +367,4 @@ int NAMED(robthermal_solve_, LANES)(const problem *q)
 int64_t NAMED(robthermal_problem_size_, LANES)(void)
 {
     return sizeof(problem);
-}
-
-/* Whether this processor has the instructions that this part of the library was compiled for. */
-int NAMED(robthermal_runs_here_, LANES)(void)
-{
-#if defined(__AVX512F__)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
-           && __builtin_cpu_supports("fma");
-#elif defined(__AVX2__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return 1;
-#endif
 }

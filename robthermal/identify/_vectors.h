@@ -1,11 +1,6 @@
 /* Vectors of LANES numbers, and sequences of them: the arithmetic of _moments.c. */
-#include <stdint.h>
+#include "../_lanes.h"
 
-#ifndef LANES
-#error "hatch_build.py says how wide a vector is"
-#endif
-
-typedef double vec __attribute__((vector_size(8 * LANES)));
 typedef int64_t mask __attribute__((vector_size(8 * LANES)));
 typedef double complex_number[2];
 

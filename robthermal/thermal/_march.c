@@ -7,14 +7,10 @@
  * from outside end with LANES.
  */
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
-#ifndef LANES
-#error "hatch_build.py says how wide a vector is"
-#endif
+#include "../_lanes.h"
 
-typedef double vec __attribute__((vector_size(8 * LANES)));
 #define PIVOT 1e-2 /* in size, from which a row is divided by it; every diagonal entry is about 1 */
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12, MOST_PAIRS = 64 };
 enum { ROWS = DEGREE * MOST + MOST + 2 * LANES, HEATS = NODES * MOST + LANES };
@@ -396,22 +392,6 @@ static INLINE int of_size(const problem *at, int64_t first)
     }
 }
 
-#define JOINED(name, lanes) name##lanes
-#define NAMED(name, lanes) JOINED(name, lanes)
-
-/* Whether this processor has the instructions that this part of the library was compiled for. */
-int NAMED(robthermal_runs_here_, LANES)(void)
-{
-#if defined(__AVX512F__)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
-           && __builtin_cpu_supports("fma");
-#elif defined(__AVX2__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-    return 1;
-#endif
-}
-
 int64_t NAMED(robthermal_march_size_, LANES)(void)
 {
     return sizeof(problem);
@@ -419,7 +399,8 @@ int64_t NAMED(robthermal_march_size_, LANES)(void)
 
 static int fits(const problem *at)
 {
-    return at->n_ports <= MOST_PORTS && at->n_pairs <= MOST_PAIRS && at->n_ports + at->n_w <= MOST && at->n_q <= MOST && at->n_z <= MOST;
+    return at->n_ports <= MOST_PORTS && at->n_pairs <= MOST_PAIRS && at->n_ports + at->n_w <= MOST && at->n_q <= MOST
+           && at->n_z <= MOST;
 }
 
 /* Samples that were differentiated: `count`, or fewer where a fixed point is not found. */

@@ -23,7 +23,7 @@ from ._module_term import ModuleTerm, RippleTerm
 from ._ports import PortHeat
 from ._terms import Array, NaturalTerm, RadiationTerm
 
-SOURCE = Path(__file__).with_name("_march.c")
+SOURCE, HEADERS = Path(__file__).with_name("_march.c"), ("../_lanes.h",)
 _MOST, _MOST_PORTS, _MOST_PAIRS, _NUMBERS, _BEYOND = 64, 12, 64, 8, 8  # as in the source
 _FINEST = 1e-11  # K: below it a change of a temperature is rounding
 _FEW = 20  # segments, whose kinds are sooner compared one by one
@@ -94,7 +94,7 @@ def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Steps | N
 
     With vectors as wide as this processor has, or of so many `lanes`.
     """
-    found = compiled_from(SOURCE, folder)
+    found = compiled_from(SOURCE, HEADERS, folder)
     wide = None if found is None else widest(found, lanes)
     if found is None or wide is None:
         return None

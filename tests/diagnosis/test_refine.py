@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,7 +127,9 @@ def test_a_name_that_stands_for_the_split_is_said_to_do_so() -> None:
                         refine=True)
     assert found.verdict == "named_with_remainder" and found.refinement is not None
     assert found.refinement.verdict == "consistent"
-    assert ", without any effect, the remainder falls from " in answer_sentence(found)
+    assert " and without any effect, the remainder falls from " in answer_sentence(found)
+    other = replace(found, refinement=replace(found.refinement, effects=("heat_source(block)",)))
+    assert " and a constant heat into block, the remainder falls from " in answer_sentence(other)
     assert "Without any effect: sensor_lag(T_" in found.refinement.outcome.text
     assert "may stand for the split only" in found.refinement.outcome.text
 

@@ -12,10 +12,10 @@ import compiled
 import numpy as np
 import pytest
 
-from robthermal._library import LANES
+from robthermal._library import LANES, library_name
 from robthermal.identify import _compiled
 from robthermal.identify._basis import LocalBasis
-from robthermal.identify._compiled import CompiledKernel, interior_kernel, library, library_name
+from robthermal.identify._compiled import CompiledKernel, interior_kernel, library
 from robthermal.identify._kernel import BlockFit
 from robthermal.identify._normal import NormalKernel
 from robthermal.identify._records import Spectrum
@@ -161,12 +161,13 @@ def test_numpy_takes_what_the_library_does_not_hold(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
-    source = _compiled.source_text()
-    assert library_name(source) != library_name(source + b" ")
-    (tmp_path / library_name(source + b" ")).write_bytes(b"")
+    name, other = compiled.name_of(_compiled), compiled.copied(_compiled, tmp_path / "tree", new=" ")
+    wrong = library_name(other, _compiled.HEADERS)
+    assert name != wrong
+    (tmp_path / wrong).write_bytes(b"")
     assert library(tmp_path) is None
     (tmp_path / "damaged").mkdir()
-    (tmp_path / "damaged" / library_name(source)).write_bytes(b"no library")
+    (tmp_path / "damaged" / name).write_bytes(b"no library")
     assert library(tmp_path / "damaged") is None
 
 
@@ -181,11 +182,7 @@ def test_the_widest_part_that_runs_is_taken(built: _compiled.Solver) -> None:
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A source tree with an old library in it."""
-    folder = tmp_path / "robthermal" / "identify"
-    folder.mkdir(parents=True)
-    shutil.copy(_compiled.SOURCE, folder)
-    shutil.copy(_compiled.SOURCE.with_name("_vectors.h"), folder)
-    (folder / "_moments_0123456789abcdef.so").write_bytes(b"old")
+    compiled.copied(_compiled, tmp_path).with_name("_moments_0123456789abcdef.so").write_bytes(b"old")
     return tmp_path
 
 
@@ -219,7 +216,7 @@ PARTS += "int NAMED(LANES)(void) { return LANES; }\n"
 def test_an_editable_install_replaces_the_old_library(tree: Path) -> None:
     source = tree / "robthermal" / "identify" / "_moments.c"
     source.write_text(PARTS)
-    name = library_name(source.read_bytes() + source.with_name("_vectors.h").read_bytes())
+    name = library_name(source, _compiled.HEADERS)
     assert compiled.built_by_hook(tree, "editable") == {"force_include": {}}
     assert [path.name for path in source.parent.glob("*.so")] == [name]
     wheel = compiled.built_by_hook(tree, "standard")

@@ -127,11 +127,8 @@ def test_what_a_small_pivot_stops_is_left_to_numpy(every: rt.System, drive: Any,
                                                    tmp_path: Path) -> None:
     """Every pivot counts as small there: no sample is differentiated in C, and the derivatives are numpy's."""
     compiled.steps()  # skips without a compiler
-    text, small = _march.SOURCE.read_text(encoding="utf-8"), "#define PIVOT 1e-2"
-    assert text.count(small) == 1
-    other = tmp_path / _march.SOURCE.name
-    other.write_text(text.replace(small, "#define PIVOT 1e9"), encoding="utf-8")
-    compiled.hook()["build"](other, tmp_path / compiled.name_of(_march.SOURCE))
+    other = compiled.copied(_march, tmp_path / "tree", "#define PIVOT 1e-2", "#define PIVOT 1e9")
+    compiled.hook()["build"](other, tmp_path / compiled.name_of(_march))
     found = _march.library(tmp_path)
     assert found is not None
     done, slopes = [], []
@@ -198,9 +195,9 @@ def test_a_sample_without_a_fixed_point_is_not_computed(full: rt.System) -> None
 
 
 def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
-    source, name = _march.SOURCE.read_bytes(), compiled.name_of(_march.SOURCE)
-    assert name == library_name("_march", source) != library_name("_march", source + b" ")
-    (tmp_path / library_name("_march", source + b" ")).write_bytes(b"")
+    name, other = compiled.name_of(_march), compiled.copied(_march, tmp_path / "tree", new=" ")
+    assert name != library_name(other, _march.HEADERS)
+    (tmp_path / library_name(other, _march.HEADERS)).write_bytes(b"")
     assert _march.library(tmp_path) is None
     (tmp_path / "damaged").mkdir()
     (tmp_path / "damaged" / name).write_bytes(b"no library")
@@ -209,11 +206,8 @@ def test_a_library_of_another_source_is_not_loaded(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_hook_builds_it_beside_its_source_or_into_a_wheel(tmp_path: Path) -> None:
-    folder = tmp_path / "robthermal" / "thermal"
-    folder.mkdir(parents=True)
-    shutil.copy(_march.SOURCE, folder)
+    folder, name = compiled.copied(_march, tmp_path).parent, compiled.name_of(_march)
     (folder / "_march_0123456789abcdef.so").write_bytes(b"old")
-    name = compiled.name_of(_march.SOURCE)
     assert compiled.built_by_hook(tmp_path, "editable") == {"force_include": {}}
     assert [path.name for path in folder.glob("*.so")] == [name] and _march.library(folder) is not None
     wheel = compiled.built_by_hook(tmp_path, "standard")

@@ -52,8 +52,10 @@ def _finer(found: Diagnosis) -> list[str]:
     if finer is None or not finer.outcome.ok:
         return []
     kind = "validation" if "validation" in finer.before else "train"
-    alone = ", without any effect," if found.effects and not finer.effects else ","
-    return [f"With {finer.best}{alone} the remainder falls from {finer.before[kind]:.2g} to {finer.after[kind]:.2g} K."]
+    named = [effect.label for effect in found.effects]
+    beside = "" if list(finer.effects) == named else f" and {' and '.join(finer.effects) or 'without any effect'}"
+    return [labels_in_words(f"With {finer.best}{beside}, the remainder falls from {finer.before[kind]:.2g} to "
+                            f"{finer.after[kind]:.2g} K.")]
 
 
 def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:

@@ -9,7 +9,7 @@ from ...errors import InputError
 from .._names import misspelt, suggestion
 from .._thermistor import Thermistor
 from ._channel import Channel
-from ._heater import heater_channel, resistive_channel
+from ._heater import heater_channel
 from ._options import ColumnChoice, Declared
 from ._table import Table
 from ._tokens import short
@@ -185,8 +185,10 @@ def _channel(
     if text is not None and unit_of(text) is None and text == (own or (text if gain == 0.0 else None)):
         return Channel(name, role, place, None, text, *scaling)  # rpm: the system says so, or it is no heat
     unit = _unit(table, name, place, picked, role)
-    if picked is not None and picked.resistance is not None:
-        return _resistive(name, role, place, unit, own, picked.resistance, scaling, where)
+    resistance = None if picked is None else picked.resistance
+    if resistance is not None and role != "input":
+        raise InputError(f"{name!r} is a {_KINDS.get(role, role)}, and a resistance is declared for it", where=where,
+                         expected="a heater, cells in V or A", remedy="Remove resistance.")
     if picked is not None and picked.thermistor is not None:
         return _thermistor(name, role, place, unit, picked.thermistor, scaling, where)
     if role in ("sensor", "ambient"):
@@ -212,15 +214,7 @@ def _channel(
                 remedy=f"Another column? Write --column '{name}=HEADER'.",
             )
         return Channel(name, role, place, unit, kept, *scaling)
-    return heater_channel(name, place, unit, own, gain, scaling, where)
-
-
-def _resistive(name: str, role: str, place: int, unit: Unit | None, own: str | None, resistance: float,
-               scaling: tuple[float, float, bool], where: str) -> Channel:
-    if role != "input":
-        raise InputError(f"{name!r} is a {_KINDS.get(role, role)}, and a resistance is declared for it", where=where,
-                         expected="a heater, cells in V or A", remedy="Remove resistance.")
-    return resistive_channel(name, place, unit, own, resistance, scaling, where)
+    return heater_channel(name, place, unit, own, gain, scaling, where, resistance)
 
 
 def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteristic: Thermistor,

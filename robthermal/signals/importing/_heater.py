@@ -17,8 +17,9 @@ def heater_channel(
     gain: float,
     scaling: tuple[float, float, bool],
     where: str,
+    resistance: float | None = None,
 ) -> Channel:
-    """A heater's column: in W, or in the unit the system file gives the input.
+    """A heater's column: in W, in the unit the system file gives the input, or its voltage or current.
 
     Parameters
     ----------
@@ -34,12 +35,16 @@ def heater_channel(
         Scale and offset, and whether they were declared.
     where : str
         Column, for messages.
+    resistance : float, optional
+        Of a heater whose cells are its voltage or its current, and become its power, U²/R or I² R [Ω].
 
     Raises
     ------
     InputError
-        Units that do not fit.
+        Units that do not fit; a resistance for an input that is kept in another unit than W.
     """
+    if resistance is not None:
+        return _resistive(name, place, unit, own, resistance, scaling, where)
     kept = unit_of(own) if own else None
     if scaling[2]:
         return Channel(name, "input", place, None, own or "W", *scaling)
@@ -78,30 +83,9 @@ def heater_channel(
     )
 
 
-def resistive_channel(name: str, place: int, unit: Unit | None, own: str | None, resistance: float,
-                      scaling: tuple[float, float, bool], where: str) -> Channel:
-    """A heater whose cells are its voltage or its current: they become its power, U²/R or I² R.
-
-    Parameters
-    ----------
-    name, place : str, int
-        Name in the system, and column of the table.
-    unit : Unit or None
-        Unit of the cells.
-    own : str or None
-        Unit that the system gives the input.
-    resistance : float
-        Of the heater [Ω].
-    scaling : tuple of float, float, bool
-        Scale and offset of the cells, before they are squared, and whether they were declared.
-    where : str
-        Column, for messages.
-
-    Raises
-    ------
-    InputError
-        Cells that are neither a voltage nor a current, an input that is kept in another unit than W.
-    """
+def _resistive(name: str, place: int, unit: Unit | None, own: str | None, resistance: float,
+               scaling: tuple[float, float, bool], where: str) -> Channel:
+    """A power by a resistance; scale and offset act before the square."""
     if unit is None or unit.quantity not in _ELECTRIC:
         raise InputError(f"a resistance is declared for {name!r}, and the column is in {unit.name if unit else '?'}",
                          where=where, expected="V, mV, A or mA: the voltage or the current of the heater",
