@@ -13,7 +13,7 @@ from ._exact import Malformed, short
 from ._lines import Lines
 from ._result import Answer, not_covered, not_valid, valid
 from ._thermal import Network, check_cost
-from ._uncertain import read_network
+from ._uncertain import read_network, with_rises
 
 METHODS = ("sum", "max", "energy", "lyapunov")
 
@@ -32,7 +32,7 @@ class Problem:
 
 def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     """Return the problem of the sections of a certificate."""
-    network = read_network(parts["system"], parts["region"], gains=True)
+    network = with_rises(read_network(parts["system"], parts["region"], gains=True, heaters=True))
     evidence, n = parts["evidence"], len(network.lumps)
     method = text(get(evidence, "method", "evidence"), "evidence.method")
     if method not in METHODS:

@@ -15,7 +15,7 @@ FORMAT = "robthermal-certificate/1"
 SECTIONS = ("system", "region", "evidence", "margin", "made_by")
 _LARGEST = 20_000_000  # bytes
 _DEEPEST = 100  # nested objects and lists
-# effects of a system file that no claim takes into account
+# effects of a system file beyond the plain network
 _EFFECTS = frozenset(("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson",
                       "joule_split", "hysteresis", "drive", "power_slope", "feedthrough", "self_heating"))
 
@@ -163,11 +163,11 @@ def only(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
             raise Malformed(f"{where}: unknown key {short(key)}")
 
 
-def no_effects(table: Mapping[str, Any], where: str) -> None:
-    """Refuse the names of effects that no claim takes into account; other unknown keys are notes."""
+def no_effects(table: Mapping[str, Any], where: str, known: Sequence[str] = ()) -> None:
+    """Refuse the names of effects that the claim does not take into account; other unknown keys are notes."""
     for key in table:
-        if key in _EFFECTS:
-            raise Malformed(f"{where}: {key!r} is an effect that no claim takes into account")
+        if key in _EFFECTS and key not in known:
+            raise Malformed(f"{where}: {key!r} is an effect that this claim does not take into account")
 
 
 def margin(table: Mapping[str, Any], key: str) -> Any:

@@ -62,6 +62,10 @@ def _thermal(system: Mapping[str, Any]) -> list[Any]:
              [Name(name) for name in system["ambients"]],
              [_link(link) for link in system["links"]],
              [_module(name, module) for name, module in system["modules"].items()]]
+    if heaters := [[Name(name), Name(item["lump"]), item["power_slope"], item["reference_temperature"]]
+                   for name, item in system.get("inputs", {}).items()
+                   if isinstance(item, Mapping) and "power_slope" in item]:
+        found += [Name("inputs"), heaters]
     if "operating" in system:
         operating = system["operating"]
         found += [Name("scheduled"), [operating["temperature"][name] for name in system["lumps"]],

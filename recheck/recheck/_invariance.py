@@ -29,7 +29,7 @@ class Problem:
 def read(parts: Mapping[str, Mapping[str, Any]]) -> Problem:
     """Return the problem of the sections of a certificate."""
     region = parts["region"]
-    network = read_network(parts["system"], region, gains=True)
+    network = read_network(parts["system"], region, gains=True, heaters=True)
     given = get(region, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")
     loads = mapping(region.get("heat", {}), "region.heat")
@@ -78,6 +78,8 @@ class _Face:
         """Return the largest outward heat [W]: a bound, or (inner) a value that is attained."""
         network = self.problem.network
         total = self.sign * self.problem.heat[self.lump][self.side] if self.lump in self.problem.heat else ZERO
+        total += sum((self.sign * heater.heat(self.own)[self.side] for heater in network.heaters
+                      if heater.lump == self.lump), ZERO)
         members: dict[int, list[int]] = {}
         for k in modules:
             module = network.modules[k]

@@ -109,15 +109,21 @@ def _region(network: Network) -> str:
                                            if currents else "")
 
 
+def _heaters(network: Network) -> str:
+    powers = ", ".join(f"{short(heater.name)} in {_span(heater.power)} W at {decimal(heater.reference)} K"
+                       for heater in network.heaters)
+    return f", heater powers {powers}, linear in the temperatures of their lumps" if powers else ""
+
+
 def _rate(rate: Fraction) -> str:
     return f"decays at least as exp(-rate t), rate = {decimal(rate)} 1/s" if rate > 0 else "decays strictly"
 
 
 def _contraction_claim(problem: _contraction.Problem, parts: Parts) -> str:
     network = problem.network
-    return (f"The {_subject(network, parts)}, contracts for all {_region(network)}: between any two trajectories under "
-            f"the same inputs, as long as both stay in this box {_BOX}, {_NORMS[problem.method]} (method "
-            f"{problem.method}) {_rate(problem.rate)}.")
+    return (f"The {_subject(network, parts)}, contracts for all {_region(network)}{_heaters(network)}: between any two "
+            f"trajectories under the same inputs, as long as both stay in this box {_BOX}, {_NORMS[problem.method]} "
+            f"(method {problem.method}) {_rate(problem.rate)}.")
 
 
 def _invariance_claim(problem: _invariance.Problem, parts: Parts) -> str:
@@ -125,8 +131,8 @@ def _invariance_claim(problem: _invariance.Problem, parts: Parts) -> str:
     inputs = [f"ambient {short(name)} in {_span(box)} K" for name, box in problem.ambient.items()]
     inputs += [f"heat load on {short(network.lumps[k])} in {_span(box)} W" for k, box in problem.heat.items()]
     words = f", for all {', '.join(inputs)}" if inputs else ""
-    return (f"The {_subject(network, parts)}, never leaves the box of {_region(network)}, once its temperatures are in "
-            f"it{words}, with no other heat.")
+    return (f"The {_subject(network, parts)}, never leaves the box of {_region(network)}{_heaters(network)}, once its "
+            f"temperatures are in it{words}, with no other heat.")
 
 
 def _gain_claim(problem: _gain.Problem, parts: Parts) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 from ._document import get, interval, intervals, kelvin, mapping, no_effects, not_negative, positive, sequence, text
 from ._exact import ZERO, Interval, Malformed, NotCovered, exact, power, short
+from ._heaters import Heater, read_heaters
 
 Quadratic = tuple[Fraction, Fraction, Fraction]  # a + b I + c I²
 Form = tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction], tuple[Fraction, Fraction]]
@@ -98,14 +99,18 @@ class Network:
     temperature: tuple[Interval, ...]
     current: tuple[Interval, ...]
     parameters: Mapping[str, Interval]
+    heaters: tuple[Heater, ...] = ()
 
 
-def read_nominal(system: Mapping[str, Any], region: Mapping[str, Any]) -> Network:
-    """Return network and box of a certificate, every number the one of the system."""
+def read_nominal(system: Mapping[str, Any], region: Mapping[str, Any], *, heaters: bool = False) -> Network:
+    """Return network and box of a certificate, every number the one of the system.
+
+    ``heaters``: whether the claim takes heaters into account whose power follows temperature.
+    """
     no_effects(system, "system")
     if system.get("temperature_unit", "K") != "K":
         raise Malformed("system: temperatures are not in kelvin")
-    _check_devices(system)
+    _check_devices(system, heaters)
     listed = mapping(get(system, "lumps", "system"), "system.lumps")
     if not listed:
         raise Malformed("system.lumps: none")
@@ -125,7 +130,7 @@ def read_nominal(system: Mapping[str, Any], region: Mapping[str, Any]) -> Networ
     current = intervals(get(region, "current", "region"), list(tables), "region.current")
     network = Network(title, lumps, ambients, tuple(capacity), tuple(links), tuple(modules),
                       _temperatures(get(region, "temperature", "region"), lumps), tuple(current.values()),
-                      read_parameters(region))
+                      read_parameters(region), read_heaters(system, region, lumps) if heaters else ())
     return network
 
 
@@ -144,10 +149,10 @@ def peak(quadratic: Quadratic, currents: Interval) -> Fraction:
     return max(a + x * (b + c * x) for x in points)
 
 
-def _check_devices(system: Mapping[str, Any]) -> None:
-    inputs = mapping(system.get("inputs", {}), "system.inputs")
+def _check_devices(system: Mapping[str, Any], heaters: bool) -> None:
+    inputs, known = mapping(system.get("inputs", {}), "system.inputs"), ("power_slope",) if heaters else ()
     for name in inputs:
-        no_effects(mapping(inputs[name], f"input {short(name)}"), f"input {short(name)}")
+        no_effects(mapping(inputs[name], f"input {short(name)}"), f"input {short(name)}", known)
     sensors = system.get("sensors", ())
     for sensor in sensors.values() if isinstance(sensors, Mapping) else sequence(sensors, "system.sensors"):
         if isinstance(sensor, Mapping):
@@ -219,6 +224,7 @@ def check_cost(network: Network, times: int = 1) -> None:
     numbers = [value for link in network.links for value in (*link.conductance, *link.gain, *link.radiation)]
     numbers += [value for module in network.modules for pair in module.nominal for value in pair]
     numbers += [value for box in (*network.temperature, *network.current) for value in box]
+    numbers += [value for heater in network.heaters for value in (*heater.slope, *heater.power, heater.reference)]
     bits = max((value.numerator.bit_length() + value.denominator.bit_length() for value in numbers), default=0)
     parts = sum(40 if link.gain[1] else 2 for link in network.links)
     parts += sum(40 * len(module.forms) for module in network.modules)

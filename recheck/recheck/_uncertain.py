@@ -8,16 +8,20 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
-from ._exact import Interval, Malformed, NotCovered, short
+from ._exact import ZERO, Interval, Malformed, NotCovered, short
 from ._hash import link_name
-from ._thermal import PROPERTIES, Form, Network, read_nominal
+from ._thermal import PROPERTIES, Form, Link, Network, read_nominal
 
 _MOST = 300  # uncertain numbers
 
 
-def read_network(system: Mapping[str, Any], region: Mapping[str, Any], *, gains: bool = False) -> Network:
-    """Return network and box of a certificate; ``gains``: also gain and radiation of links may be uncertain."""
-    network = read_nominal(system, region)
+def read_network(system: Mapping[str, Any], region: Mapping[str, Any], *, gains: bool = False,
+                 heaters: bool = False) -> Network:
+    """Return network and box of a certificate; ``gains``: also gain and radiation of links may be uncertain.
+
+    ``heaters``: the claim takes heaters into account whose power follows temperature.
+    """
+    network = read_nominal(system, region, heaters=heaters)
     if len(network.parameters) > _MOST:
         raise NotCovered(f"{len(network.parameters)} uncertain numbers are too many, at most {_MOST}")
     index: dict[str, list[int]] = {}
@@ -36,6 +40,8 @@ def read_network(system: Mapping[str, Any], region: Mapping[str, Any], *, gains:
             network = _link(network, links[part], box, key)
         elif gains and (table, last, key) == ("links", "natural", "gain") and owner in links:
             network = _link(network, links[owner], box, key)
+        elif (table, key) == ("inputs", "power_slope") and part in [heater.name for heater in network.heaters]:
+            network = _slope(network, part, box)
         elif not (table == "modules" and last in PROPERTIES and key in ("value", "slope")):
             raise Malformed(f"region.parameters[{short(parameter)}]: no such number can be uncertain")
     return _with_forms(network)
@@ -58,6 +64,20 @@ def _link(network: Network, k: int, box: Interval, key: str) -> Network:
     if box[0] < 0:
         raise Malformed(f"region.parameters: a {key} may be negative")
     return replace(network, links=(*network.links[:k], given, *network.links[k + 1:]))
+
+
+def _slope(network: Network, name: str, box: Interval) -> Network:
+    own = next(heater for heater in network.heaters if heater.name == name)
+    _contains(box, own.slope[0], name)
+    return replace(network, heaters=tuple(replace(heater, slope=box) if heater is own else heater
+                                          for heater in network.heaters))
+
+
+def with_rises(network: Network) -> Network:
+    """Return the network with the slope of every heat of a heater as a link to somewhere, of conductance below zero."""
+    links = [Link((heater.lump, ""), (-heater.rise[1], -heater.rise[0]), (ZERO, ZERO), ZERO, (ZERO, ZERO))
+             for heater in network.heaters]
+    return replace(network, links=(*network.links, *links))
 
 
 def _with_forms(network: Network) -> Network:

@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, establish, not_certified
 from ._energy import energy_rate
+from ._heaters import following
 from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, short_matrices
 from ._polytope import MOST
@@ -33,6 +34,8 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
                 large: bool = False) -> Certificate:
     """Certify that a network contracts for every temperature and current in a box.
 
+    Heaters whose power follows temperature (`power_slope`) may have any power within their declared limits.
+
     Parameters
     ----------
     system : System
@@ -45,7 +48,8 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
         Norm: V = eᵀEe, weighted l₁ (cᵀJ < 0), weighted l∞ (J d < 0), V = eᵀPe.
     parameters : mapping, optional
         Uncertain numbers of the system, {parameter name: (lower, upper)} in their own units: capacities of lumps,
-        conductances of links, values and slopes of modules. The claim then covers every combination.
+        conductances of links, values and slopes of modules, slopes of the powers of heaters. The claim then covers
+        every combination.
     structure : {"full", "block"}
         Method "lyapunov": any P, or one without entries between hot side, cold side and the faces of the modules,
         Evers (2021), (5.20).
@@ -60,7 +64,8 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     Raises
     ------
     InputError
-        Boxes that do not fit the system, Celsius, unknown method or parameter, a large system with method "lyapunov".
+        Boxes that do not fit the system, Celsius, unknown method or parameter, a large system with method "lyapunov", a
+        heater whose power follows temperature and that has no limits.
 
     References
     ----------
@@ -78,7 +83,7 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
     if method not in METHODS:
         raise InputError(f"method = {method!r}", where="argument method",
                          expected='"energy", "sum", "max" or "lyapunov"')
-    system_part = system_section(system, forcing=True)
+    system_part = system_section(system, forcing=True, heaters=following(system, parameters))
     region = region_section(system, current, temperature, parameters)
     parts: dict[str, Any] = {"system": system_part, "region": region}
     if method == "lyapunov":

@@ -7,7 +7,7 @@ stays in it, whatever the currents, heaters and ambients do within their ranges.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..verification import Certificate, not_certified
 from ._contraction import Method, contraction
 from ._energy import energy_rate
 from ._faces import Array, Faces
+from ._heaters import following, power_ranges
 from ._invariance import invariance
 from ._jacobian import box_jacobian
 from ._lyapunov import Structure
@@ -94,7 +95,8 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     ambient : mapping, optional
         {ambient: (lower, upper)} [K]; default nominal.
     heat : mapping, optional
-        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters.
+        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters. Not in it are heaters
+        whose power follows temperature: their declared limits always count.
     method : {"energy", "sum", "max", "lyapunov"}
         Norm of the contraction.
     structure, large
@@ -120,14 +122,14 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     >>> found.holds
     True
     """
-    system_section(system)  # refuses effects before they meet the box
+    system_section(system, heaters=following(system, parameters))  # refuses effects before they meet the box
     currents = current_box(system, current)
     ranges = parameter_box(system, parameters or {})
     around = ambient_ranges(system, ambient, parameters)
-    heat = heat_ranges(system, heat, parameters)
+    heat, power = heat_ranges(system, heat, parameters), power_ranges(system, parameters)
 
     def faces(kept: Mapping[str, Any]) -> Faces:
-        return Faces(system, around, heat, kept, RESERVE)
+        return Faces(system, around, heat, kept, RESERVE, power)
 
     box = box_with_reserve(faces(ranges), currents)
     if box is None:
@@ -149,8 +151,7 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
 def box_with_reserve(faces: Faces, current: Mapping[str, Any]) -> Array | None:
     """Smallest box that is never left, with as much of the reserve of the faces as there is; None if there is none."""
     for share in _TIGHTER:
-        box = smallest_box(Faces(faces.system, faces.ambient, faces.heat, faces.parameters, share * faces.reserve),
-                           current)
+        box = smallest_box(replace(faces, reserve=share * faces.reserve), current)
         if box is not None:
             return box
     return None
@@ -163,12 +164,12 @@ def named_box(system: System, box: Array) -> dict[str, Interval]:
 
 def no_box(system: System, current: Currents) -> Certificate:
     """The refusal where no box was found."""
-    region = region_section(system, current, (COLDEST, HOTTEST))
+    region, heaters = region_section(system, current, (COLDEST, HOTTEST)), following(system)
     reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
               f"diverges, or its box would reach below {COLDEST:g} K or above {HOTTEST:g} K. Narrow the currents, or "
               "improve the heat sink.")
-    return not_certified("invariance", system=system_section(system), region=region, evidence={}, reason=reason,
-                         made_by=made_by("Newton's method on the faces", "none"))
+    return not_certified("invariance", system=system_section(system, heaters=heaters), region=region, evidence={},
+                         reason=reason, made_by=made_by("Newton's method on the faces", "none"))
 
 
 def _limiting(ranges: Mapping[str, Any], better: Any) -> str | None:
@@ -189,7 +190,8 @@ def _rate(system: System, current: Mapping[str, Any], ranges: Mapping[str, Any],
     if box is None:
         return -np.inf
     temperature = {name: list(pair) for name, pair in named_box(system, box).items()}
-    return energy_rate(box_jacobian(system, {"temperature": temperature, "current": current, "parameters": ranges}))
+    return energy_rate(box_jacobian(system, {"temperature": temperature, "current": current, "parameters": ranges,
+                                             "power": faces.power}))
 
 
 def _outcome(stays: Certificate, shrinks: Certificate, box: dict[str, Interval]) -> Outcome:

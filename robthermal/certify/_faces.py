@@ -6,8 +6,9 @@ Used to *find* boxes; the proof is the checker's. The lump is on its face, every
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
 
 from ..thermal import System
+from ._heaters import reference, slope_of
 from ._jacobian import module_variants
 from ._sections import Interval
 
@@ -58,6 +60,8 @@ class Faces:
         {name: (lower, upper)} of uncertain numbers that the checker of boxes covers.
     reserve : float
         Share of every single heat (of a link, Peltier, Joule, conducted) by which it may be off, all at once.
+    power : mapping
+        {heater: (lower, upper)} of heaters that follow temperature, their power at the reference temperature [W].
     """
 
     system: System
@@ -65,6 +69,7 @@ class Faces:
     heat: Mapping[str, Interval]
     parameters: Mapping[str, Any]
     reserve: float = 0.0
+    power: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -107,6 +112,7 @@ class Faces:
         for side in (0, 1):
             self._add_links(side, nodes[side], add)
             self._add_modules(side, nodes, current, add)
+            self._add_heaters(side, nodes[side], add)
             heat[side] += SIGNS[side] * self._loads[side] + self.reserve * np.abs(self._loads[side]) + self.margin
         shape = (2 * self.count, 2 * self.count)
         entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
@@ -135,6 +141,24 @@ class Faces:
                 flow, by_own, end, by_far = found
                 add(side, np.array([own]), np.array([flow]), np.array([by_own]), np.array([far]), end,
                     np.array([by_far]))
+
+    def _add_heaters(self, side: int, nodes: Array, add: Any) -> None:
+        nowhere, none = np.array([self.count]), np.zeros(1)
+        for lump, corners in self._heaters:
+            warmer = nodes[lump] - reference(self.system)
+            heats = [q * (1 + s * warmer) for q, s in corners]
+            flow, (q, s) = max((SIGNS[side] * heat + self.reserve * abs(heat), pair)
+                               for heat, pair in zip(heats, corners, strict=True))
+            add(side, np.array([lump]), np.array([flow]), np.array([q * s]), nowhere, side, none)
+
+    @cached_property
+    def _heaters(self) -> list[tuple[int, list[Interval]]]:
+        """Lump, and corners (power at the reference temperature [W], slope [1/K]), of heaters that follow it."""
+        found = []
+        for name, powers in self.power.items():
+            slope = self._range(slope_of(name), self.system.inputs[name].power_slope or 0.0)
+            found.append((self.system.lump_names.index(self.system.inputs[name].lump), list(product(powers, slope))))
+        return found
 
     @cached_property
     def margin(self) -> Array:

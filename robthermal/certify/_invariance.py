@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from ..thermal import System
 from ..verification import Certificate, establish
+from ._heaters import following
 from ._sections import (
     Currents,
     Interval,
@@ -35,7 +36,8 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     ambient : mapping, optional
         {ambient: (lower, upper)} [K]; default its nominal temperature.
     heat : mapping, optional
-        {lump: (lower, upper)} extra heat, heaters and loads [W]; default none.
+        {lump: (lower, upper)} extra heat, heaters and loads [W]; default none. Not in it are heaters whose power
+        follows temperature: their declared limits count.
     parameters : mapping, optional
         Uncertain numbers of the system as in `contraction`.
 
@@ -61,5 +63,6 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
     if heat:
         region["heat"] = named_ranges(heat, system.lump_names, "heat", "lump")
-    return establish("invariance", system=system_section(system), region=region, evidence={},
+    section = system_section(system, heaters=following(system, parameters))
+    return establish("invariance", system=section, region=region, evidence={},
                      made_by=made_by("none", "checked directly"))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..thermal import Equations, System
+from ._heaters import slope_of
 
 Array = NDArray[np.float64]
 _CURRENTS = 9  # samples of a current range where the blocks are not convex in it
@@ -22,7 +23,7 @@ _CURRENTS = 9  # samples of a current range where the blocks are not convex in i
 
 @dataclass(frozen=True)
 class Block:
-    """Entries [[aa, ab], [ba, bb]] of one module or nonlinear link at its vertices; b is -1 for an ambient.
+    """Entries [[aa, ab], [ba, bb]] of one module, nonlinear link or heater at its vertices; b is -1 for no lump.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ class BoxJacobian:
     base : csr_array, shape (n, n)
         Conductance matrix of the linear links [W/K].
     blocks : tuple of Block
-        Modules (with all of their conductance) and nonlinear links.
+        Modules (with all of their conductance), nonlinear links, heaters that follow temperature.
     """
 
     capacity: NDArray[np.float64]
@@ -61,7 +62,7 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
 
     ``hull`` takes the corners of the triangle around the curve (I, I²) instead of points of it, as the checker does
     for a full matrix P. Uncertain capacities enter at their upper end, uncertain links as a block, uncertain modules as
-    more vertices.
+    more vertices, heaters whose power follows temperature as blocks.
     """
     parameters = region.get("parameters", {})
     worst = system.with_parameters(
@@ -93,6 +94,11 @@ def box_jacobian(system: System, region: Mapping[str, Any], *, hull: bool = Fals
         if link.natural is not None or link.radiation is not None:
             slopes = _link_vertices(link, ends[a], ends[b], parameters, ambient=b not in index)
             blocks.append(Block(index[a], index.get(b, -1), slopes))
+    for name, powers in region.get("power", {}).items():
+        heater = system.inputs[name]
+        slopes = parameters.get(slope_of(name), (heater.power_slope,))
+        rises = np.unique([q * s for q, s in product(powers, slopes)])
+        blocks.append(Block(index[heater.lump], -1, rises[:, None, None] * np.array([[1.0, 0.0], [0.0, 0.0]])))
     return BoxJacobian(eq.capacity, csr_array(base), tuple(blocks))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from .._celsius import ADD_ZERO
 from ..errors import InputError
 from ..thermal import System
+from ._heaters import LATE, MORE, following, heater_sections, power_ranges, slope_of
 
 Interval = tuple[float, float]
 Currents = Mapping[str, Interval]
@@ -26,33 +27,33 @@ _HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to t
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
-            "inputs": ("drive.gain", "drive.offset", "drive.gain_slope", "drive.cubic", "drive.clip", "drive.delay",
-                       "drive.time_constant", "feedthrough.share")}
+            "inputs": (*MORE, *LATE)}
 
 
-def system_section(system: System, *, forcing: bool = False) -> dict[str, Any]:
+def system_section(system: System, *, forcing: bool = False, heaters: tuple[str, ...] = ()) -> dict[str, Any]:
     """Every number of a thermal network that a claim depends on, kelvin.
 
     Effects that no checker knows are refused: a certificate must not leave out a heat. With `forcing`, for claims on
-    ∂f/∂x alone, those pass that are not part of it.
+    ∂f/∂x alone, those pass that are not part of it. `heaters` are those, following temperature, that the claim knows.
     """
     if not isinstance(system, System):
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
-    _refuse_effects(system, forcing)
+    inputs = {"inputs": heater_sections(system, heaters)} if heaters else {}
+    _refuse_effects(system, forcing, {slope_of(name) for name in heaters})
     return {"name": system.name,
             "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
             "ambients": list(system.ambients),
             "links": [_link(link) for link in system.links],
-            "modules": {name: _module(module) for name, module in system.modules.items()}}
+            "modules": {name: _module(module) for name, module in system.modules.items()}, **inputs}
 
 
-def _refuse_effects(system: System, forcing: bool) -> None:
+def _refuse_effects(system: System, forcing: bool, known: set[str]) -> None:
     for name in system.effects:
         table, _, rest = name.partition(".")
         passes = forcing and (any(rest.endswith("." + field) for field in _FORCING.get(table, ()))
                               or (rest.endswith(".gradient") and not _breezy(system, rest.removesuffix(".gradient"))))
-        if not passes:
+        if not passes and name not in known:
             raise InputError(f"{name} = {system.parameter(name):g} is an effect that no certificate covers yet",
                              where="argument system", expected="a network of links, modules and lumps only",
                              remedy="Certify the system without it (set it to 0), a heat that it adds as a range of "
@@ -88,6 +89,8 @@ def region_section(system: System, current: Currents, temperature: Temperatures,
     region = {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
     if ranges := parameter_box(system, parameters or {}):
         region["parameters"] = ranges
+    if powers := power_ranges(system, parameters):
+        region["power"] = powers
     return region
 
 
@@ -98,22 +101,23 @@ def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[st
     heats and ambients depends on it.
     """
     every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
-    ranges = {}
+    slopes, ranges = set(map(slope_of, following(system, parameters))), {}
     for name, (low, high) in every.items():
         where, value = f"argument parameters[{name!r}]", system.parameter(name)
         outside = name.startswith(_NOT_OF_THE_NETWORK) and not name.endswith(_HEATING)
         if outside or name.endswith((".disturbance", ".initial")):
             continue
-        if not name.endswith(_UNCERTAIN):
+        follows = name in slopes
+        if not follows and not name.endswith(_UNCERTAIN):
             raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
                              expected="ranges of capacities, conductances, natural.gain and radiation of links, "
-                                      "and values and slopes of modules",
+                                      "values and slopes of modules, and power_slope of heaters",
                              remedy="Leave it out of `parameters`, and hold it at its value in the calibration too.")
         if not low <= value <= high:
             raise InputError(f"({low}, {high}) excludes the system's own value {value}", where=where,
                              expected="lower <= value <= upper")
         positive = low > 0 or (low == 0 and name.startswith("links."))
-        if not positive and not name.endswith(".slope"):
+        if not positive and not follows and not name.endswith(".slope"):
             raise InputError(f"({low}, {high})", where=where, expected="positive numbers; of links also 0")
         ranges[name] = [low, high]
     return ranges

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ..errors import InputError
 from ..thermal import System
+from ._heaters import following
 from ._sections import Currents, Interval, Temperatures, named_ranges, region_section
 
 _HARMLESS = ("gain", "drive.delay", "drive.time_constant")  # ranges that are counted, or keep heat within its limits
@@ -24,7 +25,8 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Returns
     -------
     dict
-        {lump: (lower, upper)} [W]; heaters on one lump add up, and an input of gain 0 is none.
+        {lump: (lower, upper)} [W]; heaters on one lump add up, and an input of gain 0 is none. Without heaters whose
+        power follows temperature: of these, certificates state the power at a temperature.
 
     Raises
     ------
@@ -43,7 +45,10 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     {'bar': (0.0, 21.0)}
     """
     heat: dict[str, Interval] = {}
+    others = following(system, parameters)
     for name, heater in system.inputs.items():
+        if name in others:
+            continue
         gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
         if not any(gains):  # the speed of a fan, a force: no heat, whatever its limits
             continue

@@ -56,6 +56,28 @@ def with_named_effects(system: System, named: Iterable[Found]) -> System:
     return System(**{**dict(system), "fit": fit})
 
 
+def ranged(system: System, nominal: System, named: Iterable[Found]) -> System:
+    """A system that has the named effects, their numbers with a range in its fit table as in `with_named_effects`.
+
+    Parameters
+    ----------
+    system : System
+        Refitted system with the effects.
+    nominal : System
+        The same without them. Where it has no fit table all its numbers are taken as right, and so are those.
+    named : iterable of Found
+        `Diagnosis.effects`; what is no effect of the catalog has no number of its own.
+    """
+    if not nominal.fit:
+        return system
+    more = with_named_effects(nominal, [one for one in named if one.effect in effects()]).fit
+    new = {name: more[name] for name in more if name not in nominal.fit and name in system.parameters}
+    own = {name: system.parameter(name) for name in new}
+    return System(**{**dict(system), "fit": {**system.fit, **{
+        name: FitRange(lower=min(limits.lower, own[name]), upper=max(limits.upper, own[name]))
+        for name, limits in new.items()}}})
+
+
 def with_fitted(system: System, named: Iterable[Found], parameters: Choice) -> tuple[System, Choice]:
     """The system with effects and what is fitted in it: the numbers of effects beside those that were.
 

@@ -41,6 +41,7 @@ from ._own_names import in_own_names
 from ._refine import refine as refined
 from ._searching import searched
 from ._visible_words import visible_in_words
+from ._with_names import ranged
 from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor, refuse_constant, refuse_long
 from .diagnosis import Diagnosis
@@ -253,7 +254,7 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),
-        system=fit.system if named else nominal.system, gap=gap, located=where,
+        system=ranged(fit.system, nominal.structure.base, found) if named else nominal.system, gap=gap, located=where,
         not_testable=_hidden(state) | state.scores.not_testable,
         next_experiment=_plan(state.rounds) if named else None, outcome=judged.outcome,
         noise_floor=nominal.floor, nominal=nominal, fit=fit, scores=state.scores, rounds=state.rounds,

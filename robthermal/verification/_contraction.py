@@ -12,6 +12,7 @@ from flint import fmpq
 from . import _energy, _lyapunov, _weighted
 from ._contraction_problem import Contraction
 from ._fields import margin_of
+from ._heaters import read_heaters, say_heaters, with_rises
 from ._kind import Kind, Proof, working_precision
 from ._norm import NORMS, read_norm, say_rate
 from ._numbers import round_down, show
@@ -21,21 +22,22 @@ from ._uncertain import read_parameters, say_subject, worst_system
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Contraction:
     """Return the exact problem, or raise InputError."""
-    nominal = read_system(system)
+    nominal = read_system(system, heaters=True)
     box = read_region(region, nominal)
     parameters = read_parameters(region)
-    network = worst_system(nominal, system, parameters, nonlinear=True)
+    heaters, others = read_heaters(system, region, nominal.lumps, parameters)
+    network = with_rises(worst_system(nominal, system, others, nonlinear=True), heaters)
     norm = read_norm(evidence, len(network.lumps))
     return Contraction(network, box, norm.method, norm.rate, margin_of(margin, "rate"), norm.weights, norm.matrix,
-                       parameters)
+                       parameters, heaters)
 
 
 def claim(problem: Contraction, machine: str) -> str:
     """Return the one sentence the data give."""
-    return (f"The {say_subject(problem.system, problem.parameters, machine)}, contracts for all "
-            f"{say_region(problem.system, problem.region)}: between any two trajectories under the same inputs, as "
-            f"long as both stay in this box (that they do is not part of this claim), {NORMS[problem.method]} "
-            f"(method {problem.method}) {say_rate(problem.rate)}.")
+    box = say_region(problem.system, problem.region) + say_heaters(problem.heaters)
+    return (f"The {say_subject(problem.system, problem.parameters, machine)}, contracts for all {box}: between any two "
+            "trajectories under the same inputs, as long as both stay in this box (that they do is not part of this "
+            f"claim), {NORMS[problem.method]} (method {problem.method}) {say_rate(problem.rate)}.")
 
 
 def prove(problem: Contraction) -> Proof:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from flint import fmpq
 
+from ._heaters import Heater
 from ._system import Region, ThermalSystem
 from ._uncertain import Parameters
 
@@ -22,3 +23,4 @@ class Contraction:
     weights: tuple[fmpq, ...]
     matrix: tuple[tuple[fmpq, ...], ...]
     parameters: Parameters = ()
+    heaters: tuple[Heater, ...] = ()

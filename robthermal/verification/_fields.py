@@ -13,7 +13,7 @@ from robthermal.errors import InputError
 from ._numbers import exact, name_of, show
 
 Interval = tuple[fmpq, fmpq]
-# effects of a system file beyond the plain network: no claim knows them, whatever stands under these names
+# effects of a system file beyond the plain network: claims that do not know them refuse these names
 _EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson", "joule_split",
             "hysteresis", "drive", "power_slope", "feedthrough", "self_heating")
 
@@ -115,10 +115,11 @@ def no_other(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
             raise InputError(f"unknown key {name_of(name)}", where=where, expected=f"{list(keys)}")
 
 
-def no_effects(table: Mapping[str, Any], where: str) -> None:
-    """Refuse effects of a system file that no claim takes into account: other unknown keys are free, these are physics.
+def no_effects(table: Mapping[str, Any], where: str, known: Sequence[str] = ()) -> None:
+    """Refuse effects of a system file that a claim does not take into account: other unknown keys are free, these are
+    physics. ``known``: effects that the claim knows.
     """
     for key in table:
-        if key in _EFFECTS:
-            raise InputError(f"{key!r} is an effect that no claim takes into account", where=where,
+        if key in _EFFECTS and key not in known:
+            raise InputError(f"{key!r} is an effect that this claim does not take into account", where=where,
                              remedy="Certify the system without it.")

@@ -13,6 +13,7 @@ from flint import fmpq
 
 from ._cost import too_many_corners
 from ._fields import Interval, get, interval, intervals, kelvin_interval, mapping, margin_of
+from ._heaters import Heater, read_heaters, say_heaters
 from ._kind import Kind, Proof, working_precision
 from ._numbers import name_of, round_down, show
 from ._slopes import power
@@ -43,13 +44,15 @@ class Invariance:
     heat: dict[int, Interval]
     margin: fmpq
     parameters: Parameters = ()
+    heaters: tuple[Heater, ...] = ()
 
 
 def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
     """Return the exact problem, or raise InputError."""
-    nominal, table = read_system(system), mapping(region, "region")
+    nominal, table = read_system(system, heaters=True), mapping(region, "region")
     parameters = read_parameters(table)
-    network = worst_system(nominal, system, parameters, nonlinear=True)
+    heaters, others = read_heaters(system, table, nominal.lumps, parameters)
+    network = worst_system(nominal, system, others, nonlinear=True)
     mapping(evidence, "evidence")
     given = get(table, "ambient", "region")
     intervals(given, network.ambients, "region.ambient")
@@ -59,7 +62,8 @@ def read(system: Any, region: Any, evidence: Any, margin: Any) -> Invariance:
               network.lumps, "region.heat")
     heat = {k: interval(loads[name], f"region.heat[{name_of(name)}]")
             for k, name in enumerate(network.lumps) if name in loads}
-    return Invariance(network, read_region(table, network), ambient, heat, margin_of(margin, "heat"), parameters)
+    return Invariance(network, read_region(table, network), ambient, heat, margin_of(margin, "heat"), parameters,
+                      heaters)
 
 
 def claim(problem: Invariance, machine: str) -> str:
@@ -68,9 +72,9 @@ def claim(problem: Invariance, machine: str) -> str:
     inputs = [f"ambient {name_of(name)} in {say_interval(value)} K" for name, value in problem.ambient.items()]
     inputs += [f"heat load on {name_of(lumps[k])} in {say_interval(value)} W" for k, value in problem.heat.items()]
     words = f", for all {', '.join(inputs)}" if inputs else ""
-    return (f"The {say_subject(problem.system, problem.parameters, machine)}, never leaves the box of "
-            f"{say_region(problem.system, problem.region)}, once its temperatures are in it{words}, "
-            "with no other heat.")
+    box = say_region(problem.system, problem.region) + say_heaters(problem.heaters)
+    return (f"The {say_subject(problem.system, problem.parameters, machine)}, never leaves the box of {box}, once its "
+            f"temperatures are in it{words}, with no other heat.")
 
 
 def prove(problem: Invariance) -> Proof:
@@ -117,6 +121,7 @@ def _largest(problem: Invariance, lump: int, sign: int, links: list[Link], own_m
     upper = 1 if sign > 0 else 0
     own = problem.region.temperature[lump][upper]
     total = sign * problem.heat[lump][upper] if lump in problem.heat else fmpq(0)
+    total += sum((sign * heater.heat(own)[upper] for heater in problem.heaters if heater.lump == lump), fmpq(0))
     modules: dict[int, list[int]] = {}
     for k in own_modules:
         module = problem.system.modules[k]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._fields import get, mapping, sequence, text
 from ._hash import Name, canonical, short_hash
+from ._heaters import heaters_of
 from ._system import link_names, read_system
 
 if TYPE_CHECKING:
@@ -106,7 +107,7 @@ def _content(section: Any) -> list[Any]:
 
 
 def _thermal(table: Mapping[str, Any]) -> list[Any]:
-    system = read_system(table)
+    system = read_system(table, heaters=True)
     nodes = [Name(lump) for lump in system.lumps]
     links = [[Name(name), *(nodes[end] if isinstance(end, int) else Name(end) for end in link.nodes),
               link.conductance, link.gain, link.exponent, link.radiation]
@@ -115,6 +116,8 @@ def _thermal(table: Mapping[str, Any]) -> list[Any]:
                 *module.conductance, module.reference] for module in system.modules]
     content = [Name("thermal"), Name(system.name), [[name, c] for name, c in zip(nodes, system.capacity, strict=True)],
                [Name(ambient) for ambient in system.ambients], links, modules]
+    if heaters := heaters_of(table, system.lumps):
+        content += [Name("inputs"), [[Name(one.name), nodes[one.lump], one.slope[0], one.reference] for one in heaters]]
     if "operating" in table:
         content += [Name("scheduled"), _operating(table, "temperature", system.lumps),
                     _operating(table, "current", [module.name for module in system.modules]),

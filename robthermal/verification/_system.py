@@ -109,10 +109,13 @@ class Region:
     current: tuple[Interval, ...]
 
 
-def read_system(value: Any) -> ThermalSystem:
-    """Return the exact system of a certificate; InputError for anything missing, of another type or impossible."""
+def read_system(value: Any, *, heaters: bool = False) -> ThermalSystem:
+    """Return the exact system of a certificate; InputError for anything missing, of another type or impossible.
+
+    ``heaters``: whether the claim takes heaters into account whose power is linear in the temperature of their lump.
+    """
     table = mapping(value, "system")
-    _only_known(table)
+    _only_known(table, heaters)
     lumps = mapping(get(table, "lumps", "system"), "system.lumps")
     if not lumps:
         raise InputError("no lumps", where="system.lumps", expected="at least one")
@@ -231,14 +234,14 @@ def _link(value: Any, nodes: Mapping[str, int | str], where: str) -> Link:
     return Link((first, second), conductance, gain, exponent, radiation)
 
 
-def _only_known(table: Mapping[str, Any]) -> None:
-    """Refuse physics that no claim knows: heaters that are not just heat, sensors that heat; and Celsius."""
+def _only_known(table: Mapping[str, Any], heaters: bool) -> None:
+    """Refuse physics that the claim does not know: heaters that are not just heat, sensors that heat; and Celsius."""
     no_effects(table, "system")
     if table.get("temperature_unit", "K") != "K":
         raise InputError(f"temperature_unit {name_of(table['temperature_unit'])}", where="system", expected="'K'")
     for name, heater in mapping(table.get("inputs", {}), "system.inputs").items():
         place = f"system.inputs[{name_of(name)}]"
-        no_effects(mapping(heater, place), place)
+        no_effects(mapping(heater, place), place, known=("power_slope",) if heaters else ())
     sensors = table.get("sensors", ())
     for sensor in sensors.values() if isinstance(sensors, Mapping) else sequence(sensors, "system.sensors"):
         if isinstance(sensor, Mapping):  # what a sensor reads matters to an observer only, which looks closer

@@ -10,6 +10,7 @@ PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sen
           "input or module": "m1"}
 OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "sensor_lag",
        "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope"}  # plain system content
+FOLLOWING = {"heater_power_slope"}  # a heat that the certificates of a network know
 FORCING = {"heat_source", "sensor_self_heating", "ambient_gradient", "periodic_load", "input_feedthrough",
            "input_gain_slope"}
 
@@ -28,7 +29,7 @@ def with_effect(effect: str) -> rt.System:
     return rt.thermal.add_effect(machine(), effect, where, {kind.sizes[0]: 0.05}).system
 
 
-@pytest.mark.parametrize("effect", sorted(set(rt.thermal.effects()) - OWN))
+@pytest.mark.parametrize("effect", sorted(set(rt.thermal.effects()) - OWN - FOLLOWING))
 def test_every_new_effect_is_refused_or_is_no_part_of_the_jacobian(effect):
     system = with_effect(effect)
     name, = system.effects
@@ -79,33 +80,13 @@ def test_the_law_refuses_modules_it_does_not_know():
     assert rt.design.feedback_linearization(system, ["m2"]).names == ("m2",)
 
 
-def winding(power: float, slope: float) -> tuple[rt.System, rt.System, rt.Record]:
-    """A winding in water, the same without its slope, and an hour at full power: T - 293.15 K ends at P/(1 - s P)."""
-    system = rt.System(ambients={"water": {"temperature": 293.15}}, lumps={"coil": {"capacity": 100.0}},
-                       links=[{"between": ("coil", "water"), "conductance": 1.0}], sensors={"T": {"lump": "coil"}},
-                       inputs={"drive": {"lump": "coil", "power_slope": slope}})
-    drive = rt.Record(sample_time=10.0, inputs=np.full(360, power), outputs=np.zeros((360, 0)), input_names=["drive"],
-                      output_names=[])
-    return system, system.with_parameters({"inputs.drive.power_slope": 0.0}), drive
-
-
-def test_a_range_of_heat_wide_enough_for_the_box_covers_a_heat_that_rises_with_temperature():
-    """As the refusal says: 20 W at 20 °C are 36 W at 60 °C."""
-    system, bare, drive = winding(20.0, 0.02)
-    with pytest.raises(rt.InputError, match="power_slope.* wide enough for every temperature in the box"):
-        rt.certify.invariance(system, current={}, temperature=(293.0, 333.15))
-    box = rt.certify.invariance(bare, current={}, temperature=(293.0, 333.15), heat={"coil": (0.0, 36.0)})
-    assert box.holds and rt.verify(box).valid
-    hottest = rt.thermal.simulate(system, drive).outputs.max()
-    assert hottest == pytest.approx(293.15 + 20.0 / 0.6, abs=0.1) and hottest < 333.15
-    assert not rt.certify.invariance(bare, current={}, temperature=(293.0, 313.15), heat={"coil": (0.0, 28.0)}).holds
-
-
-def test_contraction_without_such_a_heat_says_nothing_of_it():
-    """Certified without the slope; with it the heat grows faster than the loss, and the winding runs away."""
-    system, bare, drive = winding(60.0, 0.02)
-    assert rt.certify.contraction(bare, current={}, temperature=(280.0, 400.0)).holds
-    with pytest.raises(rt.InputError, match="contraction says nothing then of a heat that rises"):
-        rt.certify.contraction(system, current={}, temperature=(280.0, 400.0))
-    with pytest.raises(rt.Diverged):
-        rt.thermal.simulate(system, drive)
+def test_a_heater_that_follows_temperature_is_part_of_the_claims():
+    """tests/certify/test_following_heaters.py shows what they are; those of single modules do not know it."""
+    system = with_effect("heater_power_slope")
+    stays = rt.certify.invariance(system, current={"m1": (0.0, 0.0), "m2": (0.0, 0.0)}, temperature=(290.0, 330.0))
+    assert stays.holds and "heater powers 'heater' in [0, 1] W" in stays.claim
+    assert "heater" in rt.certify.contraction(system, current=CURRENT, temperature=BOX).region["power"]
+    for claim in (rt.certify.runaway, rt.certify.usable_current):
+        with pytest.raises(rt.InputError, match="power_slope = .*no certificate covers"):
+            claim(system, **({"setpoint": {"m1": 283.15, "m2": 283.15}} if claim is rt.certify.runaway else
+                             {"temperature": (278.15, 358.15)}))

@@ -25,7 +25,7 @@ def number(value: Any) -> float:
 
 def heat(system: Document, x: np.ndarray, currents: dict[str, float], ambient: dict[str, float],
          load: dict[str, float] | None = None) -> np.ndarray:
-    """Return the heat into every lump [W]; works for complex temperatures too."""
+    """Return the heat into every lump [W]; works for complex temperatures too. Powers of heaters are with currents."""
     place = {name: k for k, name in enumerate(system["lumps"])}
     flow = np.zeros(len(place), dtype=x.dtype)
     for link in system["links"]:
@@ -49,6 +49,10 @@ def heat(system: Document, x: np.ndarray, currents: dict[str, float], ambient: d
         current = currents[name]
         flow[h] += S * x[h] * current + R * current**2 / 2 + K * (x[c] - x[h])
         flow[c] += -S * x[c] * current + R * current**2 / 2 + K * (x[h] - x[c])
+    for name, heater in system.get("inputs", {}).items():
+        T = x[place[heater["lump"]]]
+        warmer = T - number(heater["reference_temperature"])
+        flow[place[heater["lump"]]] += currents.get(name, 0.0) * (1 + number(heater["power_slope"]) * warmer)
     for name, value in (load or {}).items():
         flow[place[name]] += value
     return flow
@@ -76,8 +80,9 @@ def boxes(system: Document, region: Document) -> tuple[np.ndarray, np.ndarray]:
 
 
 def points(system: Document, region: Document, rng: np.random.Generator, count: int) -> list[tuple[np.ndarray, dict]]:
-    """Return vertices and inner points of the box."""
+    """Return vertices and inner points of the box; with the currents, powers of heaters that follow temperature."""
     T, I = boxes(system, region)  # noqa: E741 - the current
+    powers = {name: [number(value) for value in pair] for name, pair in region.get("power", {}).items()}
     found = []
     for k in range(count):
         s, t = rng.random(len(T)), rng.random(len(I))
@@ -87,7 +92,8 @@ def points(system: Document, region: Document, rng: np.random.Generator, count: 
             t = rng.random(len(I))
         x = T[:, 0] + s * (T[:, 1] - T[:, 0])
         i = I[:, 0] + t * (I[:, 1] - I[:, 0])
-        found.append((x, dict(zip(system["modules"], i.tolist(), strict=True))))
+        chosen = {name: float(rng.choice(pair)) for name, pair in powers.items()}
+        found.append((x, dict(zip(system["modules"], i.tolist(), strict=True)) | chosen))
     return found
 
 
@@ -150,6 +156,17 @@ def random_system(rng: np.random.Generator, *, modules: int = 2, nonlinear: bool
             "conductance": {"value": 0.3, "slope": sign() * 1e-3 if wild else 0.0}, "reference_temperature": 308.15}
     return {"lumps": {name: {"capacity": round(float(rng.uniform(1, 50)), 3)} for name in names},
             "ambients": ["room"], "links": links, "modules": table}
+
+
+def heat_up(system: Document, region: Document, rng: np.random.Generator) -> None:
+    """Add a heater whose power follows temperature, with a range of its power, and sometimes one of its slope."""
+    slope = round(float(rng.uniform(-0.006, 0.006)), 5)
+    system["inputs"] = {"q0": {"lump": str(rng.choice(list(system["lumps"]))), "power_slope": slope,
+                               "reference_temperature": round(float(rng.uniform(285, 300)), 2)}}
+    region["power"] = {"q0": [0.0 if rng.random() < 0.6 else -round(float(rng.uniform(1, 10)), 2),
+                              round(float(rng.uniform(1, 20)), 2)]}
+    if rng.random() < 0.4:
+        region.setdefault("parameters", {})["inputs.q0.power_slope"] = [slope - 0.001, slope + 0.0015]
 
 
 def box(system: Document, top: float, low: float = 280.0, high: float = 350.0) -> Document:

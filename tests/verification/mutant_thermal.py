@@ -51,6 +51,8 @@ def make_contraction(rng: np.random.Generator) -> Document:
         names = [f"lumps.{name}.capacity" for name in system["lumps"]] * (method != "lyapunov")
         names += 2 * names_of(system, nonlinear=True)
         region["parameters"] = spans(system, names, rng, 3, 0.8, 1.2)
+    if rng.random() < 0.4:
+        truth.heat_up(system, region, rng)
     evidence = truth.evidence_for(method, system, region, 1e-4, rng)
     good = establish("contraction", system=system, region=region, evidence=evidence, made_by={})
     if not good.holds:
@@ -74,6 +76,8 @@ def make_invariance(rng: np.random.Generator) -> Document:
               "current": {name: [-0.3 * top, top] for name in system["modules"]}, "ambient": {"room": [290.0, 300.0]}}
     if rng.random() < 0.3:
         region["parameters"] = spans(system, names_of(system, nonlinear=True), rng, 3, 0.8, 1.2)
+    if rng.random() < 0.4:
+        truth.heat_up(system, region, rng)
     good = establish("invariance", system=system, region=region, evidence={}, made_by={})
     if not good.holds:
         return make_invariance(rng)

@@ -33,6 +33,8 @@ def machines(system, ranges, rng, count):
             table, rest = name.split(".", 1)
             if table == "lumps":
                 other["lumps"][rest.removesuffix(".capacity")]["capacity"] = value
+            elif table == "inputs":
+                other["inputs"][rest.removesuffix(".power_slope")]["power_slope"] = value
             elif table == "links":
                 table, key = link_number(other, rest)
                 table[key] = value

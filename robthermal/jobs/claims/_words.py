@@ -31,8 +31,8 @@ _SENTENCES = {  # the exact sentences, with all numbers, are in the appendix, "E
                 "to sample, however the currents change.",
 }
 _WITHOUT_MODULES = {
-    "contraction": "For every lump temperature in the box any two temperature histories under the same heats approach "
-                   "each other. That the temperatures stay in this box is not part of this claim.",
+    "contraction": "For every lump temperature in the box any two temperature histories under the same inputs "
+                   "approach each other. That the temperatures stay in this box is not part of this claim.",
     "box": "A machine that starts inside the ranges of its lumps stays inside them, whatever the heats and ambients do "
            "within theirs.",
 }
@@ -126,6 +126,9 @@ def box_of(certificate: Certificate) -> str:
         parts.append(f"all lumps {_celsius(box)} °C")
     parts += [f"{name}: {_celsius(pair)} °C" for name, pair in _pairs(region, "ambient")]
     parts += [f"heat into {name}: {_range(pair)} W" for name, pair in _pairs(region, "heat")]
+    for name, pair in _pairs(region, "power"):
+        at = float(certificate.system["inputs"][name]["reference_temperature"]) - ZERO_CELSIUS
+        parts.append(f"heater {name}: {_range(pair)} W at {at:.6g} °C")
     uncertain = [f"{name} {_range(pair)}" for name, pair in _pairs(region, "parameters")]
     if uncertain:
         listed = f": {', '.join(uncertain)}" if len(uncertain) <= _LISTED else ", as the file states them"

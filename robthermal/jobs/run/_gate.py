@@ -133,8 +133,10 @@ def _diagnosis(found: DiagnosisFacts, off: bool) -> Iterator[Reason]:
         yield Reason("remark", code.code, "diagnose", found.names, "The diagnosis names an effect that the system file "
                      f"does not have; the certified model has it: {found.names}.", "Put it into the system file.")
         return
+    beside = " augmented.toml has it; `adopt` takes over only what leaves no remainder." * (
+        found.verdict == "named_with_remainder")
     yield Reason("fail" if off else "remark", code.code, "diagnose", found.names or "model",
-                 code.meaning[:-1] + (f": {found.names}." if found.names else "."), code.remedy)
+                 code.meaning[:-1] + (f": {found.names}." if found.names else "."), code.remedy + beside)
 
 
 def _parameters(doubted: Sequence[Doubted]) -> Iterator[Reason]:

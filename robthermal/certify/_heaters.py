@@ -1,0 +1,84 @@
+"""Heaters whose power is linear in the temperature of their lump, as sections of certificates state them.
+
+The heat q (1 + s (x - w)) is known by the range of q, the power at w: what the declared limits of the heater give. The
+temperature w is the first ambient's nominal one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..errors import InputError
+from ..thermal import System
+
+Interval = tuple[float, float]
+LATE = ("drive.delay", "drive.time_constant")  # of inputs: they keep the heat within its limits
+MORE = ("drive.gain", "drive.offset", "drive.gain_slope", "drive.cubic", "drive.clip", "feedthrough.share")
+
+
+def following(system: System, parameters: Mapping[str, Interval] | None = None) -> tuple[str, ...]:
+    """Names of the heaters whose power follows temperature, or may in these ranges of parameters."""
+    return tuple(name for name, heater in system.inputs.items() if heater.power_slope is not None
+                 and (heater.power_slope != 0.0 or slope_of(name) in (parameters or {})))
+
+
+def slope_of(heater: str) -> str:
+    """Parameter name of the slope of a heater's power."""
+    return f"inputs.{heater}.power_slope"
+
+
+def heater_sections(system: System, names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """Every number of these heaters that a claim depends on.
+
+    Raises
+    ------
+    InputError
+        A heater that is more than linear in temperature.
+    """
+    for name in names:
+        _refuse_more(system, name)
+    return {name: {"lump": system.inputs[name].lump, "power_slope": system.inputs[name].power_slope,
+                   "reference_temperature": reference(system)} for name in names}
+
+
+def power_ranges(system: System, parameters: Mapping[str, Interval] | None) -> dict[str, list[float]]:
+    """Powers of the heaters that follow temperature, at the reference temperature [W]: limits times gain.
+
+    Raises
+    ------
+    InputError
+        A heater without limits; an uncertain reference temperature.
+    """
+    names, ranges = following(system, parameters), parameters or {}
+    if not names:
+        return {}
+    where = f"ambients.{next(iter(system.ambients))}.temperature"
+    if where in ranges and ranges[where][0] != ranges[where][1]:
+        raise InputError(f"a range of {where} cannot be covered: the powers of {', '.join(map(repr, names))} are "
+                         "stated at this temperature", where=f"argument parameters[{where!r}]",
+                         remedy="Leave it out of `parameters`, and give the ambient its range in `ambient`.")
+    return {name: _power(system, name, ranges) for name in names}
+
+
+def reference(system: System) -> float:
+    """Temperature at which powers are stated [K]."""
+    return next(iter(system.ambients.values())).temperature
+
+
+def _power(system: System, name: str, ranges: Mapping[str, Interval]) -> list[float]:
+    heater = system.inputs[name]
+    if heater.limits is None:
+        raise InputError(f"heater {name!r} has no limits, and its power follows temperature",
+                         where=f"[inputs.{name}] limits", remedy="Give limits = [lower, upper].")
+    ends = [gain * limit for gain in ranges.get(f"inputs.{name}.gain", (heater.gain,) * 2) for limit in heater.limits]
+    return [min(ends), max(ends)]
+
+
+def _refuse_more(system: System, name: str) -> None:
+    found = [effect for effect in system.effects if effect in {f"inputs.{name}.{field}" for field in MORE}]
+    if found:
+        raise InputError(f"{found[0]} = {system.parameter(found[0]):g} and {slope_of(name)} together are an effect "
+                         "that no certificate covers yet", where="argument system",
+                         expected="a heater whose power is its column times its gain, linear in temperature",
+                         remedy="Certify the system without one of them (set it to 0).")
