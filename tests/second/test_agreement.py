@@ -162,7 +162,8 @@ def test_the_page_names_every_key_of_every_kind():
         document = subject.make(np.random.default_rng(7))
         parts = {section: document[section] for section in ("system", "region", "evidence")}
         own = {*parts["system"].get("lumps", {}), *parts["system"].get("modules", {}),
-               *parts["system"].get("ambients", []), *parts["region"].get("parameters", {})}
+               *parts["system"].get("ambients", []), *parts["region"].get("parameters", {}),
+               *parts["system"].get("inputs", {})}
         assert kind in words and keys(parts, set()) - own <= words, kind
 
 
