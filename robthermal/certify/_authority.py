@@ -46,7 +46,8 @@ def check_certificate(certificate: Certificate, system: System, kind: str, where
     if not verdict.valid:
         raise InputError(f"the certificate is not valid: {verdict.reason}", where=where,
                          expected="a certificate that rt.verify proves", remedy="Make it again from the machine.")
-    section = system_section(system, forcing=True)
+    following = tuple(name for name in certificate.system.get("inputs", {}) if name in system.inputs)
+    section = system_section(system, forcing=True, heaters=following)
     if not same_system(certificate, section):
         raise InputError(f"the certificate is about another machine, {machine_hash(certificate.system)} instead of "
                          f"{machine_hash(section)}", where=where, expected="a certificate of exactly this system",

@@ -25,6 +25,7 @@ from ._invariance import invariance
 from ._jacobian import box_jacobian
 from ._lyapunov import Structure
 from ._outcomes import CertifyCode
+from ._own_heat import driven
 from ._sections import (
     Currents,
     Interval,
@@ -95,8 +96,9 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     ambient : mapping, optional
         {ambient: (lower, upper)} [K]; default nominal.
     heat : mapping, optional
-        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters. Not in it are heaters
-        whose power follows temperature: their declared limits always count.
+        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters. Not in it are
+        constant and periodic heats of the system, which are added, and heaters whose power follows temperature, whose
+        declared limits always count.
     method : {"energy", "sum", "max", "lyapunov"}
         Norm of the contraction.
     structure, large
@@ -122,11 +124,12 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     >>> found.holds
     True
     """
+    around = ambient_ranges(system, ambient, parameters)
+    plain = driven(system, heat_ranges(system, heat, parameters), parameters)
+    system, heat, parameters = plain.system, plain.heat, plain.parameters
     system_section(system, heaters=following(system, parameters))  # refuses effects before they meet the box
     currents = current_box(system, current)
-    ranges = parameter_box(system, parameters or {})
-    around = ambient_ranges(system, ambient, parameters)
-    heat, power = heat_ranges(system, heat, parameters), power_ranges(system, parameters)
+    ranges, power = parameter_box(system, parameters), power_ranges(system, parameters)
 
     def faces(kept: Mapping[str, Any]) -> Faces:
         return Faces(system, around, heat, kept, RESERVE, power)

@@ -122,7 +122,7 @@ def gains(system: System, *, current: Currents, temperature: Temperatures, heat:
     if unknown:
         raise InputError(f"there is no lump {unknown[0]!r}", where="argument heat",
                          expected="one of " + ", ".join(system.lump_names))
-    parts: dict[str, Any] = {"system": system_section(system), "region": region}
+    parts: dict[str, Any] = {"system": system_section(system, forcing=True), "region": region}
     box = box_jacobian(system, region)
     sources = _ambient_columns(system, region)
     found = best_weights(box, "max")

@@ -14,7 +14,15 @@ from ..thermal import System
 
 Interval = tuple[float, float]
 LATE = ("drive.delay", "drive.time_constant")  # of inputs: they keep the heat within its limits
+OWN = (("lumps", "heat"), ("lumps", "periodic.heat"), ("sensors", "self_heating"))  # heats of no heater
 MORE = ("drive.gain", "drive.offset", "drive.gain_slope", "drive.cubic", "drive.clip", "feedthrough.share")
+
+
+def is_own_heat(name: str) -> bool:
+    """Whether a parameter is of a constant or periodic heat of the system's own."""
+    table = name.partition(".")[0]
+    return any(table == own and name.endswith(f".{field}") for own, field in OWN) or (
+        table == "lumps" and name.endswith((".periodic.period", ".periodic.phase")))
 
 
 def following(system: System, parameters: Mapping[str, Interval] | None = None) -> tuple[str, ...]:

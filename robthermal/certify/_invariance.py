@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from ..thermal import System
 from ..verification import Certificate, establish
 from ._heaters import following
+from ._own_heat import driven
 from ._sections import (
     Currents,
     Interval,
@@ -36,8 +37,8 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     ambient : mapping, optional
         {ambient: (lower, upper)} [K]; default its nominal temperature.
     heat : mapping, optional
-        {lump: (lower, upper)} extra heat, heaters and loads [W]; default none. Not in it are heaters whose power
-        follows temperature: their declared limits count.
+        {lump: (lower, upper)} extra heat, heaters and loads [W]; default none. Not in it are constant and periodic
+        heats of the system, which are added, and heaters whose power follows temperature: their declared limits count.
     parameters : mapping, optional
         Uncertain numbers of the system as in `contraction`.
 
@@ -59,10 +60,12 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     ...                       ambient={"room": (293.15, 303.15)}).holds
     True
     """
-    region = region_section(system, current, temperature, parameters)
+    given = named_ranges(heat or {}, system.lump_names, "heat", "lump")
+    plain = driven(system, {name: (low, high) for name, (low, high) in given.items()}, parameters)
+    region = region_section(plain.system, current, temperature, plain.parameters)
     region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
-    if heat:
-        region["heat"] = named_ranges(heat, system.lump_names, "heat", "lump")
-    section = system_section(system, heaters=following(system, parameters))
+    if plain.heat:
+        region["heat"] = {name: list(pair) for name, pair in plain.heat.items()}
+    section = system_section(plain.system, heaters=following(system, parameters))
     return establish("invariance", system=section, region=region, evidence={},
                      made_by=made_by("none", "checked directly"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib.metadata import version
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from .._celsius import ADD_ZERO
 from ..errors import InputError
 from ..thermal import System
-from ._heaters import LATE, MORE, following, heater_sections, power_ranges, slope_of
+from ._heaters import LATE, MORE, following, heater_sections, is_own_heat, power_ranges, slope_of
 
 Interval = tuple[float, float]
 Currents = Mapping[str, Interval]
@@ -23,7 +23,6 @@ _UNCERTAIN = (".capacity", ".conductance", ".natural.gain", ".radiation",
 
 _NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
 _LISTED = 12  # names in a message
-_HEATING = (".self_heating", ".power_slope")  # what sensors and heaters do to the network
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
@@ -40,7 +39,7 @@ def system_section(system: System, *, forcing: bool = False, heaters: tuple[str,
         raise InputError(f"system is a {type(system).__name__}", where="argument system",
                          expected="a robthermal.System", remedy="Read one with rt.read_system(path).")
     inputs = {"inputs": heater_sections(system, heaters)} if heaters else {}
-    _refuse_effects(system, forcing, {slope_of(name) for name in heaters})
+    refuse_effects(system, tuple(_FORCING) if forcing else (), {slope_of(name) for name in heaters})
     return {"name": system.name,
             "lumps": {name: {"capacity": lump.capacity} for name, lump in system.lumps.items()},
             "ambients": list(system.ambients),
@@ -48,11 +47,12 @@ def system_section(system: System, *, forcing: bool = False, heaters: tuple[str,
             "modules": {name: _module(module) for name, module in system.modules.items()}, **inputs}
 
 
-def _refuse_effects(system: System, forcing: bool, known: set[str]) -> None:
+def refuse_effects(system: System, forcing: tuple[str, ...] = (), known: Collection[str] = ()) -> None:
+    """Refuse effects that no checker knows, but those of `known` names, and heats of these tables that are forcing."""
     for name in system.effects:
         table, _, rest = name.partition(".")
-        passes = forcing and (any(rest.endswith("." + field) for field in _FORCING.get(table, ()))
-                              or (rest.endswith(".gradient") and not _breezy(system, rest.removesuffix(".gradient"))))
+        passes = table in forcing and (any(rest.endswith("." + field) for field in _FORCING.get(table, ())) or (
+            rest.endswith(".gradient") and not _breezy(system, rest.removesuffix(".gradient"))))
         if not passes and name not in known:
             raise InputError(f"{name} = {system.parameter(name):g} is an effect that no certificate covers yet",
                              where="argument system", expected="a network of links, modules and lumps only",
@@ -97,17 +97,17 @@ def region_section(system: System, current: Currents, temperature: Temperatures,
 def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
     """{parameter name: [lo, hi]} around the values of the system, of those that the claim depends on.
 
-    What only sensors, heaters or a start know is left out: no claim about the network in given ranges of currents,
-    heats and ambients depends on it.
+    What only sensors, heaters, constant heats or a start know is left out: no claim about the network in given ranges
+    of currents, heats and ambients depends on it.
     """
     every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
     slopes, ranges = set(map(slope_of, following(system, parameters))), {}
     for name, (low, high) in every.items():
         where, value = f"argument parameters[{name!r}]", system.parameter(name)
-        outside = name.startswith(_NOT_OF_THE_NETWORK) and not name.endswith(_HEATING)
+        follows = name in slopes
+        outside = (name.startswith(_NOT_OF_THE_NETWORK) and not follows) or is_own_heat(name)
         if outside or name.endswith((".disturbance", ".initial")):
             continue
-        follows = name in slopes
         if not follows and not name.endswith(_UNCERTAIN):
             raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
                              expected="ranges of capacities, conductances, natural.gain and radiation of links, "

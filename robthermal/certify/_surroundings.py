@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..errors import InputError
 from ..thermal import System
 from ._heaters import following
+from ._own_heat import add, heater_range, through
 from ._sections import Currents, Interval, Temperatures, named_ranges, region_section
-
-_HARMLESS = ("gain", "drive.delay", "drive.time_constant")  # ranges that are counted, or keep heat within its limits
 
 
 def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
@@ -20,7 +18,8 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     system : System
         System with heaters and their declared limits.
     parameters : mapping, optional
-        {parameter name: (lower, upper)}; ranges of `inputs.NAME.gain` widen the heat, others change nothing.
+        {parameter name: (lower, upper)}; ranges of the gain of a heater and of what it makes of its column otherwise
+        widen the heat, others change nothing.
 
     Returns
     -------
@@ -31,7 +30,7 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Raises
     ------
     InputError
-        A heater without limits; a range of a heater's parameter that does more than scale its heat.
+        A heater without limits.
 
     Examples
     --------
@@ -47,21 +46,10 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     heat: dict[str, Interval] = {}
     others = following(system, parameters)
     for name, heater in system.inputs.items():
-        if name in others:
-            continue
         gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
-        if not any(gains):  # the speed of a fan, a force: no heat, whatever its limits
-            continue
-        if heater.limits is None:
-            raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
-                             remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
-        for key in parameters or {}:
-            if key.startswith(f"inputs.{name}.") and key.removeprefix(f"inputs.{name}.") not in _HARMLESS:
-                raise InputError(f"a range of {key} cannot be covered: limits do not tell what it does to the heat",
-                                 where=f"argument parameters[{key!r}]", remedy="Pass heat={lump: (lower, upper)}.")
-        ends = sorted(gain * limit for gain in gains for limit in heater.limits)
-        low, high = heat.get(heater.lump, (0.0, 0.0))
-        heat[heater.lump] = (low + ends[0], high + ends[-1])
+        if name not in others and any(gains):  # no heat: the speed of a fan, a force, whatever its limits
+            for lump, pair in through(system, name, heater_range(system, name, parameters), parameters):
+                add(heat, lump, pair)
     return heat
 
 

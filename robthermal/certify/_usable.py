@@ -11,6 +11,7 @@ from ..verification import Certificate
 from ._contraction import METHODS, Method, contraction
 from ._limits import DIRECTIONS, Direction, current_range
 from ._outcomes import CertifyCode
+from ._own_heat import driven
 from ._regulated import SetPoints
 from ._sections import Interval, Temperatures, parameter_box, system_section
 from ._surroundings import ambient_ranges, heat_ranges
@@ -90,10 +91,11 @@ def question_of(system: System, *, direction: Direction = "cooling", temperature
                 ambient: Mapping[str, Interval] | None, heat: Mapping[str, Interval] | None,
                 parameters: Mapping[str, Interval] | None, lower: Lower, method: Method) -> Question:
     """Arguments of `usable_current`, checked."""
-    _check(system, direction, method, lower)
-    question = Question(system, direction, temperature, ambient_ranges(system, ambient, parameters),
-                        heat_ranges(system, heat, parameters),
-                        parameter_box(system, parameters or {}), lower, method)
+    around = ambient_ranges(system, ambient, parameters)
+    plain = driven(system, heat_ranges(system, heat, parameters), parameters)
+    _check(plain.system, direction, method, lower)
+    question = Question(plain.system, direction, temperature, around, plain.heat,
+                        parameter_box(plain.system, plain.parameters), lower, method)
     question.check_box()
     return question
 

@@ -203,8 +203,9 @@ class Integrator:
             A = np.stack([one.K for one in steps])[kind]
             driven = np.einsum("sij,sj->si", np.stack([one.Ku for one in steps])[kind], plan.w[k:stop])
         z[k:stop + 1] = recursion(A, driven[..., None], z[k][:, None])[..., 0]
-        hot = np.flatnonzero(~(np.abs(z[k:stop + 1, :len(self.eq.capacity)]).max(axis=1) < HOTTEST))
-        if hot.size:
+        lumps = z[k:stop + 1, :len(self.eq.capacity)]
+        if not (lumps.max() < HOTTEST and lumps.min() > -HOTTEST):
+            hot = np.flatnonzero(~(np.abs(lumps).max(axis=1) < HOTTEST))
             self._give_up(z[k + hot[0]], plan.at[k + hot[0]] * self.lengths[0])
         return stop - k
 

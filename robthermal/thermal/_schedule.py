@@ -64,6 +64,9 @@ def schedule(eq: Equations, u: Array, h: float, start: float = 0.0, ripple: Mapp
         Of the modules `Equations.ripple` [A].
     """
     n = len(u)
+    if not (eq.drives.steps or eq.drives.ripples or any(drive.delay for drive in eq.drives.of.values())):
+        every = np.arange(n)  # nothing happens between the samples
+        return Schedule((h,), every.astype(float), np.zeros(n, np.intp), u, eq.drives(u), every)
     delays = {column: drive.delay / h for column, drive in eq.drives.of.items() if drive.delay}
     steps = {column: (link.step.time - start) / h for link in eq.system.links if link.step
              for column in [eq.drives.steps[link.name]]}

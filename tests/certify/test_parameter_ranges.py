@@ -41,12 +41,13 @@ def test_gain_of_a_heater_widens_its_heat() -> None:
     system, gain = bench(**HEATER), {"inputs.foil.gain": (1.9, 2.5)}
     found = rt.certify.runaway_free(system, current={"m": (0.0, 1.0)}, parameters=gain)
     assert [float(end) for end in found.invariance.region["heat"]["h"]] == [0.0, 2.5]
-    with pytest.raises(rt.InputError, match=r"inputs.foil.drive.gain cannot be covered"):
-        rt.certify.runaway_free(system, current={"m": (0.0, 1.0)}, parameters={"inputs.foil.drive.gain": (-0.1, 0.1)})
+    imperfect = {"inputs.foil.drive.gain": (-0.1, 0.1)}
+    more = rt.certify.runaway_free(system, current={"m": (0.0, 1.0)}, parameters=imperfect)
+    assert more.invariance.region["heat"]["h"] == pytest.approx([0.0, 2.2])
 
 
-@pytest.mark.parametrize("name", ["modules.m.reference_temperature", "modules.m.thomson", "lumps.h.heat",
-                                  "links.h-room.natural.exponent", "sensors.T.self_heating"])
+@pytest.mark.parametrize("name", ["modules.m.reference_temperature", "modules.m.thomson",
+                                  "links.h-room.natural.exponent", "lumps.h.gradient"])
 def test_what_no_checker_covers_is_refused_by_name(name) -> None:
     system = bench(**HEATER)
     value = system.parameter(name)

@@ -14,11 +14,12 @@ from ..._distributions import chi2_sf, f_sf
 from ..._drawing import axes_for
 from ...errors import Outcome
 from .._outcomes import DiagnosisCode
-from ..fit import Refit
+from ..fit import Refit, orthonormal
 from ..path import N_SPLINES, Linearized
 from ._frequency_tails import inflation, relative_degrees_of_freedom
 
 Array = NDArray[np.float64]
+_FLAT = 1e-6  # relative size of a direction that counts as none
 LAGS = 60
 SMALLEST_P = 1e-3
 
@@ -147,9 +148,7 @@ def spline_tests(fit: Refit) -> dict[str, tuple[float, float]]:
 
 def f_test(fit: Refit, J: Array) -> tuple[float, float]:
     """F statistic and p-value of projected columns (m, q)."""
-    scale = np.linalg.norm(J, axis=0)
-    U, s, _ = np.linalg.svd(J / np.where(scale > 0, scale, 1.0), full_matrices=False)
-    U = U[:, s > 1e-6]
+    U = orthonormal(J, _FLAT)
     q, nu = U.shape[1], fit.degrees_of_freedom - U.shape[1]
     if not q or nu < 1:
         return 0.0, 1.0

@@ -19,7 +19,7 @@ from ..path import Linearized, LinearizedRecord, White, linearized_records
 from ._noise_scaling import NoiseScaling
 from ._sessions import session_table
 from ._structure import Structure
-from ._turned import orthonormal
+from ._turned import orthonormal, right_singular
 from ._whitened import Whitened
 
 Array = NDArray[np.float64]
@@ -231,10 +231,8 @@ class Refit:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the unknowns, (p, p), in the optimizer's coordinates, scaled by the whitened variance."""
-        scale = np.linalg.norm(self.J, axis=0)
-        scale[scale == 0] = 1.0
         # of J, not of JᵀJ: its rounding would make variances negative where the data tell next to nothing
-        _, s, Vt = np.linalg.svd(self.J / scale, full_matrices=False)
+        scale, s, Vt = right_singular(self.J)
         root = (Vt[s > _FLAT * s[0]] / s[s > _FLAT * s[0], None]).T / scale[:, None]
         return np.asarray(root @ root.T * max(self.variance, 1.0), np.float64)
 

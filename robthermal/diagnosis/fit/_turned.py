@@ -70,12 +70,23 @@ def orthonormal(J: Array, flat: float) -> Array:
     -------
     ndarray
     """
-    length = np.linalg.norm(J, axis=0)
-    length[length == 0.0] = 1.0
-    R = _by_reflections(J, np.zeros(len(J)))[0][:-1]
-    _, s, V = np.linalg.svd(R / length)
+    length, s, V = right_singular(J)
     kept = s > flat * s[0]
     return J @ (V[kept].T / length[:, None] / s[kept])
+
+
+def right_singular(J: Array) -> tuple[Array, Array, Array]:
+    """Lengths of columns J (m, p), and singular values (p,) and right vectors (p, p), by rows, of these scaled to 1.
+
+    Parameters
+    ----------
+    J : ndarray, shape (m, p)
+        Columns, at least as many rows.
+    """
+    length = np.linalg.norm(J, axis=0)
+    length[length == 0.0] = 1.0
+    _, s, V = np.linalg.svd(_by_reflections(J, np.zeros(len(J)))[0][:-1] / length)
+    return length, s, V
 
 
 def triangle(G: Array, less: Array | None = None) -> tuple[Array, Array] | None:

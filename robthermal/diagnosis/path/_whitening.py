@@ -201,11 +201,13 @@ def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNois
         On top of the white noise.
     """
     A, C = path.steps[0], path.C
-    n, R = len(A), np.broadcast_to(np.diag(noise**2), (len(A), noise.size, noise.size))
+    n, each = len(A), np.eye(noise.size)
+    squares = np.broadcast_to(noise**2, (n, noise.size))
     if path.one.missing is not None:
-        R = R + _IGNORED**2 * path.one.missing[:, :, None] * np.eye(noise.size)
+        squares = squares + _IGNORED**2 * path.one.missing
     if slow is None and not disturbance.any():
-        return Whitener(A, C, np.zeros((n, A.shape[1], C.shape[1])), np.linalg.inv(np.linalg.cholesky(R)))
+        return Whitener(A, C, np.zeros((n, A.shape[1], C.shape[1])), (1.0 / np.sqrt(squares))[:, :, None] * each)
+    R = squares[:, :, None] * each
     Q, P = gathered(path, disturbance), np.zeros(A.shape[1:])
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)

@@ -25,6 +25,7 @@ _FEW = 3  # evaluations of every start
 _KEPT = 0.7  # share of the predicted decrease that a good start keeps
 _MOVES = 0.1  # share of it that a start from nothing must reach not to be called standing still
 _MANY = 12  # evaluations along a curved valley
+_AS_MUCH = 0.75  # of the best ΔBIC reached, that a candidate must promise for as many
 BEHIND = 60.0  # ΔBIC by which a candidate may lie below the best, and still get there
 _SHARE = 0.3  # of the best ΔBIC, less that much
 _FACTOR = 1.0  # of a logarithm: a linearization says nothing of a parameter that changes by more than a factor e
@@ -76,7 +77,7 @@ def started(origin: Origin, candidate: Candidate, size: float, best: float = 0.0
         least = min(least, start.promise)
     worth = not tried or in_reach(fit.n_readings * np.log(fit.rss / least), best)
     if worth and not any(new.rss < fit.rss for new in tried):
-        tried += _from_nothing(fit, candidate, size, tried, least)
+        tried += _from_nothing(fit, candidate, size, tried, least, best)
     return min(tried, key=lambda new: new.rss)
 
 
@@ -105,13 +106,19 @@ def elsewhere(origin: Origin, candidate: Candidate, values: Mapping[str, float])
     return None if new is None else extended(new, new.structure, new.v, _MANY)
 
 
-def _from_nothing(fit: Refit, candidate: Candidate, size: float, tried: list[Refit], least: float) -> list[Refit]:
-    """Refits from a size that hardly shows and, where that stands still, further iterations of the best start."""
+def _from_nothing(fit: Refit, candidate: Candidate, size: float, tried: list[Refit], least: float, best: float
+                  ) -> list[Refit]:
+    """Refits from a size that hardly shows and, where that stands still, further iterations of the best start.
+
+    These cost as much as all starts together: for those that promise about what another has reached, the `best` ΔBIC.
+    """
     nothing = float(np.sign(size)) * candidate.effect.size.typical
     new = _refitted(fit, _Start(fit, candidate, fit.v, nothing, fit.rss))
     if new is None and not tried:
         raise Diverged(f"no start of {candidate.label} survives its simulation", time=0.0)
-    further = _further_iterations(fit, tried, least, fit.rss if new is None else new.rss)
+    promised = fit.n_readings * np.log(fit.rss / least)
+    further = (_further_iterations(fit, tried, least, fit.rss if new is None else new.rss)
+               if promised > _AS_MUCH * best else None)
     return [one for one in (new, further) if one is not None]
 
 

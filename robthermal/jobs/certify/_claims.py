@@ -11,7 +11,6 @@ from typing import Any
 from ...certify import (
     RunawayFree,
     contraction,
-    heater_heat,
     largest_regulated_current,
     runaway,
     runaway_free,
@@ -65,8 +64,7 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     """
     if parameters is None and not isinstance(boxes.parameters, str):
         parameters = boxes.parameters
-    current = _currents(system, boxes)
-    heat = heater_heat(system) if boxes.heat is None else boxes.heat
+    current, heat = _currents(system, boxes), boxes.heat
     progress("certifying the temperature box, and that no trajectory leaves its box")
     nominal, safe = _required(system, boxes, current, heat)
     found = list(nominal.values())
@@ -103,12 +101,11 @@ def claims_hold(system: System, boxes: Boxes, parameters: Ranges) -> bool:
     parameters : mapping
         {parameter: (lower, upper)}.
     """
-    heat = heater_heat(system) if boxes.heat is None else boxes.heat
-    box, safe = _claims(system, boxes, _currents(system, boxes), heat, parameters)
+    box, safe = _claims(system, boxes, _currents(system, boxes), boxes.heat, parameters)
     return box.holds and safe.holds
 
 
-def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any],
+def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
             parameters: Ranges | None) -> tuple[Certificate, RunawayFree]:
     norm: dict[str, Any] = {"method": boxes.method, "structure": boxes.structure, "large": boxes.large,
                             "parameters": parameters}
@@ -116,7 +113,7 @@ def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapp
     return box, runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, **norm)
 
 
-def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any],
+def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
               parameters: Ranges | None = None) -> tuple[dict[str, Checked], RunawayFree]:
     """Required claims by key, as yet without their checks."""
     box, safe = _claims(system, boxes, current, heat, parameters)
@@ -129,8 +126,8 @@ def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Ma
             for key, certificate in found.items()}, safe
 
 
-def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any], parameters: Ranges,
-            nominal: Mapping[str, Checked]) -> dict[str, Checked]:
+def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
+            parameters: Ranges, nominal: Mapping[str, Checked]) -> dict[str, Checked]:
     """The same for all parameters in their ranges, with the parameter that breaks what holds without the ranges."""
     found, _ = _required(system, boxes, current, heat, parameters)
 

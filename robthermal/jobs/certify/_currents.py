@@ -30,7 +30,7 @@ def directions(current: Pairs) -> tuple[Direction, ...]:
     return ("cooling", "heating", "symmetric") if both else ("cooling", "heating")
 
 
-def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs, parameters: Pairs | None,
+def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs | None, parameters: Pairs | None,
                     progress: Callable[[str], None]) -> tuple[list[UsableRange], list[Found]]:
     """Usable currents of all directions, with certificates; for the parameter ranges too where there are some."""
     rows: list[UsableRange] = []

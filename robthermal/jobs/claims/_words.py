@@ -128,7 +128,7 @@ def box_of(certificate: Certificate) -> str:
     parts += [f"heat into {name}: {_range(pair)} W" for name, pair in _pairs(region, "heat")]
     for name, pair in _pairs(region, "power"):
         at = float(certificate.system["inputs"][name]["reference_temperature"]) - ZERO_CELSIUS
-        parts.append(f"heater {name}: {_range(pair)} W at {at:.6g} °C")
+        parts.append(f"heater {name}: {_range(pair)} W at {at:.6g} °C, linear in its temperature")
     uncertain = [f"{name} {_range(pair)}" for name, pair in _pairs(region, "parameters")]
     if uncertain:
         listed = f": {', '.join(uncertain)}" if len(uncertain) <= _LISTED else ", as the file states them"

@@ -1,0 +1,124 @@
+"""Heaters as they are and constant heats are covered by ranges of heat: nothing leaves the box, and it is tight."""
+
+import numpy as np
+import pytest
+
+import robthermal as rt
+from robthermal.verification import verify
+
+ROOM, LIMITS = 293.15, (0.0, 10.0)
+# effect, where, its numbers, largest heat into the coil [W]; None where another test says it
+COVERED = [
+    ("input_gain", ["q"], {"gain": 0.2}, 12.0), ("input_offset", ["q"], {"offset": 1.5}, 11.5),
+    ("input_gain_slope", ["q"], {"slope": 0.05}, 15.0), ("input_gain_slope", ["q"], {"slope": -0.02}, 8.0),
+    ("input_saturation", ["q"], {"cubic": 0.002}, 8.0), ("input_saturation", ["q"], {"cubic": 0.005}, None),
+    ("input_saturation", ["q"], {"clip": 6.0}, 6.0), ("input_lag", ["q"], {"time_constant": 30.0}, 10.0),
+    ("input_delay", ["q"], {"delay": 20.0}, 10.0), ("input_feedthrough", ["q", "core"], {"share": 0.3}, None),
+    ("heat_source", ["coil"], {"heat": 2.0}, 12.0), ("heat_source", ["coil"], {"heat": -3.0}, 7.0),
+    ("sensor_self_heating", ["T"], {"heat": 0.5}, 10.5),
+    ("periodic_load", ["coil"], {"heat": 1.5, "period": 40000.0}, 11.5)]
+
+
+def machine() -> rt.System:
+    return rt.System(ambients={"room": {"temperature": ROOM}},
+                     lumps={"coil": {"capacity": 40.0}, "core": {"capacity": 100.0}},
+                     links=[{"between": ("coil", "core"), "conductance": 1.0},
+                            {"between": ("core", "room"), "conductance": 0.5}],
+                     sensors={"T": {"lump": "coil"}}, inputs={"q": {"lump": "coil", "limits": LIMITS}})
+
+
+def with_effect(effect, where, values) -> rt.System:
+    return rt.thermal.add_effect(machine(), effect, where, values).system
+
+
+def hottest_and_coldest(system: rt.System, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Extremes of the lumps over random switching of the heater within its limits, full and no power for long."""
+    held = np.concatenate([np.full(1500, LIMITS[1]), np.full(1500, LIMITS[0]), np.repeat(rng.uniform(*LIMITS, 40), 25),
+                           np.repeat(rng.choice(LIMITS, 40), 50), np.full(1500, 0.8165 * LIMITS[1])])
+    drive = rt.Record(sample_time=10.0, inputs=held, outputs=np.zeros((len(held), 0)), input_names=["q"],
+                      output_names=[])
+    lumps = rt.thermal.trajectory(system, drive).lumps
+    return lumps.max(axis=0), lumps.min(axis=0)
+
+
+@pytest.mark.parametrize(("effect", "where", "values", "most"), COVERED)
+def test_no_trajectory_leaves_the_box_and_it_is_no_larger_than_it_must_be(effect, where, values, most):
+    system = with_effect(effect, where, values)
+    found = rt.certify.runaway_free(system, current={})
+    assert found.holds and verify(found.invariance).valid and verify(found.contraction).valid
+    hot, cold = hottest_and_coldest(system, np.random.default_rng(2))
+    low, high = np.array([found.temperature[name] for name in ("coil", "core")]).T
+    assert (hot < high).all() and (cold > low - 1e-9).all()
+    assert high[0] - ROOM < 1.03 * (hot[0] - ROOM) + 0.3, "half a percent of every heat is in reserve"
+    if most is not None:
+        assert found.invariance.region["heat"]["coil"][1] == pytest.approx(most, rel=1e-12)
+
+
+def test_what_a_cubic_saturation_gives_most_lies_within_the_limits():
+    """v - 0.005 v³ is largest at √(1/0.015) = 8.165, and 5 W at the limit of 10."""
+    found = rt.certify.heater_heat(with_effect("input_saturation", ["q"], {"cubic": 0.005}))
+    assert found["coil"] == pytest.approx((0.0, 2 / 3 * np.sqrt(1 / 0.015)), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ranges_of_what_a_heater_does_are_those_of_a_dense_grid(seed):
+    rng = np.random.default_rng(seed)
+    drive = {"gain": rng.uniform(-0.3, 0.3), "offset": rng.uniform(-2, 2), "gain_slope": rng.uniform(-0.1, 0.1),
+             "cubic": rng.uniform(-0.004, 0.01)}
+    limits = tuple(np.sort(rng.uniform(-12, 12, 2)).tolist())
+    system = rt.System(**{**dict(machine()), "inputs": {"q": {"lump": "coil", "limits": limits, "gain": -1.3,
+                                                              "drive": drive}}})
+    spread = {f"inputs.q.drive.{name}": (value - 0.1 * abs(value), value + 0.2 * abs(value))
+              for name, value in drive.items()}
+    for ranges in ({}, spread):
+        given = rt.certify.heater_heat(system, ranges)["coil"]
+        values = []
+        for _ in range(300 if ranges else 1):
+            at = {name: rng.choice(pair) if rng.random() < 0.9 else rng.uniform(*pair) for name, pair in ranges.items()}
+            one = system.with_parameters({name: float(value) for name, value in at.items()})
+            v = np.linspace(*limits, 4001)
+            u = np.column_stack([v, np.full(v.size, ROOM)])
+            values += rt.thermal.Equations(one).heat(np.full((v.size, 2), ROOM), u)[:, 0].tolist()
+        assert given[0] <= min(values) + 1e-9 and max(values) <= given[1] + 1e-9
+        loose = 0.0 if not ranges else 0.02
+        assert max(values) >= given[1] - 1e-3 - loose * np.ptp(given)
+        assert min(values) <= given[0] + 1e-3 + loose * np.ptp(given)
+
+
+def test_uncertain_heats_are_counted_and_are_no_parameters_of_the_network():
+    system = with_effect("heat_source", ["coil"], {"heat": 2.0}).with_parameters({"inputs.q.drive.gain": 0.1})
+    ranges = {"lumps.coil.heat": (1.5, 2.5), "inputs.q.drive.gain": (0.05, 0.15), "links.core-room.conductance":
+              (0.45, 0.55), "sensors.T.self_heating": (0.0, 0.1)}
+    found = rt.certify.runaway_free(system, current={}, parameters=ranges)
+    assert found.holds and found.invariance.region["heat"]["coil"] == pytest.approx([1.5, 14.1])
+    assert list(found.invariance.region["parameters"]) == ["links.core-room.conductance"]
+    box = rt.certify.contraction(system, current={}, temperature=(280.0, 400.0), parameters=ranges)
+    assert box.holds and list(box.region["parameters"]) == ["links.core-room.conductance"]
+
+
+@pytest.mark.parametrize(("name", "pair", "message"), [
+    ("lumps.coil.heat", (2.0, 1.0), "lower <= upper"), ("sensors.T.self_heating", (0.0, np.nan), "finite numbers"),
+    ("lumps.attic.heat", (0.0, 1.0), "no parameter 'lumps.attic.heat'")])
+def test_ranges_of_heats_that_are_none_are_refused(name, pair, message):
+    for claim in (lambda: rt.certify.runaway_free(machine(), current={}, parameters={name: pair}),
+                  lambda: rt.certify.invariance(machine(), current={}, temperature=(280.0, 340.0),
+                                                parameters={name: pair})):
+        with pytest.raises(rt.InputError, match=message):
+            claim()
+
+
+def test_a_report_of_a_machine_with_a_lag_named_holds_for_the_range_of_its_gain():
+    system = with_effect("input_lag", ["q"], {"time_constant": 30.0})
+    done = rt.jobs.certify_system(system, rt.jobs.Boxes(temperature=(280.0, 400.0)), parameters={
+        "inputs.q.gain": (0.9, 1.2), "inputs.q.drive.time_constant": (20.0, 40.0)})
+    heats = {one.key: one.certificate.region["heat"]["coil"] for one in done.checked if one.key.startswith("box")
+             and "contraction" not in one.key}
+    assert done.holds and heats == {"box": [0.0, 10.0], "box_ranges": [0.0, 12.0]}
+
+
+def test_given_heats_come_with_those_of_the_system():
+    system = with_effect("heat_source", ["core"], {"heat": 2.0})
+    box = {"coil": (292.0, 310.2), "core": (292.0, 306.0)}  # at most 305.15 and 309.15
+    cert = rt.certify.invariance(system, current={}, temperature=box, heat={"coil": (0.0, 4.0)})
+    assert cert.holds and cert.region["heat"] == {"coil": [0.0, 4.0], "core": [2.0, 2.0]}
+    assert rt.certify.invariance(system, current={}, temperature=box).region["heat"] == {"core": [2.0, 2.0]}
