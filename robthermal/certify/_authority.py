@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..errors import InputError
 from ..thermal import System
 from ..verification import Certificate, machine_hash, same_system, verify
+from ._own_heat import driven
 from ._sections import system_section
 
 
@@ -52,3 +53,17 @@ def check_certificate(certificate: Certificate, system: System, kind: str, where
         raise InputError(f"the certificate is about another machine, {machine_hash(certificate.system)} instead of "
                          f"{machine_hash(section)}", where=where, expected="a certificate of exactly this system",
                          remedy="Certify this system; any changed number makes it another machine.")
+    if kind == "invariance":
+        _cover(certificate, system, where)
+
+
+def _cover(certificate: Certificate, system: System, where: str) -> None:
+    """Refuse heats of the system's own, constant and of leads, that are not among those of a box that is never left."""
+    current = {name: (float(low), float(high)) for name, (low, high) in certificate.region["current"].items()}
+    covered = certificate.region.get("heat", {})
+    for lump, (low, high) in driven(system, {}, None, current).heat.items():
+        least, most = (float(end) for end in covered.get(lump, (0.0, 0.0)))
+        if low < least or high > most:
+            raise InputError(f"the system itself heats lump {lump!r} by {low:.6g} to {high:.6g} W, and the box is "
+                             f"never left for {least:.6g} to {most:.6g} W", where=where,
+                             expected="a certificate of exactly this system", remedy="Certify this system.")

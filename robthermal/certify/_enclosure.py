@@ -20,18 +20,19 @@ from ..verification import Certificate, not_certified
 from ._contraction import Method, contraction
 from ._energy import energy_rate
 from ._faces import Array, Faces
-from ._heaters import following, power_ranges
+from ._heaters import following, heater_sections, power_ranges, slope_of
 from ._invariance import invariance
 from ._jacobian import box_jacobian
 from ._lyapunov import Structure
 from ._outcomes import CertifyCode
-from ._own_heat import driven
+from ._own_heat import driven, of_leads
 from ._sections import (
     Currents,
     Interval,
     current_box,
     made_by,
     parameter_box,
+    refuse_effects,
     region_section,
     system_section,
 )
@@ -127,9 +128,10 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     around = ambient_ranges(system, ambient, parameters)
     plain = driven(system, heat_ranges(system, heat, parameters), parameters)
     system, heat, parameters = plain.system, plain.heat, plain.parameters
-    system_section(system, heaters=following(system, parameters))  # refuses effects before they meet the box
+    heater_sections(system, following(system, parameters))  # refuses what heaters are that no claim knows
+    refuse_effects(system, ("leads",), [*map(slope_of, following(system, parameters))])  # before they meet the box
     currents = current_box(system, current)
-    ranges, power = parameter_box(system, parameters), power_ranges(system, parameters)
+    ranges, power = parameter_box(system, parameters) | of_leads(parameters), power_ranges(system, parameters)
 
     def faces(kept: Mapping[str, Any]) -> Faces:
         return Faces(system, around, heat, kept, RESERVE, power)
@@ -167,7 +169,8 @@ def named_box(system: System, box: Array) -> dict[str, Interval]:
 
 def no_box(system: System, current: Currents) -> Certificate:
     """The refusal where no box was found."""
-    region, heaters = region_section(system, current, (COLDEST, HOTTEST)), following(system)
+    system, heaters = driven(system, {}, None, current_box(system, current)).system, following(system)
+    region = region_section(system, current, (COLDEST, HOTTEST))
     reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
               f"diverges, or its box would reach below {COLDEST:g} K or above {HOTTEST:g} K. Narrow the currents, or "
               "improve the heat sink.")

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array, csc_array
 from ..thermal import System
 from ._heaters import reference, slope_of
 from ._jacobian import module_variants
+from ._own_heat import leads_of, squares_of
 from ._sections import Interval
 
 Array = NDArray[np.float64]
@@ -113,6 +114,7 @@ class Faces:
             self._add_links(side, nodes[side], add)
             self._add_modules(side, nodes, current, add)
             self._add_heaters(side, nodes[side], add)
+            self._add_leads(side, current, heat[side])
             heat[side] += SIGNS[side] * self._loads[side] + self.reserve * np.abs(self._loads[side]) + self.margin
         shape = (2 * self.count, 2 * self.count)
         entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
@@ -150,6 +152,11 @@ class Faces:
             flow, (q, s) = max((SIGNS[side] * heat + self.reserve * abs(heat), pair)
                                for heat, pair in zip(heats, corners, strict=True))
             add(side, np.array([lump]), np.array([flow]), np.array([q * s]), nowhere, side, none)
+
+    def _add_leads(self, side: int, current: Mapping[str, Any], heat: Array) -> None:
+        for lump, module, resistance in leads_of(self.system, self.parameters):
+            heats = np.outer(resistance, squares_of(current[module]))
+            heat[self.system.lump_names.index(lump)] += np.max(SIGNS[side] * heats + self.reserve * np.abs(heats))
 
     @cached_property
     def _heaters(self) -> list[tuple[int, list[Interval]]]:

@@ -25,6 +25,11 @@ def is_own_heat(name: str) -> bool:
         table == "lumps" and name.endswith((".periodic.period", ".periodic.phase")))
 
 
+def is_of_lead(name: str) -> bool:
+    """Whether a parameter is the resistance of a lead: its heat is the current's."""
+    return name.startswith("leads.") and name.endswith(".resistance")
+
+
 def following(system: System, parameters: Mapping[str, Interval] | None = None) -> tuple[str, ...]:
     """Names of the heaters whose power follows temperature, or may in these ranges of parameters."""
     return tuple(name for name, heater in system.inputs.items() if heater.power_slope is not None

@@ -12,6 +12,7 @@ from ._sections import (
     Currents,
     Interval,
     Temperatures,
+    current_box,
     made_by,
     named_ranges,
     region_section,
@@ -61,7 +62,8 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     True
     """
     given = named_ranges(heat or {}, system.lump_names, "heat", "lump")
-    plain = driven(system, {name: (low, high) for name, (low, high) in given.items()}, parameters)
+    plain = driven(system, {name: (low, high) for name, (low, high) in given.items()}, parameters,
+                   current_box(system, current))
     region = region_section(plain.system, current, temperature, plain.parameters)
     region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
     if plain.heat:

@@ -1,4 +1,4 @@
-"""Heat that depends on no temperature, as ranges beside a network without it: heaters as they are, constant heats.
+"""Heat that depends on no temperature, as ranges beside a network without it: of heaters as they are, leads, constant.
 
 Claims about a network state ranges of heat into its lumps. What a heater makes of its column, and heats of the system's
 own that are constant or periodic, are somewhere in such a range; in what order they come does not matter.
@@ -7,13 +7,14 @@ own that are constant or periodic, are somewhere in such a range; in what order 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 from ..errors import InputError
 from ..thermal import System
-from ._heaters import LATE, MORE, OWN, following, is_own_heat
+from ._heaters import LATE, MORE, OWN, following, is_of_lead, is_own_heat
 from ._sections import named_ranges
 
 Interval = tuple[float, float]
@@ -39,7 +40,7 @@ class Driven:
     parameters: dict[str, Interval]
 
 
-def driven(system: System, heat: Ranges, parameters: Ranges | None) -> Driven:
+def driven(system: System, heat: Ranges, parameters: Ranges | None, current: Mapping[str, Any] | None = None) -> Driven:
     """Count heats of the system's own as ranges of heat.
 
     Parameters
@@ -50,6 +51,8 @@ def driven(system: System, heat: Ranges, parameters: Ranges | None) -> Driven:
         {lump: (lower, upper)} [W], heaters and loads.
     parameters : mapping, optional
         Ranges of uncertain numbers of the system.
+    current : mapping, optional
+        {module: (lower, upper)} [A]: the heat of leads is counted too. Without it they are left as they are.
 
     Raises
     ------
@@ -63,17 +66,42 @@ def driven(system: System, heat: Ranges, parameters: Ranges | None) -> Driven:
         if name.endswith("periodic.heat"):
             low, high = -max(-low, high), max(-low, high)
         add(total, lump, (low, high))
+    if current is not None:
+        for lump, module, resistance in leads_of(system, ranges):
+            heats = [R * square for R, square in product(resistance, squares_of(current[module]))]
+            add(total, lump, (min(heats), max(heats)))
     heaters = [name for name in system.inputs if name not in following(system, ranges)]
     counted = tuple(f"inputs.{name}.{field}" for name in heaters for field in (*MORE, *LATE))
-    kept = {name: pair for name, pair in ranges.items() if name not in counted and not is_own_heat(name)}
-    if not any(name in counted or is_own_heat(name) for name in system.effects):
+    kept = {name: pair for name, pair in ranges.items() if name not in counted and not is_own_heat(name)
+            and not (current is not None and is_of_lead(name))}
+    if not any(name in counted or is_own_heat(name) or is_of_lead(name) for name in system.effects):
         return Driven(system, total, kept)
     plain = {
         "lumps": {name: {**dict(lump), "heat": 0.0, "periodic": None} for name, lump in system.lumps.items()},
         "sensors": {name: {**dict(sensor), "self_heating": 0.0} for name, sensor in system.sensors.items()},
         "inputs": {name: {**dict(heater), **({"drive": {}, "feedthrough": None} if name in heaters else {})}
                    for name, heater in system.inputs.items()}}
-    return Driven(System(**{**dict(system), **plain, "fit": {}}), total, kept)
+    leads = () if current is not None else system.leads
+    return Driven(System(**{**dict(system), **plain, "leads": leads, "fit": {}}), total, kept)
+
+
+def leads_of(system: System, parameters: Ranges) -> Iterator[tuple[str, str, Interval]]:
+    """Lump, module and resistance [Ω] of every lead that heats."""
+    for lead in system.leads:
+        resistance = _range(system, f"leads.{lead.name}.resistance", parameters)
+        if any(resistance):
+            yield lead.lump, lead.module, resistance
+
+
+def squares_of(current: Sequence[float]) -> Interval:
+    """Least and largest square of a current in a range [A²]."""
+    low, high = current
+    return (0.0 if low <= 0.0 <= high else min(low * low, high * high)), max(low * low, high * high)
+
+
+def of_leads(parameters: Ranges | None) -> dict[str, Interval]:
+    """Ranges of the resistances of leads, among others."""
+    return {name: pair for name, pair in (parameters or {}).items() if is_of_lead(name)}
 
 
 def heater_range(system: System, name: str, parameters: Ranges | None = None) -> Interval:

@@ -24,6 +24,7 @@ from ._sections import (
     made_by,
     named_ranges,
     parameter_box,
+    refuse_effects,
     system_section,
     temperature_box,
 )
@@ -84,8 +85,9 @@ def regulated(system: System, *, setpoint: SetPoints, current: Currents, tempera
     (True, True)
     """
     _check(system, method, large)
+    refuse_effects(system, ("lumps", "sensors", "inputs"))  # the heat of leads differs between two trajectories
     region = _region(system, setpoint, current, temperature, parameters)
-    parts: dict[str, Any] = {"system": system_section(system), "region": region}
+    parts: dict[str, Any] = {"system": system_section(system, forcing=True), "region": region}
     box = regulated_jacobian(system, region)
     if box is None:
         return _no_grip(parts, method)

@@ -13,7 +13,7 @@ import numpy as np
 from .._celsius import ADD_ZERO
 from ..errors import InputError
 from ..thermal import System
-from ._heaters import LATE, MORE, following, heater_sections, is_own_heat, power_ranges, slope_of
+from ._heaters import LATE, MORE, following, heater_sections, is_of_lead, is_own_heat, power_ranges, slope_of
 
 Interval = tuple[float, float]
 Currents = Mapping[str, Interval]
@@ -26,7 +26,7 @@ _LISTED = 12  # names in a message
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
 _FORCING = {"lumps": ("heat", "periodic.heat"), "sensors": ("self_heating",),
-            "inputs": (*MORE, *LATE)}
+            "inputs": (*MORE, *LATE), "leads": ("resistance",)}
 
 
 def system_section(system: System, *, forcing: bool = False, heaters: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -97,15 +97,15 @@ def region_section(system: System, current: Currents, temperature: Temperatures,
 def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
     """{parameter name: [lo, hi]} around the values of the system, of those that the claim depends on.
 
-    What only sensors, heaters, constant heats or a start know is left out: no claim about the network in given ranges
-    of currents, heats and ambients depends on it.
+    What only sensors, heaters, leads, constant heats or a start know is left out: no claim about the network in given
+    ranges of currents, heats and ambients depends on it.
     """
     every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
     slopes, ranges = set(map(slope_of, following(system, parameters))), {}
     for name, (low, high) in every.items():
         where, value = f"argument parameters[{name!r}]", system.parameter(name)
         follows = name in slopes
-        outside = (name.startswith(_NOT_OF_THE_NETWORK) and not follows) or is_own_heat(name)
+        outside = (name.startswith(_NOT_OF_THE_NETWORK) and not follows) or is_own_heat(name) or is_of_lead(name)
         if outside or name.endswith((".disturbance", ".initial")):
             continue
         if not follows and not name.endswith(_UNCERTAIN):

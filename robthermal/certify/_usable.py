@@ -11,9 +11,9 @@ from ..verification import Certificate
 from ._contraction import METHODS, Method, contraction
 from ._limits import DIRECTIONS, Direction, current_range
 from ._outcomes import CertifyCode
-from ._own_heat import driven
+from ._own_heat import driven, of_leads
 from ._regulated import SetPoints
-from ._sections import Interval, Temperatures, parameter_box, system_section
+from ._sections import Interval, Temperatures, parameter_box, refuse_effects
 from ._surroundings import ambient_ranges, heat_ranges
 from ._usable_bounds import Lower, Question, contraction_bound, largest_box_current, rating_bound
 from ._usable_result import CurrentBound, UsableCurrent
@@ -95,7 +95,7 @@ def question_of(system: System, *, direction: Direction = "cooling", temperature
     plain = driven(system, heat_ranges(system, heat, parameters), parameters)
     _check(plain.system, direction, method, lower)
     question = Question(plain.system, direction, temperature, around, plain.heat,
-                        parameter_box(plain.system, plain.parameters), lower, method)
+                        parameter_box(plain.system, plain.parameters) | of_leads(plain.parameters), lower, method)
     question.check_box()
     return question
 
@@ -164,7 +164,7 @@ def _limiting_parameter(question: Question, limited_by: str, current: float) -> 
 
 
 def _check(system: System, direction: str, method: str, lower: str) -> None:
-    system_section(system)  # refuses effects that no certificate covers
+    refuse_effects(system, ("leads",))
     for argument, value, choices in (("direction", direction, DIRECTIONS), ("method", method, METHODS),
                                      ("lower", lower, ("inside", "reported"))):
         if value not in choices:

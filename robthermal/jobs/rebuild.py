@@ -160,7 +160,7 @@ def _checked_twice(found: list[_Found], files: set[str]) -> list[_Found]:
     return [replace(one, evidence=checked) for one, checked in zip(found, evidence, strict=True)]
 
 
-_NETWORK = ("name", "lumps", "ambients", "links", "modules")
+_NETWORK = ("name", "lumps", "ambients", "links", "modules", "inputs")
 
 
 def _lost(one: Evidence, reason: str) -> Evidence:

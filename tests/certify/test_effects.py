@@ -11,7 +11,8 @@ PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sen
 OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "sensor_lag",
        "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope"}  # plain system content
 FOLLOWING = {"heater_power_slope"}  # a heat that the certificates of a network know
-COUNTED = {"heat_source", "sensor_self_heating", "periodic_load", "input_feedthrough", "input_gain_slope"}  # as heat
+COUNTED = {"heat_source", "sensor_self_heating", "periodic_load", "input_feedthrough", "input_gain_slope",
+           "lead_heating"}  # as heat
 FORCING = {*COUNTED, "ambient_gradient"}
 
 

@@ -122,3 +122,78 @@ def test_given_heats_come_with_those_of_the_system():
     cert = rt.certify.invariance(system, current={}, temperature=box, heat={"coil": (0.0, 4.0)})
     assert cert.holds and cert.region["heat"] == {"coil": [0.0, 4.0], "core": [2.0, 2.0]}
     assert rt.certify.invariance(system, current={}, temperature=box).region["heat"] == {"core": [2.0, 2.0]}
+
+
+def stack(resistance: float) -> rt.System:
+    """Two modules; a lead of the first one heats its cold lump."""
+    two = rt.systems.two_module()
+    return rt.thermal.add_effect(two, "lead_heating", ["x9", "m1"], {"resistance": resistance}).system
+
+
+def test_leads_heat_with_the_square_of_the_current():
+    system, current = stack(0.4), {"m1": (-0.5, 1.0), "m2": (0.0, 1.0)}
+    found = rt.certify.runaway_free(system, current=current)
+    assert found.holds and found.invariance.region["heat"] == {"x9": [0.0, 0.4]}
+    assert verify(found.invariance).valid and "no other heat" in found.invariance.claim
+    plain = rt.certify.runaway_free(rt.systems.two_module(), current=current)
+    assert found.temperature["x9"][1] > plain.temperature["x9"][1] + 0.1
+    both = rt.certify.invariance(system, current={"m1": (0.5, 1.0), "m2": (0.0, 1.0)}, temperature=(200.0, 500.0),
+                                 parameters={"leads.m1-x9.resistance": (0.3, 0.5)})
+    assert both.region["heat"]["x9"] == pytest.approx([0.3 * 0.25, 0.5]) and "parameters" not in both.region
+    rng = np.random.default_rng(4)
+    held = np.repeat(np.column_stack([rng.choice([-0.5, 1.0], 60), rng.choice([0.0, 1.0], 60)]), 30, axis=0)
+    held = np.concatenate([np.tile([1.0, 1.0], (1500, 1)), np.tile([1.0, 0.0], (1500, 1)), held])
+    drive = rt.Record(sample_time=5.0, inputs=held, outputs=np.zeros((len(held), 0)), input_names=["m1", "m2"],
+                      output_names=[])
+    lumps = rt.thermal.trajectory(system, drive).lumps
+    low, high = np.array([found.temperature[name] for name in system.lumps]).T
+    assert (lumps.max(axis=0) < high).all() and (lumps.min(axis=0) > low).all()
+
+
+def test_leads_cost_usable_current():
+    """Of a lead in the cold lump more current heats earlier: the coldest steady state is at less."""
+    stated = (278.15, 358.15)
+    plain = rt.certify.usable_current(rt.systems.two_module(), temperature=stated, lower="reported")
+    with_lead = rt.certify.usable_current(stack(2.0), temperature=stated, lower="reported",
+                                          parameters={"leads.m1-x9.resistance": (1.5, 2.5)})
+    assert with_lead.holds and 0.3 * plain.current < with_lead.current < 0.9 * plain.current
+    c = with_lead.current
+    assert with_lead.invariance.region["heat"]["x9"] == pytest.approx([0.0, 2.5 * c**2])
+    low, high = np.array([with_lead.box[name] for name in stack(2.0).lumps]).T
+    drive = rt.Record(sample_time=20.0, inputs=np.full((1500, 2), c), outputs=np.zeros((1500, 0)),
+                      input_names=["m1", "m2"], output_names=[])
+    lumps = rt.thermal.trajectory(stack(2.5), drive).lumps
+    assert (lumps.max(axis=0) < high).all() and (lumps.min(axis=0) > low).all()
+
+
+def test_regulated_claims_refuse_leads_and_pass_constant_heats():
+    """Two trajectories under the same set-points have different currents in the modules that hold them."""
+    asked = {"setpoint": {"m1": 278.15, "m2": 278.15}, "temperature": (278.15, 328.15),
+             "current": {"m1": (0.0, 1.2), "m2": (0.0, 1.2)}}
+    with pytest.raises(rt.InputError, match="leads.m1-x9.resistance = 0.4 .*no certificate covers"):
+        rt.certify.regulated(stack(0.4), **asked)
+    warm = rt.systems.two_module().with_parameters({"lumps.x9.heat": 0.3})
+    assert rt.certify.regulated(warm, **asked).claim == rt.certify.regulated(rt.systems.two_module(), **asked).claim
+
+
+def test_a_report_says_what_is_not_certified_of_a_machine_with_leads():
+    boxes = rt.jobs.Boxes(current={"m1": (0.0, 1.0), "m2": (0.0, 1.0)}, setpoint={"m1": 283.15, "m2": 283.15})
+    done = rt.jobs.certify_system(stack(0.4), boxes)
+    refused = {one.key: one.certificate.reason for one in done.checked if not one.certificate.holds}
+    assert done.holds and set(refused) == {"runaway", "regulated"}
+    assert all("leads.m1-x9.resistance = 0.4 is an effect" in reason for reason in refused.values())
+    with pytest.raises(rt.InputError, match="no module 'm3'"):
+        rt.jobs.certify_system(stack(0.4), rt.jobs.Boxes(current=boxes.current, setpoint={"m3": 283.15}))
+
+
+def test_a_law_takes_no_authority_from_a_box_without_the_heats_of_its_machine():
+    """The network is the same, and so is its section of the certificate; a heat of 3 W is not in it."""
+    plain = rt.systems.two_module()
+    proof = rt.certify.usable_current(plain, temperature=(278.15, 358.15), lower="reported")
+    rt.design.feedback_linearization(plain, certificate=proof)
+    for other in (plain.with_parameters({"lumps.x9.heat": 3.0}), stack(0.4)):
+        with pytest.raises(rt.InputError, match="the system itself heats lump 'x9' by"):
+            rt.design.feedback_linearization(other, certificate=proof)
+        own = rt.certify.usable_current(other, temperature=(278.15, 358.15), lower="reported")
+        assert own.current < proof.current
+        rt.design.feedback_linearization(other, certificate=own)

@@ -47,3 +47,6 @@ def test_the_slope_of_a_winding_is_certified_with_its_range(tmp_path: Path) -> N
     box = rt.Certificate.load(out / "certificates" / "box.json")
     assert box.region["temperature"]["bar"][1] > ROOM + 273.15 + POWER / (CONDUCTANCE - SLOPE * POWER)
     assert sum("heater Q: 0 to 8 W at 20 °C, linear in its temperature" in claim.box for claim in report.claims) == 6
+    again = rt.jobs.rebuild_report(out)
+    assert again.verdict == report.verdict and [one.status for one in again.claims] == [
+        one.status for one in report.claims]

@@ -9,6 +9,7 @@ from math import isfinite
 from typing import Any
 
 from ...certify import (
+    Runaway,
     RunawayFree,
     contraction,
     largest_regulated_current,
@@ -73,13 +74,12 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
         robust = _robust(system, boxes, current, heat, parameters, nominal)
         found = [one for key in nominal for one in (nominal[key], robust.get(key)) if one is not None]
     rows, limits = usable_currents(system, boxes, current, heat, parameters, progress)
-    fold = None
+    fold: Runaway | None = None
     optional = [Checked(key, title, certificate, None, False) for key, title, certificate in limits]
     if boxes.setpoint:
         progress("searching the runaway limit")
-        fold = runaway(system, setpoint=boxes.setpoint)
-        optional += [Checked(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert,
-                             None, False) for name, cert in fold.certificates.items()]
+        fold, closed = _closed_form(system, boxes.setpoint)
+        optional += closed
         progress("searching the largest current while the cold faces are held")
         optional.append(Checked("regulated", "Largest current while the cold faces are held", _held(system, boxes),
                                 None, False))
@@ -142,6 +142,21 @@ def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapp
 def _verified(one: Checked) -> Checked:
     verdict = verify(one.certificate) if one.certificate.holds else None
     return replace(one, verdict=verdict)
+
+
+def _closed_form(system: System, setpoint: Mapping[str, float]) -> tuple[Runaway | None, list[Checked]]:
+    """The runaway limit of single modules with its certificates; of a system that it leaves heats out of, why not."""
+    title = "Closed form of {}, constant properties (not the network)"
+    try:
+        fold = runaway(system, setpoint=setpoint)
+    except InputError as refusal:
+        if refusal.where != "argument system":  # wrong set-points are the caller's
+            raise
+        refused = not_certified("runaway", system={}, region={"setpoint": setpoint}, evidence={}, reason=str(refusal),
+                                made_by={}, claim="Up to some current a module takes more heat with more current.")
+        return None, [Checked("runaway", title.format("the modules"), refused, None, False)]
+    return fold, [Checked(f"runaway_{name}", title.format(name), cert, None, False)
+                  for name, cert in fold.certificates.items()]
 
 
 def _held(system: System, boxes: Boxes) -> Certificate:
