@@ -50,7 +50,8 @@ def usable_current(system: System, *, direction: Direction = "cooling", temperat
     ambient : mapping, optional
         {ambient: (lower, upper)} [K]; default nominal.
     heat : mapping, optional
-        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters.
+        {lump: (lower, upper)} [W], heaters and loads; default the declared limits of the heaters. Constant and periodic
+        heats of the system and the heat of leads are added.
     setpoint : mapping, optional
         {module: temperature, or (lower, upper), at which its cold face is held} [K].
     parameters : mapping, optional
