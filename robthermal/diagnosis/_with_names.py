@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from ..errors import InputError
 from ..fitting import Choice, chosen_ranges
 from ..thermal import FitRange, System, add_effect
 from ._found import Found
@@ -70,7 +71,10 @@ def ranged(system: System, nominal: System, named: Iterable[Found]) -> System:
     """
     if not nominal.fit:
         return system
-    more = with_named_effects(nominal, [one for one in named if one.effect in effects()]).fit
+    try:
+        more = with_named_effects(nominal, [one for one in named if one.effect in effects()]).fit
+    except InputError:  # the system had a number of the effect already, and may fit it
+        return system
     new = {name: more[name] for name in more if name not in nominal.fit and name in system.parameters}
     own = {name: system.parameter(name) for name in new}
     return System(**{**dict(system), "fit": {**system.fit, **{

@@ -25,6 +25,10 @@ def test_copper_is_named_by_its_coefficient(tmp_path: Path) -> None:
     slope, std, unit = found.effects[0].values["slope"]
     assert unit == "1/K" and abs(slope - ALPHA) < 1.96 * std and std < 0.2 * ALPHA
     assert found.gap["validation"].after < 0.4 * found.gap["validation"].before
+    slope = found.system.parameter("inputs.coil.power_slope")  # calibrated again it is a number like the others
+    limits = found.system.fit["inputs.coil.power_slope"]
+    assert limits.lower < 0.0 < slope < ALPHA * 2 < limits.upper
+    assert set(found.system.fit) == {*rt.thermal.parse_system(motor_coil.SYSTEM).fit, "inputs.coil.power_slope"}
 
 
 @pytest.mark.exhaustive

@@ -126,9 +126,11 @@ def box_of(certificate: Certificate) -> str:
         parts.append(f"all lumps {_celsius(box)} °C")
     parts += [f"{name}: {_celsius(pair)} °C" for name, pair in _pairs(region, "ambient")]
     parts += [f"heat into {name}: {_range(pair)} W" for name, pair in _pairs(region, "heat")]
+    heaters = dict(_pairs(certificate.system, "inputs"))
     for name, pair in _pairs(region, "power"):
-        at = float(certificate.system["inputs"][name]["reference_temperature"]) - ZERO_CELSIUS
-        parts.append(f"heater {name}: {_range(pair)} W at {at:.6g} °C, linear in its temperature")
+        if name in heaters:
+            at = float(heaters[name]["reference_temperature"]) - ZERO_CELSIUS
+            parts.append(f"heater {name}: {_range(pair)} W at {at:.6g} °C, linear in its temperature")
     uncertain = [f"{name} {_range(pair)}" for name, pair in _pairs(region, "parameters")]
     if uncertain:
         listed = f": {', '.join(uncertain)}" if len(uncertain) <= _LISTED else ", as the file states them"
