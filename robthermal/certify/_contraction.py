@@ -16,7 +16,7 @@ from ._heaters import following
 from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, short_matrices
 from ._polytope import MOST
-from ._sections import Currents, Interval, Temperatures, made_by, region_section, system_section
+from ._sections import JACOBIAN, Currents, Interval, Temperatures, made_by, region_section, system_section
 from ._weights import best_weights
 
 Method = Literal["energy", "sum", "max", "lyapunov"]
@@ -84,7 +84,7 @@ def contraction(system: System, *, current: Currents, temperature: Temperatures,
         raise InputError(f"method = {method!r}", where="argument method",
                          expected='"energy", "sum", "max" or "lyapunov"')
     system_part = system_section(system, forcing=True, heaters=following(system, parameters))
-    region = region_section(system, current, temperature, parameters)
+    region = region_section(system, current, temperature, parameters, (*JACOBIAN, "inputs"))
     parts: dict[str, Any] = {"system": system_part, "region": region}
     if method == "lyapunov":
         check_choice(system, structure, large)

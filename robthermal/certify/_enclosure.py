@@ -131,7 +131,8 @@ def runaway_free(system: System, *, current: Currents, ambient: Mapping[str, Int
     heater_sections(system, following(system, parameters))  # refuses what heaters are that no claim knows
     refuse_effects(system, ("leads",), [*map(slope_of, following(system, parameters))])  # before they meet the box
     currents = current_box(system, current)
-    ranges, power = parameter_box(system, parameters) | of_leads(parameters), power_ranges(system, parameters)
+    ranges = parameter_box(system, parameters, ("leads", "inputs")) | of_leads(parameters)
+    power = power_ranges(system, parameters)
 
     def faces(kept: Mapping[str, Any]) -> Faces:
         return Faces(system, around, heat, kept, RESERVE, power)
@@ -170,7 +171,7 @@ def named_box(system: System, box: Array) -> dict[str, Interval]:
 def no_box(system: System, current: Currents) -> Certificate:
     """The refusal where no box was found."""
     system, heaters = driven(system, {}, None, current_box(system, current)).system, following(system)
-    region = region_section(system, current, (COLDEST, HOTTEST))
+    region = region_section(system, current, (COLDEST, HOTTEST), knows=("inputs",))
     reason = ("no box was found that these currents and heats cannot leave: the heat balance of some lump "
               f"diverges, or its box would reach below {COLDEST:g} K or above {HOTTEST:g} K. Narrow the currents, or "
               "improve the heat sink.")

@@ -18,7 +18,7 @@ from ..thermal import System
 from ..verification import Certificate, establish, not_certified
 from ._jacobian import BoxJacobian, box_jacobian
 from ._outcomes import CertifyCode
-from ._sections import Currents, Interval, Temperatures, made_by, named_ranges, region_section, system_section
+from ._sections import JACOBIAN, Currents, Interval, Temperatures, made_by, named_ranges, region_section, system_section
 from ._weights import best_weights
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ def gains(system: System, *, current: Currents, temperature: Temperatures, heat:
     >>> round(float(found.ambient.loc["x9", "room"]), 2), round(float(found.ambient.loc["x11", "room"]), 2)  # K/K
     (1.27, 1.23)
     """
-    region = region_section(system, current, temperature, parameters)
+    region = region_section(system, current, temperature, parameters, JACOBIAN)
     if ambient:
         region["ambient"] = named_ranges(ambient, system.ambient_names, "ambient", "ambient", kelvin=True)
     loads = list(system.lump_names if heat is None else heat)

@@ -1,4 +1,4 @@
-"""Heaters whose power is linear in the temperature of their lump, as sections of certificates state them.
+"""What heaters give within their limits; those whose power is linear in the temperature of their lump, as sections.
 
 The heat q (1 + s (x - w)) is known by the range of q, the power at w: what the declared limits of the heater give. The
 temperature w is the first ambient's nominal one.
@@ -6,7 +6,9 @@ temperature w is the first ambient's nominal one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from itertools import product
 from typing import Any
 
 from ..errors import InputError
@@ -79,13 +81,45 @@ def reference(system: System) -> float:
     return next(iter(system.ambients.values())).temperature
 
 
-def _power(system: System, name: str, ranges: Mapping[str, Interval]) -> list[float]:
-    heater = system.inputs[name]
+def heater_range(system: System, name: str, parameters: Mapping[str, Interval] | None = None) -> Interval:
+    """Heat of a heater [W], whatever its column is within the declared limits, in the ranges of its numbers."""
+    heater, ranges = system.inputs[name], parameters or {}
     if heater.limits is None:
+        raise InputError(f"heater {name!r} has no limits", where=f"[inputs.{name}] limits",
+                         remedy="Give limits = [lower, upper], or pass heat={lump: (lower, upper)}.")
+
+    drive = heater.drive
+
+    def ends(field: str, value: float) -> Interval:
+        return ranges.get(f"inputs.{name}.{field}", (value, value))
+
+    linear = [(1.0 + gain) * v + offset for gain, v, offset in product(
+        ends("drive.gain", drive.gain), heater.limits, ends("drive.offset", drive.offset))]
+    shaped = list(_shaped(min(linear), max(linear), ends("drive.gain_slope", drive.gain_slope),
+                          ends("drive.cubic", drive.cubic)))
+    clips = ends("drive.clip", drive.clip) if drive.clip is not None else (math.inf,)
+    values = [min(max(value, -clip), clip) for value, clip in product((min(shaped), max(shaped)), clips)]
+    heats = [gain * value for gain, value in product(ends("gain", heater.gain), values)]
+    return min(heats), max(heats)
+
+
+def _power(system: System, name: str, ranges: Mapping[str, Interval]) -> list[float]:
+    if system.inputs[name].limits is None:
         raise InputError(f"heater {name!r} has no limits, and its power follows temperature",
                          where=f"[inputs.{name}] limits", remedy="Give limits = [lower, upper].")
-    ends = [gain * limit for gain in ranges.get(f"inputs.{name}.gain", (heater.gain,) * 2) for limit in heater.limits]
-    return [min(ends), max(ends)]
+    return list(heater_range(system, name, ranges))
+
+
+def _shaped(low: float, high: float, slopes: Interval, cubics: Interval) -> Iterator[float]:
+    """Values of (1 + k |l|) l - c l³ at the ends of l and where it turns within, for the ends of k and c."""
+    for k, c, sign in product(slopes, cubics, (-1.0, 1.0)):
+        places = [low, high]
+        if c:  # 1 + 2 k |l| - 3 c l² = 0
+            inside = k * k + 3.0 * c
+            places += [sign * (k + way * math.sqrt(inside)) / (3.0 * c) for way in (-1.0, 1.0)] if inside >= 0 else []
+        elif k:
+            places.append(-sign / (2.0 * k))
+        yield from ((1.0 + k * abs(v)) * v - c * v**3 for v in places if low <= v <= high)
 
 
 def _refuse_more(system: System, name: str) -> None:

@@ -64,7 +64,7 @@ def invariance(system: System, *, current: Currents, temperature: Temperatures,
     given = named_ranges(heat or {}, system.lump_names, "heat", "lump")
     plain = driven(system, {name: (low, high) for name, (low, high) in given.items()}, parameters,
                    current_box(system, current))
-    region = region_section(plain.system, current, temperature, plain.parameters)
+    region = region_section(plain.system, current, temperature, plain.parameters, ("inputs",))
     region["ambient"] = {name: list(pair) for name, pair in ambient_ranges(system, ambient, parameters).items()}
     if plain.heat:
         region["heat"] = {name: list(pair) for name, pair in plain.heat.items()}

@@ -18,7 +18,7 @@ from ._jacobian import BoxJacobian, box_jacobian
 from ._lyapunov import Structure, best_matrix, block_pattern, check_choice, largest_growth
 from ._outcomes import CertifyCode
 from ._polytope import MOST, Cuts, polytope
-from ._sections import Interval, Temperatures, region_section
+from ._sections import JACOBIAN, Interval, Temperatures, region_section
 from ._weights import has_weights
 
 Direction = Literal["symmetric", "cooling", "heating"]
@@ -112,7 +112,8 @@ def largest_current(system: System, *, temperature: Temperatures, direction: Dir
                          remedy="Without modules use rt.certify.contraction with current={}.")
 
     def box(c: float, hull: bool = False) -> BoxJacobian:
-        region = region_section(system, current_range(system, direction, c), temperature, parameters)
+        region = region_section(system, current_range(system, direction, c), temperature, parameters,
+                                (*JACOBIAN, "inputs"))
         return box_jacobian(system, region, hull=hull)
 
     if method == "lyapunov":

@@ -18,7 +18,7 @@ from ..errors import InputError, Outcome
 from ..thermal import System, format_system, steady_state
 from ._contraction import Method
 from ._outcomes import CertifyCode
-from ._sections import Interval, Temperatures, parameter_box
+from ._sections import Interval, Temperatures, parameter_box, system_section
 from ._usable import box_bound, headline, question_of
 from ._usable_bounds import Lower, Question, contraction_bound, rating_bound
 from ._usable_result import CurrentBound, UsableCurrent
@@ -134,6 +134,7 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
                                                         strict=True)]
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise InputError(f"jobs = {jobs!r}", where="argument jobs", expected="a whole number, at least 1")
+    system_section(system)  # refuses heats of its own: the loads of the map would stand in their place
     ranges = parameter_box(system, parameters or {})
     nominal = question_of(system, temperature=temperature, parameters=parameters, lower=lower, method=method, heat={},
                           ambient=dict.fromkeys(system.ambient_names, (min(axes[0]), max(axes[0]))))

@@ -190,7 +190,7 @@ def _region(system: System, setpoint: SetPoints, current: Currents, temperature:
     free = [name for name in system.lump_names if name not in held]
     region: dict[str, Any] = {"temperature": temperature_box(system, temperature, free), "setpoint": points,
                               "current": current_box(system, current)}
-    if ranges := parameter_box(system, parameters or {}):
+    if ranges := parameter_box(system, parameters or {}, ("lumps", "sensors")):
         region["parameters"] = ranges
     return region
 

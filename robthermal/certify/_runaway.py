@@ -14,7 +14,7 @@ from ..errors import Outcome
 from ..thermal import LoadCurve, System, fold
 from ..verification import Certificate, establish
 from ._outcomes import CertifyCode
-from ._sections import Interval, made_by, parameter_box, refuse_effects
+from ._sections import Interval, made_by, parameter_box, system_section
 
 _SLACKS = (0.01, 0.05, 0.2)  # share of the spread over the corners of the constants added to it, tried in turn
 
@@ -106,7 +106,7 @@ def runaway(system: System, *, setpoint: Mapping[str, float], ambient: Mapping[s
     >>> round(limit.load["m1"], 2)
     3.75
     """
-    refuse_effects(system, ("inputs",))  # the closed form leaves them out; of heaters it knows nothing anyway
+    system_section(system)  # refuses effects that the closed form leaves out
     curve = fold(system, setpoint, ambient=ambient)
     current = dict(zip(setpoint, curve.current[-1].tolist(), strict=True))
     load = dict(zip(setpoint, curve.load[-1].tolist(), strict=True))

@@ -22,6 +22,7 @@ _UNCERTAIN = (".capacity", ".conductance", ".natural.gain", ".radiation",
               *(f".{name}.{part}" for name in ("seebeck", "resistance", "conductance") for part in ("value", "slope")))
 
 _NOT_OF_THE_NETWORK = ("sensors.", "inputs.", "ambients.")
+JACOBIAN = ("lumps", "sensors", "leads")  # tables of heats that ∂f/∂x does not depend on
 _LISTED = 12  # names in a message
 
 # forcing: what adds heat that depends on no lump, and leaves the Jacobian ∂f/∂x as it is
@@ -84,43 +85,56 @@ def _module(module: Any) -> dict[str, Any]:
 
 
 def region_section(system: System, current: Currents, temperature: Temperatures,
-                   parameters: Mapping[str, Interval] | None = None) -> dict[str, Any]:
-    """Temperature and current box, and the ranges of uncertain parameters, checked against the system."""
+                   parameters: Mapping[str, Interval] | None = None, knows: Collection[str] = ()) -> dict[str, Any]:
+    """Temperature and current box, and the ranges of uncertain parameters, checked against the system.
+
+    `knows`: as in `parameter_box`.
+    """
     region = {"temperature": temperature_box(system, temperature), "current": current_box(system, current)}
-    if ranges := parameter_box(system, parameters or {}):
+    if ranges := parameter_box(system, parameters or {}, knows):
         region["parameters"] = ranges
-    if powers := power_ranges(system, parameters):
+    if "inputs" in knows and (powers := power_ranges(system, parameters)):
         region["power"] = powers
     return region
 
 
-def parameter_box(system: System, parameters: Mapping[str, Interval]) -> dict[str, list[float]]:
+def parameter_box(system: System, parameters: Mapping[str, Interval], knows: Collection[str] = ()
+                  ) -> dict[str, list[float]]:
     """{parameter name: [lo, hi]} around the values of the system, of those that the claim depends on.
 
-    What only sensors, heaters, leads, constant heats or a start know is left out: no claim about the network in given
-    ranges of currents, heats and ambients depends on it.
+    What only sensors, heaters or a start know is left out: no claim about the network in given ranges of currents,
+    heats and ambients depends on it. `knows` are tables whose heats the claim has otherwise, or does not depend on:
+    constant ones of lumps and sensors, those of leads; with "inputs" it knows heaters whose power follows temperature.
     """
     every = named_ranges(parameters, system.parameter_names, "parameters", "parameter")
-    slopes, ranges = set(map(slope_of, following(system, parameters))), {}
+    slopes = set(map(slope_of, following(system, parameters))) if "inputs" in knows else set()
+    ranges: dict[str, list[float]] = {}
     for name, (low, high) in every.items():
-        where, value = f"argument parameters[{name!r}]", system.parameter(name)
+        where = f"argument parameters[{name!r}]"
         follows = name in slopes
-        outside = (name.startswith(_NOT_OF_THE_NETWORK) and not follows) or is_own_heat(name) or is_of_lead(name)
-        if outside or name.endswith((".disturbance", ".initial")):
+        heats = is_own_heat(name) or is_of_lead(name) or name.endswith(".power_slope")
+        outside = name.partition(".")[0] in knows if heats and not follows else name.startswith(_NOT_OF_THE_NETWORK)
+        if (outside and not follows) or name.endswith((".disturbance", ".initial")):
             continue
         if not follows and not name.endswith(_UNCERTAIN):
             raise InputError(f"a range of {name} cannot be covered: no checker knows it", where=where,
                              expected="ranges of capacities, conductances, natural.gain and radiation of links, "
-                                      "values and slopes of modules, and power_slope of heaters",
+                                      "and values and slopes of modules; in boxes that are never left also of heats",
                              remedy="Leave it out of `parameters`, and hold it at its value in the calibration too.")
-        if not low <= value <= high:
-            raise InputError(f"({low}, {high}) excludes the system's own value {value}", where=where,
-                             expected="lower <= value <= upper")
+        must_hold(system, name, (low, high))
         positive = low > 0 or (low == 0 and name.startswith("links."))
         if not positive and not follows and not name.endswith(".slope"):
             raise InputError(f"({low}, {high})", where=where, expected="positive numbers; of links also 0")
         ranges[name] = [low, high]
     return ranges
+
+
+def must_hold(system: System, name: str, pair: Interval) -> None:
+    """Refuse a range without the system's own value: a claim names this system."""
+    value = system.parameter(name)
+    if not pair[0] <= value <= pair[1]:
+        raise InputError(f"({pair[0]}, {pair[1]}) excludes the system's own value {value}",
+                         where=f"argument parameters[{name!r}]", expected="lower <= value <= upper")
 
 
 def temperature_box(system: System, temperature: Temperatures, lumps: Sequence[str] | None = None) -> Any:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..thermal import System
-from ._heaters import following
-from ._own_heat import add, heater_range, through
+from ._heaters import following, heater_range
+from ._own_heat import add, through
 from ._sections import Currents, Interval, Temperatures, named_ranges, region_section
 
 

@@ -95,8 +95,8 @@ def question_of(system: System, *, direction: Direction = "cooling", temperature
     around = ambient_ranges(system, ambient, parameters)
     plain = driven(system, heat_ranges(system, heat, parameters), parameters)
     _check(plain.system, direction, method, lower)
-    question = Question(plain.system, direction, temperature, around, plain.heat,
-                        parameter_box(plain.system, plain.parameters) | of_leads(plain.parameters), lower, method)
+    ranges = parameter_box(plain.system, plain.parameters, ("leads",)) | of_leads(plain.parameters)
+    question = Question(plain.system, direction, temperature, around, plain.heat, ranges, lower, method)
     question.check_box()
     return question
 

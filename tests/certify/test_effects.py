@@ -36,8 +36,9 @@ def test_every_new_effect_is_refused_or_is_no_part_of_the_jacobian(effect):
     name, = system.effects
     claims = [lambda: rt.certify.invariance(system, current=CURRENT, temperature=BOX),
               lambda: rt.certify.runaway_free(system, current=CURRENT)] * (effect not in COUNTED)
-    closed_form = lambda: rt.certify.runaway(system, setpoint={"m1": 283.15, "m2": 283.15})  # noqa: E731
-    claims += [closed_form] * (not name.startswith("inputs."))  # of heaters it knows nothing, however they are
+    claims.append(lambda: rt.certify.runaway(system, setpoint={"m1": 283.15, "m2": 283.15}))
+    claims.append(lambda: rt.certify.limit_map(system, ambient=[298.15], setpoint=[283.15], load=[1.0],
+                                               temperature=(273.15, 358.15), jobs=1))
     if effect in COUNTED:  # tests/certify/test_own_heat.py shows that they are
         assert rt.certify.runaway_free(system, current=CURRENT).invariance.region["heat"]
     for claim in claims:

@@ -157,3 +157,31 @@ def test_the_machine_is_named_by_its_slope():
     machines = {cert.claim.split("machine ")[1][:12] for cert in (a, b, plain)}
     assert len(machines) == 3
     assert not rt.verification.same_system(a, b.system)
+
+
+def simulated(system: rt.System, power: float) -> rt.Record:
+    """An hour at one power."""
+    return rt.thermal.simulate(system, rt.Record(sample_time=10.0, inputs=np.full(360, power),
+                                                 outputs=np.zeros((360, 0)), input_names=["drive"], output_names=[]))
+
+
+def test_a_range_of_heat_wide_enough_for_the_box_covers_a_heat_that_rises_with_temperature():
+    """As the refusal of other effects says: 20 W at 20 °C are 36 W at 60 °C."""
+    damp = rt.thermal.add_effect(winding(0.0, 20.0), "condensation", ["coil"], {"conductance": 0.1}).system
+    with pytest.raises(rt.InputError, match="condensation.* wide enough for every temperature in the box"):
+        rt.certify.invariance(damp, current={}, temperature=(293.0, 333.15))
+    bare = winding(0.0, 20.0)
+    box = rt.certify.invariance(bare, current={}, temperature=(293.0, 333.15), heat={"coil": (0.0, 36.0)})
+    assert box.holds and rt.verify(box).valid
+    hottest = simulated(winding(0.02, 20.0), 20.0).outputs.max()
+    assert hottest == pytest.approx(293.15 + 20.0 / 0.6, abs=0.1) and hottest < 333.15
+    assert not rt.certify.invariance(bare, current={}, temperature=(293.0, 313.15), heat={"coil": (0.0, 28.0)}).holds
+
+
+def test_contraction_without_such_a_heat_says_nothing_of_it():
+    """Certified without the slope; with it the heat grows faster than the loss, and the winding runs away."""
+    system, bare = winding(0.02, 60.0), winding(0.0, 60.0)
+    assert rt.certify.contraction(bare, current={}, temperature=(280.0, 400.0)).holds
+    assert not rt.certify.contraction(system, current={}, temperature=(280.0, 400.0)).holds
+    with pytest.raises(rt.Diverged):
+        simulated(system, 60.0)

@@ -197,3 +197,72 @@ def test_a_law_takes_no_authority_from_a_box_without_the_heats_of_its_machine():
         own = rt.certify.usable_current(other, temperature=(278.15, 358.15), lower="reported")
         assert own.current < proof.current
         rt.design.feedback_linearization(other, certificate=own)
+
+
+def observer(system, **more):
+    return rt.certify.observer(system, gain=np.zeros((18, 1)), sensors=["T6"], sample_time=1.0,
+                               current={"m1": (0.0, 0.5), "m2": (0.0, 0.5)}, temperature=(280.0, 330.0), **more)
+
+
+def held(system, **more):
+    return rt.certify.regulated(system, setpoint={"m1": 278.15, "m2": 278.15}, temperature=(278.15, 328.15),
+                                current={"m1": (0.0, 1.2), "m2": (0.0, 1.2)}, **more)
+
+
+def closed_form(system, **more):
+    return rt.certify.runaway(system, setpoint={"m1": 283.15, "m2": 283.15}, **more)
+
+
+def mapped(system, **more):
+    return rt.certify.limit_map(system, ambient=[298.15], setpoint=[283.15], load=[1.0], temperature=(273.15, 358.15),
+                                jobs=1, **more)
+
+
+@pytest.mark.parametrize(("claim", "name"), [
+    *((claim, name) for claim in (observer, closed_form, mapped)
+      for name in ("lumps.x9.heat", "sensors.T6.self_heating", "leads.m1-x9.resistance")),
+    (held, "leads.m1-x9.resistance")])
+def test_ranges_of_heats_are_refused_by_claims_that_do_not_count_them(claim, name):
+    """Zero in the system, up to something in the ranges: ignored, the claim would not be about all of them."""
+    system = stack(0.0)
+    with pytest.raises(rt.InputError, match=f"a range of {name} cannot be covered"):
+        claim(system, parameters={name: (0.0, 1.0)})
+    assert claim(system) is not None
+
+
+def test_a_slope_that_may_be_is_refused_where_none_is_known():
+    warm = rt.System(**{**dict(rt.systems.two_module()), "inputs": {
+        "q": {"lump": "x1", "limits": (0.0, 1.0), "power_slope": 0.0}}})
+    for claim in (observer, closed_form, held, mapped, lambda system, **more: rt.certify.usable_current(
+            system, temperature=(278.15, 358.15), lower="reported", **more)):
+        with pytest.raises(rt.InputError, match="a range of inputs.q.power_slope cannot be covered"):
+            claim(warm, parameters={"inputs.q.power_slope": (0.0, 0.01)})
+
+
+@pytest.mark.parametrize(("name", "pair"), [("lumps.x9.heat", (0.0, 0.5)), ("leads.m1-x9.resistance", (0.5, 1.0)),
+                                            ("inputs.q.drive.gain", (-0.1, 0.1))])
+def test_a_range_without_the_number_of_the_system_is_refused(name, pair):
+    """A box for 0 to 0.5 W is none of a machine that heats itself by 2 W."""
+    system = rt.System(**{**dict(stack(0.4)), "inputs": {
+        "q": {"lump": "x1", "limits": (0.0, 1.0), "drive": {"gain": 0.3}}}}).with_parameters({"lumps.x9.heat": 2.0})
+    current = {"m1": (0.0, 0.5), "m2": (0.0, 0.5)}
+    for claim in (lambda: rt.certify.runaway_free(system, current=current, parameters={name: pair}),
+                  lambda: rt.certify.invariance(system, current=current, temperature=(250.0, 400.0),
+                                                parameters={name: pair}),
+                  lambda: rt.certify.usable_current(system, temperature=(250.0, 400.0), parameters={name: pair})):
+        with pytest.raises(rt.InputError, match="excludes the system's own value"):
+            claim()
+
+
+def test_a_map_refuses_a_machine_with_heats_of_its_own():
+    """The loads of the map stand where these would be."""
+    with pytest.raises(rt.InputError, match="lumps.x9.heat = 3 is an effect"):
+        mapped(rt.systems.two_module().with_parameters({"lumps.x9.heat": 3.0}))
+
+
+def test_the_closed_form_refuses_a_heater_that_heats_when_it_is_off():
+    """3 W of an offset take 0.5 W off what the fold of the network carries."""
+    warm = rt.System(**{**dict(rt.systems.two_module()), "inputs": {
+        "q": {"lump": "x9", "limits": (0.0, 1.0), "drive": {"offset": 3.0}}}})
+    with pytest.raises(rt.InputError, match="inputs.q.drive.offset = 3 is an effect"):
+        closed_form(warm)
