@@ -24,6 +24,7 @@ KERNELS = {  # sources, each with the headers that belong to it
     Path("robthermal", "identify", "_moments.c"): ("_vectors.h", "../_lanes.h"),
     Path("robthermal", "_recursion.c"): ("_lanes.h",),
     Path("robthermal", "thermal", "_march.c"): ("../_lanes.h",),
+    Path("robthermal", "diagnosis", "path", "_filter.c"): ("../../_lanes.h",),
 }
 # Not -march=native: what is built on one computer runs on another; the library says which of its parts the processor
 # has instructions for. -O2 with peeled loops is as fast as -O3 and takes 10 s instead of 24. Not -ffast-math: numbers

@@ -18,6 +18,7 @@ import pytest
 
 from robthermal import _recursion
 from robthermal._library import library_name
+from robthermal.diagnosis.path import _filter
 from robthermal.identify import _compiled
 from robthermal.thermal import _march
 
@@ -62,6 +63,15 @@ def recursion(lanes: int | None = None) -> Callable[..., None]:
     found = _recursion.compiled(_with_library(_recursion), lanes)
     if found is None:
         pytest.skip("no library of the recursion for this compiler and processor")
+    return found
+
+
+@cache
+def filters(lanes: int | None = None) -> _filter.Compiled:
+    """The compiled filter, in the same way."""
+    found = _filter.compiled(_with_library(_filter), lanes)
+    if found is None:
+        pytest.skip("no library of the filter for this compiler and processor")
     return found
 
 

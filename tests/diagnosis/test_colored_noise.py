@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -89,6 +90,35 @@ def test_settled_cost_is_the_log_likelihood(bar: rt.System, heat: Array) -> None
     with warnings.catch_warnings():  # of a model that runs away
         warnings.simplefilter("error")
         assert settled_cost(path, 1e200 * r[:, None], NOISE, heat) == np.inf
+
+
+def fixed(A: Array, C: Array) -> SimpleNamespace:
+    """A path with this transition throughout, without random heat from its rates."""
+    return SimpleNamespace(mean=(A, C, np.zeros(A.shape)), kinds=(None, None), h=1.0,
+                           equations=SimpleNamespace(capacity=np.ones(len(A))))
+
+
+@pytest.mark.parametrize("step", [[[0.9, 0.1], [0.0, 0.9]], [[0.0, 1.0], [0.0, 0.0]], [[0.8, 0.3], [-0.3, 0.8]]])
+def test_settled_cost_where_modes_are_alike(step: list[list[float]]) -> None:
+    """Of two that are one its vectors are no basis: such a filter ended a diagnosis with a traceback."""
+    A, C, heat, n = np.array(step), np.array([[1.0, 0.5]]), np.array([0.2, 0.0]), 400
+    r = np.random.default_rng(3).standard_normal((n, 1))
+    P, Q = np.zeros((2, 2)), np.diag(heat**2)
+    for _ in range(2000):  # Riccati's equation, iterated
+        gain = P @ C.T / (C @ P @ C.T + NOISE[0] ** 2)
+        P = A @ (P - gain @ C @ P) @ A.T + Q
+    S, x, expected = (C @ P @ C.T).item() + NOISE[0] ** 2, np.zeros((2, 1)), 0.0
+    for value in r[:, 0]:
+        e = value - (C @ x).item()
+        expected += e**2 / S + np.log(S)
+        x = A @ (x + P @ C.T * e / S)
+    assert settled_cost(fixed(A, C), r, NOISE, heat) == pytest.approx(expected, rel=1e-9)
+
+
+def test_settled_cost_of_what_nothing_holds_is_infinite() -> None:
+    """Random heat into a lump that no sensor reads and no link holds: its temperature wanders without limit."""
+    path = fixed(np.eye(2) * [0.9, 1.0], np.array([[1.0, 0.0]]))
+    assert settled_cost(path, np.ones((50, 1)), NOISE, np.array([0.1, 0.1])) == np.inf
 
 
 def colored(record: rt.Record, size: float, seed: int, pole: float = 0.9) -> rt.Record:

@@ -1,4 +1,6 @@
-"""Covariances along a record without a loop over its samples: blocks of samples are mapped together, then run together.
+"""Covariances along a record: in C where that was built, else without a loop over its samples.
+
+Blocks of samples are mapped together, then run together.
 
 With S = C P Cᵀ + R the covariance of the prediction becomes A (P - P Cᵀ S⁻¹ C P) Aᵀ + Q = A P (1 + G P)⁻¹ Aᵀ + Q with
 G = Cᵀ R⁻¹ C. Such maps, (A, G, H): P → H + A P (1 + G P)⁻¹ Aᵀ, follow each other as one of the same form (Anderson
@@ -11,6 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ._filter import compiled_for
 
 Array = NDArray[np.float64]
 _SHORTEST = 32  # samples of a block: below, a loop over the samples is as fast
@@ -29,6 +33,11 @@ def filtered(A: Array, C: Array, R: Array, Q: Array, P: Array) -> tuple[Array, A
     P : ndarray, shape (n_z, n_z)
         Covariance before the first sample.
     """
+    compiled = compiled_for(C)
+    return _in_numpy(A, C, R, Q, P) if compiled is None else compiled.filtered(A, C, R, Q, P)
+
+
+def _in_numpy(A: Array, C: Array, R: Array, Q: Array, P: Array) -> tuple[Array, Array]:
     n, (n_s, n_z) = len(A), C.shape[1:]
     each = [_in_blocks(one) for one in (A, C, R, Q)]
     blocks, length = each[0].shape[:2]

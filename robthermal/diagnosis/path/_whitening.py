@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 
 from ..._recursion import recursion
 from ...thermal import Equations
+from ._filter import compiled_for
 from ._riccati import filtered, settled, spread
 
 Array = NDArray[np.float64]
@@ -137,8 +137,11 @@ class Whitener:
         """Whiten along time, into `out` of the same shape if it is given: columns of a long record are copied once."""
         flat = r.reshape(*r.shape[:2], -1)
         z = np.empty(flat.shape) if out is None else out.reshape(flat.shape)
+        compiled = compiled_for(self.C)
         if self._scale is not None:
             np.multiply(self._scale, flat, out=z)
+        elif compiled is not None:
+            compiled.whitened((self.A, self.C, self.gains, self.roots), flat, z)
         else:
             for first in range(0, flat.shape[2], _COLUMNS):
                 z[..., first:first + _COLUMNS] = self._filtered(flat[..., first:first + _COLUMNS])
@@ -250,21 +253,21 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
                  ) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
-    Good enough for noise levels, and a hundred times faster than the time-varying filter.
+    Good enough for noise levels, and faster than the time-varying filter. Infinite where nothing settles: random heat
+    into what no sensor sees and no ambient holds.
     """
     A, C, M = path.mean
     Q, R = gathered(path, disturbance, M), np.diag(noise**2)
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
-    P = settled(A, C, R, Q)
+    try:
+        P = settled(A, C, R, Q)
+    except np.linalg.LinAlgError:
+        return np.inf
     S = C @ P @ C.T + R
     gain = P @ C.T @ np.linalg.inv(S)
-    poles, V = np.linalg.eig(A - A @ gain @ C)  # x(k+1) = (A - A K C) x + A K r, mode by mode
-    if not np.iscomplexobj(poles) or not poles.imag.any():  # no rounding has made a pair: real numbers are faster
-        poles, V = poles.real, V.real
-    push = np.ascontiguousarray(np.linalg.solve(V, A @ gain) @ r.T)
-    modes = np.array([scipy.signal.lfilter([0.0, 1.0], [1.0, -pole], own) for pole, own in
-                      zip(poles, push, strict=True)])
-    e = r - (C @ V @ modes).real.T
+    step = np.broadcast_to(A - A @ gain @ C, (len(r), *A.shape))
+    states = recursion(step, (r @ (A @ gain).T)[:, :, None])[:-1, :, 0]  # x(k+1) = (A - A K C) x + A K r
+    e = r - states @ C.T
     with np.errstate(over="ignore"):  # of a model that runs away: infinite, and not chosen
         return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])
