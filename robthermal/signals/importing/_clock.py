@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import numpy as np
+
 from ...errors import InputError
 from ._dates import date_reader, stamp_reader
 from ._options import ImportOptions
@@ -72,22 +74,7 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
     if len(found) == 1:
         return (found[0],)
     if not found:
-        if options.sample_time is not None:
-            return ()
-        place = unnamed_stamps(table)
-        if place is not None:
-            table.actions.append(
-                Action("mapped", 1, "time taken from the only column without a name, which holds stamps")
-            )
-            return (place,)
-        listed = ", ".join(header for header in table.headers if header)[:200]
-        proposed = time_headers(table) or 'time = "HEADER"'
-        raise InputError(
-            "there is no column 'time'",
-            where=table.where,
-            expected="one column 'time', or a declared one",
-            remedy=f"Write {proposed}, or sample_time = 1.0. Columns: {listed}.",
-        )
+        return _by_its_cells(table, options, free)
     numeric = [k for k in found if table.columns[k].dtype.kind == "f" and _in_seconds(table.headers[k])]
     if len(numeric) == 1:
         table.actions.append(
@@ -106,6 +93,31 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         where=table.where,
         expected="one time column",
         remedy=f'Write time = "{table.headers[found[0]]}", or another of them.',
+    )
+
+
+def _by_its_cells(table: Table, options: ImportOptions, free: list[int]) -> tuple[int, ...]:
+    """The time column where no header says it: counted, the only one in a unit of time that rises, or of stamps."""
+    if options.sample_time is not None:
+        return ()
+    timed = [k for k in free if _timed(table.headers[k])]
+    rising = [k for k in timed if _rises(table.columns[k])]
+    if len(rising) == 1:
+        header = table.headers[rising[0]]
+        text = f"time taken from {header!r}, the only column in a unit of time that rises"
+        table.actions.append(Action("mapped", 1, text, header))
+        return (rising[0],)
+    place = unnamed_stamps(table)
+    if place is not None:
+        table.actions.append(Action("mapped", 1, "time taken from the only column without a name, which holds stamps"))
+        return (place,)
+    listed = ", ".join(header for header in table.headers if header)[:200]
+    proposed = time_headers(table) or f'time = "{table.headers[timed[0]] if timed else "HEADER"}"'
+    raise InputError(
+        "there is no column 'time'",
+        where=table.where,
+        expected="one column 'time', or a declared one",
+        remedy=f"Write {proposed}, or sample_time = 1.0. Columns: {listed}.",
     )
 
 
@@ -144,6 +156,20 @@ def _place(table: Table, name: str) -> int:
         expected="a header of the file",
         remedy=f"Columns: {listed}.",
     )
+
+
+def _timed(header: str) -> bool:
+    """Whether a header says a unit of time."""
+    unit = unit_of(split_header(header)[1] or "")
+    return unit is not None and unit.quantity == "time"
+
+
+def _rises(cells: Any) -> bool:
+    """Whether the first cells are numbers, each larger than the one before."""
+    if getattr(getattr(cells, "dtype", None), "kind", "") != "f":
+        return False
+    there = cells[np.isfinite(cells)]
+    return len(there) > 1 and bool(np.all(np.diff(there) > 0))
 
 
 def _in_seconds(header: str) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 from zoneinfo import ZoneInfo
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from ...errors import InputError
 from .._names import suggestion
@@ -31,6 +31,8 @@ class ColumnChoice(_Table):
     ----------
     column : str
         Header in the file, with or without its unit.
+    constant : float, optional
+        Instead of a column: what a heater, current or ambient was throughout, in `unit` or the unit of the system.
     unit : str, optional
         Unit of the cells, where the header does not say it.
     scale, offset : float, optional
@@ -42,12 +44,21 @@ class ColumnChoice(_Table):
         I² R; `scale` and `offset` act before.
     """
 
-    column: str
+    column: str = ""
+    constant: Finite | None = None
     unit: str | None = None
     scale: Finite | None = None
     offset: Finite | None = None
     thermistor: Thermistor | None = None
     resistance: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> ColumnChoice:
+        if self.constant is None and not self.column.strip():
+            raise ValueError("names neither a column nor a constant")
+        if self.constant is not None and self.model_fields_set - {"constant", "unit"}:
+            raise ValueError("a constant has a unit and nothing else: no column, scale, offset, thermistor, resistance")
+        return self
 
 
 class ImportOptions(_Table):
@@ -266,10 +277,10 @@ def _checked(schema: type[_Table], table: Mapping[str, Any], where: str) -> dict
         found = schema(**table)
     except ValidationError as error:
         fault: Any = error.errors(include_url=False)[0]
-        key = str(fault["loc"][0]) if fault["loc"] else "?"
-        given = str(table.get(key, ""))[:60]
+        key = str(fault["loc"][0]) if fault["loc"] else ""
+        given = f"{key} = {str(table.get(key, ''))[:60]!r}: " if key else ""
         raise InputError(
-            f"{key} = {given!r}: {fault['msg'].removeprefix('Value error, ')}",
+            given + fault["msg"].removeprefix("Value error, "),
             where=where,
             remedy='The keys and their values are in the documentation, "Measured files".',
         ) from None

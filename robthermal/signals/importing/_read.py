@@ -13,6 +13,7 @@ from .._stated import KEY
 from ._assemble import make_records, system_names
 from ._clock import time_columns, time_reader
 from ._columns import SystemLike, channels_of_names, channels_of_system
+from ._constants import with_constants
 from ._open import open_source
 from ._options import declared, with_own_word
 from ._shorten import short_errors
@@ -48,7 +49,7 @@ def read_records(
         Without a system: the columns to read.
     columns : mapping, optional
         Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …,
-        "thermistor": …, "resistance": …}``.
+        "thermistor": …, "resistance": …}``, or to ``{"constant": …}`` of what never changed.
     median_filter : float, optional
         Width of a running median over the outputs [s]; default none, glitches are only reported.
     max_bytes : float, optional
@@ -114,7 +115,7 @@ def read_record(
         Without a system: the columns to read.
     columns : mapping, optional
         Name in the system to header in the file, or to ``{"column": …, "unit": …, "scale": …, "offset": …,
-        "thermistor": …, "resistance": …}``.
+        "thermistor": …, "resistance": …}``, or to ``{"constant": …}`` of what never changed.
     median_filter : float, optional
         Width of a running median over the outputs [s].
     max_bytes : float, optional
@@ -189,7 +190,8 @@ def _read(
         limit = None if max_bytes is None else positive_number(max_bytes, "max_bytes", "B")
         ins, outs = _names(system, inputs, outputs)
         wanted = frozenset((*ins, *outs, *(system_names(system) if system is not None else ())))
-        opened = open_source(source, choice.record, limit)
+        sensors = outs if system is None else tuple(system.sensor_names)
+        opened, choice = with_constants(open_source(source, choice.record, limit), choice, sensors)
         table = opened.table
         asked = declared(*tables, (given, {}, "arguments"))
         choice = with_own_word(choice, asked, table.facts.get(KEY, ""), table.where)
