@@ -1,6 +1,7 @@
 """Refitted candidates that no machine shows: a room faster than rooms are, a heat "periodic" within less than a period.
 
-A lag longer than the record is a sensor that is stuck. Water condenses from air that is as warm as its dew point.
+A lag longer than the record is a sensor that is stuck. Water condenses from air that is as warm as its dew point. A
+memory of the polarity shows where the polarity changes.
 
 Bounds of single quantities cannot say this. Such a candidate is an approximation of something else, and as flexible as
 it is it often beats the effect that is really there.
@@ -49,6 +50,10 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
             moves(fit.structure.base, path.one.record) for path in fit.records):
         return ("no input changes in the records, and while everything only settles a conductance that depends on "
                 "temperature looks like one that changes at some time")
+    if candidate.effect.name == "hysteresis" and not any(
+            np.ptp(np.sign(path.one.record[candidate.where[0]])) for path in fit.records):
+        return (f"the current of {candidate.where[0]} is on, or off, throughout every record, so that none shows a memory "
+                "of its polarity: something else settles from the start of a record on")
     if candidate.effect.name == "condensation":
         return _from_no_air(candidate.where[0], fit, values["dew_point"])
     return _slow_or_fast(candidate, span, values, twins) if candidate.effect.paired else ""
