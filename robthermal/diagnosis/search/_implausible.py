@@ -52,8 +52,8 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
                 "temperature looks like one that changes at some time")
     if candidate.effect.name == "hysteresis" and not any(
             np.ptp(np.sign(path.one.record[candidate.where[0]])) for path in fit.records):
-        return (f"the current of {candidate.where[0]} is on, or off, throughout every record, so that none shows a memory "
-                "of its polarity: something else settles from the start of a record on")
+        return (f"the current of {candidate.where[0]} is on, or off, throughout every record, so that none shows a "
+                "memory of its polarity: something else settles from the start of a record on")
     if candidate.effect.name == "condensation":
         return _from_no_air(candidate.where[0], fit, values["dew_point"])
     return _slow_or_fast(candidate, span, values, twins) if candidate.effect.paired else ""
