@@ -314,7 +314,7 @@ def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted:
     example = alike or (ordered[0] if likely else "HEADER")
     remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
     if role in ("input", "current"):
-        remedy += f" If {name!r} never changed: [columns] {name} = {{ constant = 0.0 }}, or what it was."
+        remedy += f" Zeros if {name!r} was off: [columns] {name} = {{ constant = 0.0 }}, or what it was throughout."
     return InputError(
         f"there is no column {name!r}{kind}",
         where=table.where,
