@@ -9,6 +9,8 @@ from voltage_rig import drive, system
 
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
+from robthermal.diagnosis.evidence import Gap, expected_rms, remainder
+from robthermal.diagnosis.fit import exact
 from robthermal.diagnosis.path import LinearizedRecord, gathered, linearized_record, whitener
 
 H = 4.0
@@ -113,3 +115,21 @@ def test_residuals_of_voltages_are_drawn_on_an_axis_of_volts(path: LinearizedRec
     plt.close(figure)
     assert drawn == {"measured − model [K]": [0.5], "measured − model [V]": [0.003]}
     assert [line.get_label() for line in ax.get_lines()] == ["T_cold", "V1 [V], right"]
+
+
+def test_what_is_left_of_a_voltage_is_said_in_volts() -> None:
+    """Thermometers that fit beside a voltage that is off by 50 mV: kelvin alone said nothing of it."""
+    machine, record = plain(), logged(plain(), 1)
+    (volts,) = (k for k, name in enumerate(record.output_names) if name not in machine.thermometers)
+    beside = record.outputs.copy()
+    beside[:, volts] += 0.05 * np.sin(np.arange(len(beside)))
+    name, wrong = record.output_names[volts], record.with_outputs(beside)
+    left = {}
+    for key, data in (("right", record), ("off", wrong)):
+        fit = rt.diagnosis.refit(machine, data)
+        gap = {"train": Gap(fit.rms, fit.rms, expected_rms(fit))}
+        left[key] = remainder(exact(fit), gap)
+    assert left["right"].voltages == {} and "voltage" not in str(left["right"])
+    assert list(left["off"].voltages) == [name] and 0.025 < left["off"].voltages[name] < 0.04  # 0.05 V / √2
+    assert f"The voltage {name} is off by 0.03" in str(left["off"]) and name not in left["off"].sensors
+    assert left["off"].to_dict()["voltages"] == left["off"].voltages and "voltages" not in left["right"].to_dict()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,8 @@ class Remainder:
         A single period that holds most of what is left at a thermometer.
     trained : str
         What the records of the fit are called.
+    voltages : dict
+        The same as `sensors` of every voltage of a module that is off by more than its noise [V].
     """
 
     gaps: dict[str, Left]
@@ -70,6 +72,7 @@ class Remainder:
     heat: float
     line: Line | None = None
     trained: str = "training records"
+    voltages: dict[str, float] = field(default_factory=dict)
 
     @property
     def located(self) -> bool:
@@ -86,10 +89,12 @@ class Remainder:
                    if self.located else f"no slow heat into a lump would remove more than {100 * share:.2g} % of it")
         said = (f"{self.gaps[seen].rms:.2g} K of the error on the {kind} is not explained, mostly at {sensor} between "
                 f"{self.low:.2g} and {self.high:.2g} Hz; {removed}.")
-        return said if self.line is None else f"{said} {self.line}"
+        volts = "".join(f" The voltage {name} is off by {rms:.2g} V rms beyond its noise."
+                        for name, rms in self.voltages.items())
+        return said + volts if self.line is None else f"{said}{volts} {self.line}"
 
     def to_dict(self) -> dict[str, Any]:
-        """As in ``diagnosis.json``; "line" is there where a single period was found.
+        """As in ``diagnosis.json``; "line" is there where a single period was found, "voltages" where one is off.
 
         Returns
         -------
@@ -98,7 +103,8 @@ class Remainder:
         return {**{name: vars(left) for name, left in self.gaps.items()}, "sensors": self.sensors,
                 "where": [{"lump": lump, "share": share} for lump, share in self.where],
                 "band": {"low": self.low, "high": self.high, "share": self.share}, "heat": self.heat,
-                **({} if self.line is None else {"line": vars(self.line)})}
+                **({} if self.line is None else {"line": vars(self.line)}),
+                **({"voltages": self.voltages} if self.voltages else {})}
 
 
 def remainder(fit: Refit, gaps: Mapping[str, Gap], trained: str = "training records") -> Remainder | None:
@@ -113,12 +119,14 @@ def remainder(fit: Refit, gaps: Mapping[str, Gap], trained: str = "training reco
     trained : str
         What the records of the fit are called.
     """
-    squares = _squares(fit)
+    beyond, noise = _squares(fit)
+    squares = {name: rms for name, rms in beyond.items() if name in fit.system.thermometers}
     if not squares:
         return None
+    volts = {name: rms for name, rms in beyond.items() if name not in squares and rms > noise[name]}
     where, heat = _places(fit)
     return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat,
-                     single_period(fit), trained)
+                     single_period(fit), trained, volts)
 
 
 def left(gap: Gap) -> Left:
@@ -133,15 +141,22 @@ def left(gap: Gap) -> Left:
     return Left(float(np.sqrt(after)), 1.0 - after / before if before > 0 else 0.0)
 
 
-def _squares(fit: Refit) -> dict[str, float]:
-    """Rms beyond the noise of every thermometer, over all records."""
-    power: dict[str, list[float]] = {}
+def _squares(fit: Refit) -> tuple[dict[str, float], dict[str, float]]:
+    """Rms beyond the noise of every sensor over all records, and what noise and random heat alone would give."""
+    beyond: dict[str, float] = {}
+    noise: dict[str, float] = {}
+    rows: dict[str, int] = {}
     for path in fit.records:
-        beyond = np.sum(path.residual**2, axis=0) - len(path.residual) * expected_squares(fit, path)
-        for name, value in zip(path.one.sensors, beyond, strict=True):
-            if name in fit.system.thermometers:
-                power.setdefault(name, []).extend([float(value), len(path.residual)])
-    return {name: float(np.sqrt(max(sum(parts[::2]) / sum(parts[1::2]), 0.0))) for name, parts in power.items()}
+        expected = len(path.residual) * np.asarray(expected_squares(fit, path))
+        powers = zip(path.one.sensors, np.sum(path.residual**2, axis=0), expected, strict=True)
+        for name, power, alone in powers:
+            beyond[name] = beyond.get(name, 0.0) + float(power - alone)
+            noise[name] = noise.get(name, 0.0) + float(alone)
+            rows[name] = rows.get(name, 0) + len(path.residual)
+    def rms(powers: dict[str, float]) -> dict[str, float]:
+        return {name: float(np.sqrt(max(power / rows[name], 0.0))) for name, power in powers.items()}
+
+    return rms(beyond), rms(noise)
 
 
 def _places(fit: Refit) -> tuple[tuple[tuple[str, float], ...], float]:
