@@ -8,6 +8,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # Tests run in two processes, each file in one of them, so that what a file shares is made once; one BLAS thread each
 # keeps them from fighting for the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+# Which tests `make test` runs; with MARK= all of them, as CI does.
+MARK ?= not exhaustive
 
 .DELETE_ON_ERROR:
 .PHONY: help demo test exhaustive quick lint docs bench clean
@@ -37,7 +39,7 @@ demo: $(VENV)/.installed
 	$(BIN)/robthermal demo --out build/demo
 
 test: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not exhaustive"
+	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "$(MARK)"
 
 exhaustive: $(VENV)/.test
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m exhaustive tests
