@@ -40,6 +40,8 @@ def test_report_of_a_diagnosis_has_volts_apart_from_kelvin(monkeypatch: pytest.M
     result = rt.jobs.diagnose_records(system(), (), [noisy])
     assert [(one.unit, list(one.before)) for one in result.residuals] == [("K", ["T_cold"]), ("V", ["V1"])]
     report = rt.jobs.diagnose.diagnosis_report(result)
+    listed = [claim.box for claim in report.claims if "train: " in claim.box]
+    assert listed and all(text.count("train: ") == 1 for text in listed)  # once, not for kelvin and for volts
     (gap,) = [section for section in report.sections if section.anchor == "gap"]
     rows = {row["records"].rpartition(" ")[2]: row["unit"] for row in gap.tables[0].frame.to_dict("records")}
     assert rows["T_cold"] == "K" and rows["V1"] == "V"

@@ -102,7 +102,10 @@ def _claim(title: str, sentence: str, holds: bool, reason: str, box: str, margin
 
 def _records(result: Diagnosed, kind: str) -> str:
     called = "new" if kind == "train" and result.diagnosis.reference is not None else kind
-    said = [f"{called}: {one.name}, {len(one.time)} samples" for one in result.residuals if one.kind == kind]
+    own = [one for one in result.residuals if one.kind == kind]
+    kelvin = {one.name for one in own if one.unit == "K"}  # what a record leaves in volts is listed beside it
+    said = [f"{called}: {one.name}, {len(one.time)} samples" for one in own
+            if one.unit == "K" or one.name not in kelvin]
     said += [f"{kind}: {one.name}, {one.frequency.size} bins" for one in result.responses if kind == "train"]
     return "; ".join(said)
 
