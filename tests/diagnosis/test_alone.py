@@ -20,7 +20,7 @@ from robthermal.diagnosis.evidence import Gap, HoldOut
 from robthermal.diagnosis.search import SearchState, ShortList
 
 ROOM, STEP, SAMPLES = 295.15, 6.0, 1000
-NAMES = ["radiation", "periodic_load", "heat_source", "conductance_step"]
+NAMES = ["radiation", "periodic_load", "heat_source"]
 PLATE = rt.System(
     ambients={"room": {"temperature": ROOM}}, lumps={"plate": {"capacity": 470.0}, "base": {"capacity": 420.0}},
     links=[{"between": ("plate", "base"), "conductance": 0.5}, {"between": ("plate", "room"), "conductance": 0.35},
