@@ -8,6 +8,7 @@ import os
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 LANES = (8, 4, 2)  # numbers of a vector: with AVX-512, with AVX2, on any processor
 
@@ -47,6 +48,28 @@ def library(source: Path, headers: Sequence[str], folder: Path | None = None) ->
         return ctypes.CDLL(os.fspath((source.parent if folder is None else folder) / library_name(source, headers)))
     except OSError:
         return None
+
+
+def functions(source: Path, headers: Sequence[str], folder: Path, lanes: int | None, names: Sequence[str]
+              ) -> list[Any] | None:
+    """Functions of the widest part of a library that this processor can run; None where there is none.
+
+    Parameters
+    ----------
+    source : Path
+        Source in the package.
+    headers : sequence of str
+        What it includes, by their places from its folder.
+    folder : Path
+        Where the library is.
+    lanes : int, optional
+        The only width to be asked for.
+    names : sequence of str
+        Of the functions, without what all begin and end with.
+    """
+    found = library(source, headers, folder)
+    wide = None if found is None else widest(found, lanes)
+    return None if found is None or wide is None else [found[f"robthermal_{name}_{wide}"] for name in names]
 
 
 def widest(found: ctypes.CDLL, lanes: int | None = None) -> int | None:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._library import library, widest
+from ._library import functions
 
 Array = NDArray[np.floating[Any]]
 SOURCE, HEADERS = Path(__file__).with_suffix(".c"), ("_lanes.h",)
@@ -27,11 +27,10 @@ def compiled(folder: Path = SOURCE.parent, lanes: int | None = None) -> Callable
 
     With vectors as wide as this processor has, or of so many `lanes`.
     """
-    found = library(SOURCE, HEADERS, folder)
-    wide = None if found is None else widest(found, lanes)
-    if found is None or wide is None:
+    found = functions(SOURCE, HEADERS, folder, lanes, ("recursion",))
+    if found is None:
         return None
-    run: Any = found[f"robthermal_recursion_{wide}"]
+    run: Any = found[0]
     run.restype, run.argtypes = None, [ctypes.c_int64] * 4 + [ctypes.c_void_p] * 3
     return run
 

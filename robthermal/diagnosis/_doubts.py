@@ -112,6 +112,24 @@ def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
             f"thermometer: see whether a network with {at} split in two does as well."] if at else []
 
 
+def which_is_off(system: System, effects: Sequence[Name]) -> list[str]:
+    """Where an offset of a thermometer is named beside a remainder and there are others, a sentence each.
+
+    Only the difference of two thermometers shows beside heats that the model has a little wrong: a measured Peltier
+    cell left 0.50 K with one of its two thermocouples off, and 0.52 K with the other one off the other way.
+
+    Parameters
+    ----------
+    system : System
+        With its thermometers.
+    effects : sequence of tuple
+        Named effects with their places.
+    """
+    off = [where[0] for name, where in effects if name == "sensor_offset" and where[0] in system.thermometers]
+    return [f"Whether {one} is off, or the other thermometers the other way, a model that leaves so much cannot say: "
+            "compare them at rest, with nothing driven." for one in off] if len(system.thermometers) > 1 else []
+
+
 def periods_undecided(rounds: Sequence[Accepted], remainder: bool) -> list[str]:
     """Where records of different times leave several periods possible, a sentence each.
 

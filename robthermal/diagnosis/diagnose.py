@@ -26,6 +26,7 @@ from ._doubts import (
     periods_undecided,
     place_undecided,
     surfaces,
+    which_is_off,
     within_the_body,
 )
 from ._each_record import asked_of_each
@@ -303,6 +304,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)
               for name in (one.key, *others)]
     return (*said, *may_be_the_room(nominal, state.fit.structure.effects), *within_the_body(nominal.system, listed),
+            *which_is_off(nominal.system, [one.key for one in found.effects]),
             *doubts(nominal.system, remainder=True))
 
 

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .._library import library as compiled_from
-from .._library import widest
+from .._library import functions
 from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm, RippleTerm
@@ -94,11 +93,10 @@ def library(folder: Path = SOURCE.parent, lanes: int | None = None) -> Steps | N
 
     With vectors as wide as this processor has, or of so many `lanes`.
     """
-    found = compiled_from(SOURCE, HEADERS, folder)
-    wide = None if found is None else widest(found, lanes)
-    if found is None or wide is None:
+    found = functions(SOURCE, HEADERS, folder, lanes, ("march_size", "march", "derivatives"))
+    if found is None:
         return None
-    size, march, derivatives = (found[f"robthermal_{name}_{wide}"] for name in ("march_size", "march", "derivatives"))
+    size, march, derivatives = found
     for function in (size, march, derivatives):
         function.restype = ctypes.c_int64
     if size() != ctypes.sizeof(_Problem):

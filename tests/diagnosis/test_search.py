@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from voltage_rig import drive, system
 
 import robthermal as rt
 from robthermal.diagnosis.effects import Candidate
@@ -290,23 +291,9 @@ def test_no_water_condenses_from_air_colder_than_its_dew_point(plant: rt.System,
                                                  (("reversed", 0.0), True)])
 def test_a_memory_of_the_polarity_shows_where_the_polarity_changes(currents: tuple[Any, ...], named: bool) -> None:
     """A measured Peltier cell, at 1.5 A in one record and at rest in the other, had a "hysteresis" of 7.6 ± 3.7 W."""
-    cell = rt.thermal.parse_system("""
-system = { temperature_unit = "K" }
-ambients.room = { temperature = 297.0 }
-lumps = { cold = { capacity = 20.0 }, hot = { capacity = 60.0 } }
-links = [{ between = ["hot", "room"], conductance = 0.5 }]
-sensors.T = { lump = "cold", noise = 0.05 }
-[modules.m1]
-cold = "cold"
-hot = "hot"
-seebeck = { value = 0.05 }
-resistance = { value = 3.5 }
-conductance = { value = 0.5 }
-""")
+    cell = system()
     pattern = {"on and off": [1.5, 0.0, 1.5, 0.0], "reversed": [1.0, -1.0, 1.0, -1.0]}
-    records = [rt.Record(sample_time=2.0, inputs=np.repeat(pattern.get(one, [one] * 4), 25),
-                         outputs=297.0 + np.random.default_rng(k).normal(0.0, 0.05, (100, 1)), input_names=["m1"],
-                         output_names=["T"]) for k, one in enumerate(currents)]
+    records = [rt.thermal.simulate(cell, drive(np.repeat(pattern.get(one, [one] * 4), 25), 4.0)) for one in currents]
     memory = rt.diagnosis.candidates(cell, ["hysteresis"])[0]
     why = implausible(memory, rt.diagnosis.refit(cell, records), {"heat": -7.6, "time_constant": 26.0}, ())
     assert (why == "") == named

@@ -8,6 +8,7 @@ import pytest
 from voltage_rig import drive, system
 
 import robthermal as rt
+from robthermal.diagnosis._doubts import which_is_off
 from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.evidence import Gap, expected_rms, remainder
 from robthermal.diagnosis.fit import exact
@@ -131,5 +132,34 @@ def test_what_is_left_of_a_voltage_is_said_in_volts() -> None:
         left[key] = remainder(exact(fit), gap)
     assert left["right"].voltages == {} and "voltage" not in str(left["right"])
     assert list(left["off"].voltages) == [name] and 0.025 < left["off"].voltages[name] < 0.04  # 0.05 V / √2
-    assert f"The voltage {name} is off by 0.03" in str(left["off"]) and name not in left["off"].sensors
+    assert f"In the training records the voltage {name} is off by 0.03" in str(left["off"])
+    assert name not in left["off"].sensors
     assert left["off"].to_dict()["voltages"] == left["off"].voltages and "voltages" not in left["right"].to_dict()
+
+
+@pytest.mark.parametrize(("named", "thermometers", "said"), [
+    ("T_cold", ["T_cold", "T_hot"], True), ("T_cold", ["T_cold"], False), ("V1", ["T_cold", "T_hot"], False)])
+def test_an_offset_does_not_say_which_thermometer_is_off(named: str, thermometers: list[str], said: bool) -> None:
+    """A measured cell: 0.503 K left with one of its thermocouples off, 0.517 K with the other one."""
+    rig = system()
+    sensors = {name: {"lump": "hot" if name == "T_hot" else "cold", "noise": 0.02} for name in thermometers}
+    rig = rt.System(**{**dict(rig), "sensors": {**sensors, "V1": {"module": "m1", "noise": 0.002}}})
+    found = which_is_off(rig, [("sensor_offset", (named,)), ("sensor_lag", ("T_cold",))])
+    assert bool(found) == said
+    assert not said or found == ["Whether T_cold is off, or the other thermometers the other way, a model that leaves "
+                                 "so much cannot say: compare them at rest, with nothing driven."]
+
+
+def test_a_diagnosis_beside_a_remainder_says_so() -> None:
+    """One of two thermometers 2 K off, and a resistance whose slope the file lacks: the other one comes first."""
+    hot = {"T_hot": {"lump": "hot", "noise": 0.02}}
+    rig = rt.System(**{**dict(plain()), "sensors": {**dict(dict(plain())["sensors"]), **hot}})
+    truth = rig.with_parameters({"sensors.T_hot.offset": 2.0, "modules.m1.resistance.slope": 0.02})
+    rng, records = np.random.default_rng(4), []
+    for currents in (CURRENTS, CURRENTS[::-1]):
+        run = rt.thermal.simulate(truth, drive(currents, H), initial=295.15)
+        records.append(run.with_outputs(run.outputs + rng.standard_normal(run.outputs.shape) * 0.002))
+    found = rt.diagnose(rig, records[0], validation=records[1], effects=["sensor_offset"])
+    assert [one.label for one in found.effects] == ["sensor_offset(T_cold)"] and found.remainder is not None
+    assert found.verdict == "ambiguous" and found.alternatives == ((("sensor_offset", ("T_hot",)),),)
+    assert any(text.startswith("Whether T_cold is off, or the other thermometers") for text in found.caveats)

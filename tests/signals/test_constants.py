@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -125,6 +126,27 @@ def test_by_names_alone(tmp_path: Path) -> None:
 def test_a_missing_current_says_how_a_constant_is_written(tmp_path: Path) -> None:
     with pytest.raises(rt.InputError, match=r"m1 = \{ constant = 0.0 \}"):
         read(logged(tmp_path), {"foil": {"constant": 0.0}})
+
+
+def test_a_room_in_celsius_of_a_machine_in_kelvin_is_caught(tmp_path: Path) -> None:
+    system = rt.thermal.parse_system(CELL.replace('"degC"', '"K"').replace("20.0 }", "293.15 }"))
+    with pytest.raises(rt.InputError, match="room"):
+        rt.read_record(logged(tmp_path), system, columns={**ALL, "room": {"constant": 24.2}})
+
+
+def test_a_thermocouple_and_a_resistance_thermometer_as_documented() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "measured_files.md").read_text(encoding="utf-8")
+    lines = [line for line in page.splitlines() if line.startswith(("T1 = { column = \"TC", "T2 = { column = \"Pt100"))]
+    assert len(lines) == 2
+    tables = tomllib.loads("\n".join(lines))
+    frame = pd.DataFrame({"time": [0.0, 1.0, 2.0], "TC K [mV]": [0.0, 1.0, 1.485],
+                          "Pt100 [ohm]": [100.0, 107.79, 119.40]})
+    system = rt.thermal.parse_system(CELL + '[sensors.T1]\nlump = "cold"\nnoise = 0.1\n[sensors.T2]\nlump = "cold"\n'
+                                     'noise = 0.1\n')
+    record = rt.read_record(frame, system, columns={**ALL, **tables})
+    # Tables of IEC 60584 (2.436 mV at 60 °C less 0.951 mV at 23.8 °C) and IEC 60751.
+    assert record["T1"][[0, 2]] - 273.15 == pytest.approx([23.8, 60.0], abs=0.5)
+    assert record["T2"] - 273.15 == pytest.approx([0.0, 20.0, 50.0], abs=0.5)
 
 
 # Time

@@ -89,7 +89,7 @@ class Remainder:
                    if self.located else f"no slow heat into a lump would remove more than {100 * share:.2g} % of it")
         said = (f"{self.gaps[seen].rms:.2g} K of the error on the {kind} is not explained, mostly at {sensor} between "
                 f"{self.low:.2g} and {self.high:.2g} Hz; {removed}.")
-        volts = "".join(f" The voltage {name} is off by {rms:.2g} V rms beyond its noise."
+        volts = "".join(f" In the {self.trained} the voltage {name} is off by {rms:.2g} V rms beyond its noise."
                         for name, rms in self.voltages.items())
         return said + volts if self.line is None else f"{said}{volts} {self.line}"
 
@@ -153,6 +153,7 @@ def _squares(fit: Refit) -> tuple[dict[str, float], dict[str, float]]:
             beyond[name] = beyond.get(name, 0.0) + float(power - alone)
             noise[name] = noise.get(name, 0.0) + float(alone)
             rows[name] = rows.get(name, 0) + len(path.residual)
+
     def rms(powers: dict[str, float]) -> dict[str, float]:
         return {name: float(np.sqrt(max(power / rows[name], 0.0))) for name, power in powers.items()}
 

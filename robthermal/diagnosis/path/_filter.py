@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._library import library, widest
+from ..._library import functions
 
 Array = NDArray[np.float64]
 SOURCE, HEADERS = Path(__file__).with_suffix(".c"), ("../../_lanes.h",)
@@ -87,12 +86,10 @@ def compiled(folder: Path = SOURCE.parent, lanes: int | None = None) -> Compiled
 
     With vectors as wide as this processor has, or of so many `lanes`.
     """
-    found = library(SOURCE, HEADERS, folder)
-    wide = None if found is None else widest(found, lanes)
-    if found is None or wide is None:
+    found = functions(SOURCE, HEADERS, folder, lanes, ("whitened", "filtered"))
+    if found is None:
         return None
-    whiten: Any = found[f"robthermal_whitened_{wide}"]
-    filtered: Any = found[f"robthermal_filtered_{wide}"]
+    whiten, filtered = found
     whiten.restype, whiten.argtypes = None, [ctypes.POINTER(_Filter), ctypes.c_int64, *[ctypes.c_void_p] * 2]
     filtered.restype = ctypes.c_int64
     filtered.argtypes = [ctypes.POINTER(_Filter), *[ctypes.c_void_p, ctypes.c_int64] * 2, ctypes.c_void_p]

@@ -253,8 +253,8 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
                  ) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
-    Good enough for noise levels, and faster than the time-varying filter. Infinite where nothing settles: random heat
-    into what no sensor sees and no ambient holds.
+    Good enough for noise levels, and faster than the time-varying filter. Infinite where nothing settles: what no
+    sensor sees and no ambient holds.
     """
     A, C, M = path.mean
     Q, R = gathered(path, disturbance, M), np.diag(noise**2)

@@ -174,10 +174,7 @@ def _rises(cells: Any) -> bool:
 
 def _in_seconds(header: str) -> bool:
     unit = split_header(header)[1]
-    found = unit_of(unit) if unit is not None else None
     bare = re.sub(r"[\W_]+", "", split_header(header)[0]).lower()
     if unit is None and bare in _MILLISECONDS:
         return True
-    return (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit")) or (
-        found is not None and found.quantity == "time"
-    )
+    return _timed(header) or (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit"))
