@@ -12,8 +12,10 @@ from .evidence import SURE, left, reproducible, score, validation_data
 from .fit import Refit, exact
 from .search import (
     ALIKE,
+    Accepted,
     Entry,
     SearchState,
+    other_thermometers,
     refit_short_list,
     resolve_places,
     with_neighbors,
@@ -30,7 +32,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
     ΔBIC excludes them too soon where the model is not exact. Beside a finer network they were compared when the effect
     was accepted; the same effect at neighboring lumps and the lag of a lump's other end are added there, and places
     that training and validation records exclude together are dropped. A rival with which the validation data keep their
-    gap could not be named itself, and is none.
+    gap could not be named itself, and is none. An offset of another thermometer is asked by itself, from its opposite.
 
     Parameters
     ----------
@@ -42,14 +44,26 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         Data that no fit has seen.
     """
     if finer.structure.n_coarse:
-        return _at_one_place(at_neighboring_lumps(state), finer, validation)
+        listed = _with_other_thermometers(at_neighboring_lumps(state), finer, validation)
+        return _at_one_place(listed, finer, validation)
     rounds = []
     for place, round_ in enumerate(state.rounds):
         known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)
                  or predicts(entry.fit, finer, validation)]
         rivals = (entry for entry in _rivals(state, place, finer) if predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*known, *rivals)))
-    return replace(state, rounds=tuple(rounds))
+    return _with_other_thermometers(replace(state, rounds=tuple(rounds)), finer, validation)
+
+
+def _with_other_thermometers(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
+    """List beside an offset of a thermometer those of others that do nearly as much, and predict."""
+    def others(place: int, round_: Accepted) -> list[Entry]:
+        less = without(state.fit, place, finer, round_.before)
+        return [] if less is None else [entry for entry in other_thermometers(round_, state.fit, less)
+                                        if predicts(entry.fit, finer, validation)]
+
+    return replace(state, rounds=tuple(replace(round_, contenders=(*round_.contenders, *others(place, round_)))
+                                       for place, round_ in enumerate(state.rounds)))
 
 
 def _at_one_place(state: SearchState, finer: Refit, validation: Validation) -> SearchState:

@@ -7,7 +7,7 @@ Validation records may then exclude the heater: `_places`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 
 from ...errors import Diverged, InputError
@@ -42,8 +42,9 @@ def with_other_end(round_: Accepted, named: Set[Key], names: Sequence[str] | Non
     others = [one for one in before.testable(candidates(before.structure.base, asked))
               if one.key not in known and ends_of_a_lump(before.structure.base, one, best.candidate)]
     try:
-        own = _refitted(best, best.candidate, before) if others else before
-        fits = [(one, _refitted(best, one, before)) for one in others]
+        at = {_TIME: best.found[_TIME]}
+        own = refitted_from(best.fit, best.candidate, before, at) if others else before
+        fits = [(one, refitted_from(best.fit, one, before, at)) for one in others]
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
     listed = tuple(Entry(one, fit, delta_bic(before, fit), best.p_value) for one, fit in fits
@@ -51,15 +52,25 @@ def with_other_end(round_: Accepted, named: Set[Key], names: Sequence[str] | Non
     return replace(round_, contenders=(*round_.contenders, *listed))
 
 
-def _refitted(best: Entry, candidate: Candidate, before: Refit) -> Refit:
-    """The fit before with one of the lags, from the time constant and the parameters of the accepted one."""
-    found = best.fit.structure
-    values = {one.key: value for fit in (before, best.fit)  # the later fit need not have all effects of the earlier one
-              for one, value in zip(fit.structure.effects, fit.structure.quantities(fit.v), strict=True)}
+def refitted_from(fit: Refit, candidate: Candidate, before: Refit, values: Mapping[str, float]) -> Refit:
+    """A fit with a candidate added, which starts from the parameters of another fit.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit whose parameters are the start.
+    candidate : Candidate
+        Effect that is added.
+    before : Refit
+        Fit without it.
+    values : mapping
+        Quantities of the candidate to start from.
+    """
+    known = {one.key: value for own in (before, fit)  # the later fit need not have all effects of the earlier one
+             for one, value in zip(own.structure.effects, own.structure.quantities(own.v), strict=True)}
     structure = before.structure.with_effect(candidate)
-    at = [*(values[one.key] for one in before.structure.effects),
-          {**candidate.shape, _TIME: values[best.candidate.key][_TIME]}]
-    return extended(before, structure, structure.carried(found, best.fit.v, at))
+    at = [*(known[one.key] for one in before.structure.effects), {**candidate.shape, **values}]
+    return extended(before, structure, structure.carried(fit.structure, fit.v, at))
 
 
 def ends_of_a_lump(system: System, one: Candidate, other: Candidate) -> bool:
