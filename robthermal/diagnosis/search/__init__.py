@@ -44,7 +44,7 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
-           "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods", "other_thermometers",
-           "quantities_of", "reconsider", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
-           "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
-           "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]
+           "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods",
+           "other_thermometers", "quantities_of", "reconsider", "refit_candidates", "refit_set", "refit_short_list",
+           "resolve_alternatives", "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist",
+           "validate", "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]
