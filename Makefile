@@ -26,7 +26,7 @@ QUICK := tests/test_tests.py tests/test_contributing.py tests/test_language.py t
 
 help:
 	@echo "make demo    (simulated) records -> calibrated model -> certificates -> build/demo/report.html"
-	@echo "make test    lint, types, then the tests (import contract, doctests, notebooks included)"
+	@echo "make test    lint, then the tests (types, import contract, doctests, notebooks included)"
 	@echo "make exhaustive   the tests that make test leaves to CI: many random draws, brute force, the site built and read"
 	@echo "make quick   lint, types, import contract and fast tests, within a minute: before every commit"
 	@echo "make lint    ruff and mypy only"
@@ -38,7 +38,9 @@ demo: $(VENV)/.installed
 	rm -rf build/demo
 	$(BIN)/robthermal demo --out build/demo
 
-test: lint
+# ruff first, because it takes a second; mypy is one of the tests, beside which the other process works on.
+test: $(VENV)/.test
+	$(BIN)/ruff check .
 	$(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "$(MARK)"
 
 exhaustive: $(VENV)/.test
@@ -68,12 +70,12 @@ clean:
 # The stamps say what the environment holds; a changed pyproject.toml renews them. recheck is the second checker.
 $(VENV)/.installed: pyproject.toml recheck/pyproject.toml | $(BIN)/pip
 	@echo "Installing robthermal into $(VENV) (a minute or two the first time)"
-	$(PIP) --editable . --editable ./recheck
+	$(PIP) --no-compile --editable . --editable ./recheck
 	@touch $@
 
 $(VENV)/.test: pyproject.toml recheck/pyproject.toml | $(BIN)/pip
 	@echo "Installing robthermal and its test tools into $(VENV) (a few minutes the first time)"
-	$(PIP) --editable ".[test]" --editable ./recheck
+	$(PIP) --no-compile --editable ".[test]" --editable ./recheck
 	@touch $(VENV)/.installed $@
 
 $(BIN)/pip:

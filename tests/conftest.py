@@ -20,7 +20,8 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]  # what
 from commands import Run, command  # noqa: E402
 
 DRAW = vars(rt.report.Figure)["draw"]
-LONGEST = ("test_notebooks.py", "test_docs.py", "test_cli.py", "test_design_commands.py", "test_results.py")
+LONGEST = ("test_types.py", "test_notebooks.py", "test_docs.py", "test_cli.py", "test_design_commands.py",
+           "test_results.py", "test_bounded_work.py", "test_changes_finer_truth.py", "test_finer_network.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

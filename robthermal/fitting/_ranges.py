@@ -65,6 +65,10 @@ class Ranges:
         """What the system's parameters become."""
         return {name: float(value) for group, value in zip(self.members, values, strict=True) for name in group}
 
+    def applied(self, system: System, coordinates: Floats) -> System:
+        """The system at these coordinates, within the bounds in spite of rounding."""
+        return system.with_parameters(self.assigned(np.clip(self.values(coordinates), self.lower, self.upper)))
+
     def joined(self, sensitivity: Floats) -> Floats:
         """Derivative (..., p) by each estimated value, from that (..., len(flat)) by every member."""
         owner = np.repeat(np.arange(len(self.members)), [len(group) for group in self.members])

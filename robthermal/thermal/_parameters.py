@@ -89,11 +89,17 @@ def _split(table: str, rest: str, parts: tuple[str, ...]) -> tuple[str, str] | N
     return None
 
 
+def number(system: System, name: str) -> float | None:
+    """Value of one parameter, kelvin for temperatures; None if it is not set."""
+    table, part, field = locate(system, name)
+    return _get(parts_of(system, table)[part], field)
+
+
 def read_parameter(system: System, name: str) -> float:
     """Value of one parameter, kelvin for temperatures."""
-    table, part, field = locate(system, name)
-    value = _get(parts_of(system, table)[part], field)
+    value = number(system, name)
     if value is None:
+        table, part, field = locate(system, name)
         raise InputError(f"{name!r} is not set in this system", where="parameter name",
                          remedy=f"Give {field} in [{table}.{part}] first.")
     return value

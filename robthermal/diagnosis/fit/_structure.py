@@ -20,10 +20,10 @@ from ..effects import Candidate
 from ..path import Linearized, Unknowns, linearize
 from ._derived import STEP, with_quantities
 from ._ends import Ends
+from ._recent import Recent
 from ._sessions import Sessions
 
 Array = NDArray[np.float64]
-_KEPT = 2
 _FARTHEST = 20.0  # standard deviations of an initial temperature
 _COLDEST, _HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
 _STILL = 1e-6  # standard deviations from a bound
@@ -77,7 +77,8 @@ class Structure:
     coarse: tuple[Array, ...] = ()
     only_heated: bool = False
     ended: Ends = field(default_factory=Ends, repr=False)
-    _last: dict[bytes, _Computed] = field(default_factory=dict, init=False, repr=False)
+    _last: Recent[_Computed] = field(default_factory=Recent, init=False, repr=False)
+    _nominals: Recent[System] = field(default_factory=Recent, init=False, repr=False)
 
     @property
     def n_parameters(self) -> int:
@@ -207,8 +208,8 @@ class Structure:
 
     def system(self, v: Array) -> System:
         """Nominal system at these parameters with the effects added."""
-        values = np.clip(self.ranges.values(v[:self.n_parameters]), self.ranges.lower, self.ranges.upper)  # a rounding
-        system = self.base.with_parameters(self.ranges.assigned(values)) if self.n_parameters else self.base
+        p = v[:self.n_parameters]  # derivatives by effects ask for the same ones
+        system = self._nominals.of(p, lambda: self.ranges.applied(self.base, p)) if p.size else self.base
         for candidate, q in zip(self.effects, self.quantities(v), strict=True):
             system = candidate.effect.add(system, candidate.where, q)
         return system
@@ -262,17 +263,15 @@ class Structure:
         return slice(first, self.n_common if only_records else first)
 
     def _computed(self, v: Array) -> _Computed:
-        key = v.tobytes()
-        if key not in self._last:
-            while len(self._last) >= _KEPT:
-                del self._last[next(iter(self._last))]
+        def compute() -> _Computed:
             paths = [linearize(system, one, self.tolerance, self.sessions.late(g))
                      for system, one, g in zip(self.systems(v), self.data, self.gains(v), strict=True)]
             if self.coarse:
                 b = v[self.n_common - self.n_coarse:self.n_common]
                 paths = [path.refined(columns, b) for path, columns in zip(paths, self.coarse, strict=True)]
-            self._last[key] = _Computed(tuple(paths))
-        return self._last[key]
+            return _Computed(tuple(paths))
+
+        return self._last.of(v, compute)
 
     def keep_only(self, v: Array) -> None:
         """Forget what was computed at other unknowns than these: megabytes for every fit to a long record.
@@ -282,8 +281,7 @@ class Structure:
         v : ndarray
             Values of the unknowns.
         """
-        for key in [key for key in self._last if key != v.tobytes()]:
-            del self._last[key]
+        self._last.keep_only(v)
 
     def _unknowns(self, v: Array) -> Iterator[Unknowns]:
         """The unknowns as every data set sees them, without those whose derivatives are the same everywhere."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .._parameters import parts_of
+from .._parameters import number, parts_of
 from .._parts import Link
 from .._system import System
 from ._response import Values, Where
@@ -67,13 +67,11 @@ def numbers(table: str, absent: float = 0.0, **keys: str) -> Builder:
         return {quantity: f"{owner}.{where[0]}.{key}" for quantity, key in keys.items()}
 
     def add(system: System, where: Where, values: Values) -> System:
-        known = set(system.parameter_names)
-        return system.with_parameters({name: values[quantity] + (system.parameter(name) if name in known else 0.0)
+        return system.with_parameters({name: values[quantity] + (number(system, name) or 0.0)
                                        for quantity, name in names(system, where).items()})
 
     def present(system: System, where: Where) -> bool:
-        known = set(system.parameter_names)
-        return any(name in known and system.parameter(name) != absent for name in names(system, where).values())
+        return any(number(system, name) not in (None, absent) for name in names(system, where).values())
 
     return Builder(add, names, present)
 
