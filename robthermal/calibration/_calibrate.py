@@ -34,6 +34,7 @@ from ..fitting import (
     scaled,
     scipy_loss,
     smallest_noise,
+    without_steps,
 )
 from ..thermal import System
 from ._directions import in_words, named, weights
@@ -145,13 +146,14 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     refuse_same(training, held_out)
     refuse_same_response(responses, responses_beside)
     refuse_double_start(ranges, initial)
+    levels = declared_noise(system, training, noise)
+    training, held_out = ([without_steps(system, one, levels) for one in some] for some in (training, held_out))
     starts = [initial_of(system, one, initial) for one in training]
     point = operating_point or {}
     problem = JointProblem(Problem(system, training, ranges, starts), tuple(
         ResponseProblem(system, measured_response(system, G, "data", point, thinned=False), ranges) for G in responses))
     compared = [measured_response(system, G, "validation", point, thinned=False) for G in responses_beside]
     refuse_short(problem.n_numbers, len(ranges.names))
-    levels = declared_noise(system, training, noise)
     filtered = method == "prediction_error" and has_disturbance(system)
     if filtered:
         refuse_unknown_noise(levels)

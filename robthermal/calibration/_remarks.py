@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ZERO_CELSIUS
-from ..fitting import within_steps
+from ..fitting import read_while_changing, within_steps
 from ..thermal import parameter_in_words, trajectory
 from ._joint import JointProblem
 
@@ -31,6 +31,7 @@ def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
     """
     problem, ranges = joint.records, joint.ranges
     system, records = problem.system, [one.record for one in problem.data]
+    yield from read_while_changing(system, problem.data)
     for name in system.ambients:
         number = f"ambients.{name}.temperature"
         lacking = [one.name or "record" for one in records if name not in one.input_names]

@@ -43,4 +43,8 @@ from ._start import Start as Start
 from ._start import initial_of as initial_of
 from ._start import start_values as start_values
 from ._start import started as started
+from ._voltage_steps import between_currents as between_currents
+from ._voltage_steps import read_while_changing as read_while_changing
+from ._voltage_steps import steps_of_current as steps_of_current
+from ._voltage_steps import without_steps as without_steps
 from ._within_steps import within_steps as within_steps

@@ -12,6 +12,7 @@ from .._arrays import Floats
 from ..errors import InputError
 from ..signals import Record
 from ..thermal import System
+from ._voltage_rows import refuse_voltage_of_another_row
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,18 @@ class Data:
     columns: NDArray[np.intp]
     readings: Floats
     missing: NDArray[np.bool_] | None = None
+
+    def where_read(self, values: Floats) -> Floats:
+        """Residuals (n, n_sensors, ...) or their derivatives, zero for the readings that count for nothing.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, n_sensors, ...)
+            Of every reading of the record.
+        """
+        if self.missing is None:
+            return values
+        return np.where(self.missing.reshape(*self.missing.shape, *[1] * (values.ndim - 2)), 0.0, values)
 
     @property
     def label(self) -> str:
@@ -65,6 +78,7 @@ def _one(system: System, record: Record, where: str) -> Data:
     if low.min() < 150.0:
         raise InputError(f"sensor {sensors[int(low.argmin())]!r} reads {low.min():.6g} K", where=f"argument {where}",
                          expected="kelvin inside a Record", remedy="Add 273.15, or read the file with its unit.")
+    refuse_voltage_of_another_row(system, record, where)
     return Data(record, sensors, np.array([system.sensor_names.index(name) for name in sensors], np.intp), readings)
 
 

@@ -69,7 +69,8 @@ def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]
     v = whole.v0
     if initial.n_free:
         n_head = max(2, round(_HEAD * len(one.readings)))
-        head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head])
+        missing = None if one.missing is None else one.missing[:n_head]
+        head = Data(one.record[:n_head], one.sensors, one.columns, one.readings[:n_head], missing)
         weights = scaled(np.array([noise.get(name) or _UNKNOWN[system.sensors[name].unit] for name in one.sensors]))
         problem = Problem(system, [head], NONE, [initial], [weights])
         v = scipy.optimize.least_squares(problem.vector, problem.v0, problem.jacobian, bounds=problem.bounds,

@@ -93,7 +93,7 @@ class Problem:
 
     def residuals(self, v: Floats) -> list[Floats]:
         """Measured − modelled of every record, (n, n_sensors) [K]."""
-        return [residual(one.readings, trajectory(system, one.record).readings[:, one.columns])
+        return [one.where_read(residual(one.readings, trajectory(system, one.record).readings[:, one.columns]))
                 for system, one in zip(self.systems(v), self.data, strict=True)]
 
     def runs(self, v: Floats) -> list[Run]:
@@ -104,10 +104,11 @@ class Problem:
             free = list(start.names) if start.n_free else []
             flat = self.ranges.flat
             run = trajectory(system, one.record, sensitivities=[*flat, *free])
-            J: Floats = np.asarray(run.sensitivity[:, one.columns], np.float64)
+            J: Floats = one.where_read(np.asarray(run.sensitivity[:, one.columns], np.float64))
             by_start: Floats = np.multiply(J[..., len(flat):], -start.sigma[:start.n_free])
             by_parameter: Floats = np.multiply(self.ranges.joined(J[..., :len(flat)]), -slopes)
-            out.append(Run(residual(one.readings, run.readings[:, one.columns]), by_parameter, by_start))
+            own = one.where_read(residual(one.readings, run.readings[:, one.columns]))
+            out.append(Run(own, by_parameter, by_start))
         return out
 
     def vector(self, v: Floats) -> Floats:

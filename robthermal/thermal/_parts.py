@@ -278,6 +278,9 @@ class Sensor(Part):
         Heat of a thermometer into its lump [W].
     lead_resistance : float, optional
         Resistance of the wires between the module and the terminals where the voltage is read [Ω]; it heats no lump.
+    read : {"after", "before"}
+        Whether a program reads a voltage after it sets the current of a row of a record, or before: then the voltage of
+        a row is that at the current of the row before. A matter of records alone.
     initial : float, optional
         Temperature of a lagged thermometer at the start [K]; default that of its lump: settled.
     """
@@ -292,6 +295,7 @@ class Sensor(Part):
     delay: NonNegative = 0.0
     self_heating: Finite = 0.0
     lead_resistance: NonNegative | None = None
+    read: Literal["after", "before"] = "after"
     initial: Kelvin | None = None
 
     @property
@@ -310,12 +314,12 @@ class Sensor(Part):
                              "temperature, a module a voltage")
         if voltage:
             object.__setattr__(self, "quantity", "voltage")
-        of_others = ("time_constant", "delay", "self_heating", "initial") if voltage else ("lead_resistance",)
-        wrong = [key for key in of_others if getattr(self, key)]
+        of_others = ("time_constant", "delay", "self_heating", "initial") if voltage else ("lead_resistance", "read")
+        wrong = [key for key in of_others if getattr(self, key) and (key != "read" or self.read == "before")]
         if wrong:
             raise ValueError(f"{wrong[0]} does not belong to a {self.quantity}: "
                              + ("a voltage is read at once and heats nothing" if voltage else
-                                "it is that of the wires of a module"))
+                                "it is that of the voltage of a module"))
         return self
 
 

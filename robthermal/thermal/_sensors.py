@@ -1,8 +1,8 @@
 """Sensor readings from states and drives, and their derivatives.
 
 A thermometer reads its lump: lag (a state), delay, gain about the reference, offset; in a record of means the mean of
-that over the sample before. The voltage of a module follows
-from the temperatures of its faces and from the current of the same row of the record, at once.
+that over the sample before. The voltage of a module follows at once from the temperatures of its faces and from the
+current of the same row of the record, or of the row before where it is read before the current is set.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ import numpy as np
 from .._all_pole import all_pole
 from ._equations import Equations
 from ._layout import Layout
+from ._parts import Sensor
 from ._terms import Array
 from ._voltage import voltages
 
 Rates = tuple[Array, Array] | None
+Drives = tuple[Array, Array]  # (n, n_w) just after every sample and just before it
 
 
 def reference(eq: Equations) -> float:
@@ -26,19 +28,24 @@ def reference(eq: Equations) -> float:
     return next(iter(eq.system.ambients.values())).temperature
 
 
-def currents(eq: Equations, states: Array, w: Array, column: int) -> Array:
-    """Current of a column of the drives (...): the state of its lag if it has one."""
+def _read_from(after: Array, before: Array, sensor: Sensor) -> Array:
+    """What a voltage is read with: what holds just after every sample, or just before it."""
+    return before if sensor.read == "before" else after
+
+
+def _currents(eq: Equations, states: Array, w: Drives, sensor: Sensor, column: int) -> Array:
+    """Current of a column of the drives (n,): the state of its lag if it has one."""
     lags = Layout(eq).drives
-    return states[..., lags[column]] if column in lags else w[..., column]
+    return states[..., lags[column]] if column in lags else _read_from(*w, sensor)[..., column]
 
 
-def read_sensors(eq: Equations, states: Array, rates: Rates, w: Array, h: float) -> Array:
-    """Noise-free readings (n, n_sensors) [K or V] from states (n, n_states) and drives w (n, n_w) of every sample."""
+def read_sensors(eq: Equations, states: Array, rates: Rates, w: Drives, h: float) -> Array:
+    """Noise-free readings (n, n_sensors) [K or V] from states (n, n_states) and drives of every sample."""
     T_ref, columns = reference(eq), []
     layout, volts = Layout(eq), voltages(eq)
     for name, sensor in eq.system.sensors.items():
         if name in volts:
-            current = currents(eq, states, w, volts[name].column)
+            current = _currents(eq, states, w, sensor, volts[name].column)
             columns.append(sensor.gain * volts[name].value(states, current) + sensor.offset)
             continue
         source = seen(layout, name, states, rates, sensor.delay, h)
@@ -46,8 +53,8 @@ def read_sensors(eq: Equations, states: Array, rates: Rates, w: Array, h: float)
     return np.column_stack(columns) if columns else np.zeros((len(states), 0))
 
 
-def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes: Array, rate_slopes: Rates,
-                   held: Mapping[str, Array], names: Sequence[str], h: float, scale: Array) -> Array:
+def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Drives, slopes: Array, rate_slopes: Rates,
+                   held: Mapping[str, Drives], names: Sequence[str], h: float, scale: Array) -> Array:
     """Derivative (n, n_sensors, n_parameters) of the readings, times `scale` (n_parameters,).
 
     Given are that of the states (n, n_states, n_parameters), and by name that of the drives (n, n_w) of every sample.
@@ -63,15 +70,15 @@ def reading_slopes(eq: Equations, states: Array, rates: Rates, w: Array, slopes:
     return out
 
 
-def _voltage_slopes(eq: Equations, name: str, states: Array, w: Array, slopes: Array, held: Mapping[str, Array],
+def _voltage_slopes(eq: Equations, name: str, states: Array, w: Drives, slopes: Array, held: Mapping[str, Drives],
                     names: Sequence[str]) -> Array:
     """Derivative (n, n_parameters) of the reading of a voltage."""
     volt, sensor = voltages(eq)[name], eq.system.sensors[name]
-    current = currents(eq, states, w, volt.column)
+    current = _currents(eq, states, w, sensor, volt.column)
     lag = Layout(eq).drives.get(volt.column)
     none = np.zeros(len(states))
     by_current = slopes[:, lag] if lag is not None else np.column_stack(
-        [held[parameter][:, volt.column] if parameter in held else none for parameter in names])
+        [_read_from(*held[parameter], sensor)[:, volt.column] if parameter in held else none for parameter in names])
     out = volt.along(states, current, slopes, by_current)
     for column, parameter in enumerate(names):
         out[:, column] += volt.parameter(parameter, states, current)
@@ -143,7 +150,8 @@ def read_sampled(eq: Equations, kept: Sequence[int], sampled: Array, u: Array, h
     volts = {name: replace(volt, hot=at[volt.hot], cold=at[volt.cold]) for name, volt in voltages(eq).items()}
     for name, sensor in eq.system.sensors.items():
         if name in volts:
-            current = eq.drives(u)[:, volts[name].column]
+            w = eq.drives(u)
+            current = _read_from(w, np.concatenate([w[:1], w[:-1]]), sensor)[:, volts[name].column]
             columns.append(sensor.gain * volts[name].value(sampled, current) + sensor.offset)
             continue
         source = sampled[:, at[eq.index[sensor.lump]]]

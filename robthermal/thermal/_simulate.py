@@ -126,7 +126,8 @@ def simulate(system: System, record: Record, *, initial: Initial = None, toleran
     Record
         Same inputs; outputs are the noise-free readings of all sensors [K, or V] (of all lumps if the system has no
         sensor). Where those of `record` are means over the sample before, these are too; its first is kept, because the
-        sample that it is the mean of is not in the record. The voltage of a row is that at the current of the same row.
+        sample that it is the mean of is not in the record. The voltage of a row is that at the current of the same row,
+        or of the row before (`read = "before"` of its sensor).
 
     Raises
     ------
@@ -236,10 +237,12 @@ def _equations(system: System, record: Record) -> Equations:
 
 
 def _first_measured(eq: Equations, record: Record) -> list[tuple[int, str]]:
-    """Column and name of sensors whose first reading is the record's: the step that it is the mean of is not in it."""
-    if not eq.averaged:
-        return []
-    return [(i, name) for i, name in enumerate(eq.system.sensors) if name in record.output_names]
+    """Column and name of sensors whose first reading is the record's: what it depends on was before the record.
+
+    A mean over the step before, or a voltage at the current of the row before.
+    """
+    return [(i, name) for i, (name, sensor) in enumerate(eq.system.sensors.items())
+            if name in record.output_names and (eq.averaged or sensor.read == "before")]
 
 
 def _keep_first(eq: Equations, record: Record, readings: Array) -> None:
@@ -268,7 +271,7 @@ def _exponential(eq: Equations, record: Record, u: Array, initial: Initial, tole
     path = by.run(start_state(eq, record, initial, plan), plan)
     states = path.z[at, :layout.n_free]
     derivative = _Derivative(record, initial, by, plan, path)
-    readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, plan.w[at], h)
+    readings = read_sensors(eq, states, _rates(by, states, plan) if derivative.delayed else None, _around(plan), h)
     _keep_first(eq, record, readings)
     lumps, meters = states[:, :n], path.z[at]
     return Trajectory(eq.system, record.time, lumps, readings, (lumps - lumps[0]) @ eq.capacity,
@@ -302,10 +305,11 @@ class _Derivative:
         slopes = along.along(self.path, plan, start_slope(eq, self.record, self.initial, names, held))
         if len(at) < len(slopes):  # else every segment is a sample
             slopes = slopes[at]
-        out = reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, self.plan.w[at], slopes,
+        sooner = np.maximum(at - 1, 0)
+        out = reading_slopes(eq, states, _rates(by, states, plan) if by_rate else None, _around(plan), slopes,
                               _rate_slopes(along, states, plan, slopes) if self.delayed else None,
-                              {name: moved[at] for name, moved in held.items()}, names, self.record.sample_time,
-                              np.ones(len(names)) if scale is None else scale)
+                              {name: (moved[at], moved[sooner]) for name, moved in held.items()}, names,
+                              self.record.sample_time, np.ones(len(names)) if scale is None else scale)
         out[0, [column for column, _ in _first_measured(eq, self.record)]] = 0.0
         return out
 

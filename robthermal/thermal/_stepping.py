@@ -105,7 +105,7 @@ class Stepper:
     def undelayed(self) -> Array:
         """Noise-free readings of all sensors now, as if none had a pure delay [K]; voltages at the currents of the
         last step [V]."""
-        return read_sensors(self._eq, self.state[None], None, self._w[None], self.sample_time)[0]
+        return read_sensors(self._eq, self.state[None], None, (self._w[None], self._w[None]), self.sample_time)[0]
 
     def step(self, inputs: Mapping[str, float] | None = None, load: Mapping[str, float] | None = None) -> Array:
         """Advance one sample.

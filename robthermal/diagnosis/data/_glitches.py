@@ -3,7 +3,7 @@
 A spike of a thousand standard deviations would decide any sum of squares. It is told from physics by its neighbors:
 heat seldom makes a reading leave and come back within three samples; where it does so in a rhythm (a thermostat, a
 pulsed heater), or where the model itself bends as fast, nothing is called a spike, nor a jump of a few steps of the
-converter.
+converter. Voltages that are read while their current changes are left out too, however many they are.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..._residual import residual
 from ..._rhythm import in_rhythm
 from ...errors import Diverged, InputError
-from ...fitting import Data, quantum
+from ...fitting import Data, between_currents, quantum, steps_of_current
 from ...thermal import System, trajectory
 
 Array = NDArray[np.float64]
@@ -32,13 +32,17 @@ _PASSES = 5
 MOST = 0.05
 
 
-def counted(data: Sequence[Data]) -> dict[str, int]:
-    """Number of outliers of every sensor that has any; refuse more than a few per cent."""
+def counted(system: System, data: Sequence[Data]) -> dict[str, int]:
+    """Number of outliers of every sensor that has any; refuse more than a few per cent.
+
+    Voltages that were read while their current changed are not among them.
+    """
     readings: dict[str, int] = {}
     found: dict[str, int] = {}
     for one in data:
         if one.missing is not None:
-            for name, n in zip(one.sensors, one.missing.sum(axis=0).tolist(), strict=True):
+            alone = one.missing & ~steps_of_current(system, one)
+            for name, n in zip(one.sensors, alone.sum(axis=0).tolist(), strict=True):
                 found[name] = found.get(name, 0) + n
                 readings[name] = readings.get(name, 0) + len(one.missing)
     for name, n in found.items():
@@ -65,21 +69,21 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
         model = np.asarray(trajectory(system, one.record).readings[:, one.columns], np.float64)
     except Diverged:  # the refit will say so
         return one
-    r, missing = residual(one.readings, model), np.zeros(one.readings.shape, bool)
+    r = residual(one.readings, model)
     steps = np.array([_STEPS * quantum(y) for y in one.readings.T])
     allowed: Array = np.maximum(_FAR * noise, steps) + _CURVED * _curvature(model)
-    time = np.arange(len(r))
+    changing = between_currents(system, one, r, noise)
+    missing = changing.copy()
     for _ in range(_PASSES):
+        _bridge(r, missing)
         new = outliers(r, allowed) & ~missing
         if not new.any():
             break
         missing |= new
-        for i in np.flatnonzero(missing.any(axis=0)):
-            good = ~missing[:, i]
-            r[:, i] = np.interp(time, time[good], r[good, i])
+    _bridge(r, missing)
     own = residual(one.readings, model)
     for i in np.flatnonzero(missing.any(axis=0)):
-        rows = np.flatnonzero(missing[:, i])
+        rows = np.flatnonzero(missing[:, i] & ~changing[:, i])
         kept = rows[in_rhythm(rows, own[rows, i] - r[rows, i])]
         missing[kept, i], r[kept, i] = False, own[kept, i]
     if not missing.any():
@@ -89,6 +93,14 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     outputs = np.array(one.record.outputs, float)
     outputs[:, columns] = readings
     return replace(one, record=one.record.with_outputs(outputs), readings=readings, missing=missing)
+
+
+def _bridge(r: Array, missing: Mask) -> None:
+    """Interpolate residuals (n, n_sensors) over missing readings."""
+    time = np.arange(len(r))
+    for i in np.flatnonzero(missing.any(axis=0)):
+        good = ~missing[:, i]
+        r[:, i] = np.interp(time, time[good], r[good, i])
 
 
 def outliers(r: Array, allowed: Array) -> Mask:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..._drawing import axes_for
 from ...errors import InputError, Outcome
-from ...fitting import Data, Measured, declared_noise, quantum, smallest_noise
+from ...fitting import Data, Measured, declared_noise, quantum, read_while_changing, smallest_noise
 from ...thermal import System
 from .._outcomes import DiagnosisCode
 from ._glitches import counted
@@ -153,10 +153,12 @@ def noise_floor(system: System, records: Measured | Sequence[Measured], *,
     noise_of = {name: level or rough[name] for name, level in levels.items()}
     units = {name: system.sensors[name].unit for name in noise_of}
     disturbance = {name: lump.disturbance for name, lump in system.lumps.items()}
-    glitches = counted([one.without_outliers(system, noise_of) for one in records_of(measured)])
+    clean = [one.without_outliers(system, noise_of) for one in records_of(measured)]
     return NoiseEstimate({**noise_of, **relative}, unknown, disturbance, {**rough, **relative},
-                         _outcome(noise_of, rough, unknown, units), glitches, _quantized(data, noise_of),
-                         {**units, **dict.fromkeys(relative, "-")}, remarks(system, data, noise_of),
+                         _outcome(noise_of, rough, unknown, units), counted(system, clean),
+                         _quantized(data, noise_of),
+                         {**units, **dict.fromkeys(relative, "-")},
+                         (*remarks(system, data, noise_of), *read_while_changing(system, clean)),
                          quiet(system, data, noise_of))
 
 

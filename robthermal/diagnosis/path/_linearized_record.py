@@ -228,8 +228,7 @@ class LinearizedRecord:
 
     def _changes_voltage(self, trial: Candidate) -> bool:
         """Whether an effect acts on a module whose voltage is read: beside its heat, it changes a reading at once."""
-        read = {self.system.sensors[name].module for name in self.one.sensors}
-        return any(name in self.system.modules and name in read for name in trial.where)
+        return bool({self.system.sensors[name].module for name in self.one.sensors} & {*trial.where} - {""})
 
     def splines(self, lump: int) -> Array:
         """As `Linearized.splines`: a spline in time of 1 W.
@@ -317,7 +316,8 @@ class LinearizedRecord:
         read = [core + self.means.index(source) for source in self.sources] if self.means else self.sources
         for i, name in enumerate(self.one.sensors):
             if read[i] < 0:
-                C[:, i, :self.x.shape[1]] = voltage_slopes(self.equations, name, self.x, self.u)
+                u = self.u[np.maximum(np.arange(len(self.u)) - (self.system.sensors[name].read == "before"), 0)]
+                C[:, i, :self.x.shape[1]] = voltage_slopes(self.equations, name, self.x, u)
             else:
                 C[:, i, read[i]] = self.system.sensors[name].gain
         return C if varies else np.broadcast_to(C[0], (len(self.x), *C.shape[1:]))

@@ -1,0 +1,128 @@
+"""When a voltage is read, and when its current is set: before, after, or while; logs made by hand in plain scipy."""
+
+import re
+
+import numpy as np
+import pytest
+from voltage_rig import FILE, TRUE, log, system, voltage
+
+import robthermal as rt
+
+H = 4.0
+FIT = {"modules.m1.seebeck.value": {"lower": 0.03, "upper": 0.08},
+       "modules.m1.resistance.value": {"lower": 1.0, "upper": 4.0},
+       "modules.m1.conductance.value": {"lower": 0.1, "upper": 1.5}}
+
+
+def currents(seed: int) -> np.ndarray:
+    return np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.8, 20), 10)
+
+
+def machine(read: str = "after", **numbers: float) -> rt.System:
+    """The rig, whose file knows its slopes, with a program that reads after or before it sets the current."""
+    made = rt.thermal.parse_system(FILE.replace('quantity = "voltage"', f'quantity = "voltage"\nread = "{read}"'))
+    return rt.System(**{**dict(made.with_parameters(numbers)), "fit": FIT})
+
+
+def logged(seed: int, share: float, p: dict[str, float] = TRUE) -> rt.Record:
+    """A log in which `share` of the voltage is still that at the current of the row before, at rest at the start."""
+    current = currents(seed)
+    readings, faces = log(current, H, p)
+    before = np.concatenate([[0.0], current[:-1]])
+    V = (1.0 - share) * readings[:, 1] + share * voltage(faces[:, 0], faces[:, 1], before, p)
+    noise = np.random.default_rng(100 + seed).standard_normal((len(current), 2)) * [0.02, 0.002]
+    return rt.Record(sample_time=H, inputs=current, outputs=np.column_stack([readings[:, 0], V]) + noise,
+                     input_names=["m1"], output_names=["T_cold", "V1"])
+
+
+def test_a_voltage_read_before_is_that_of_the_rig() -> None:
+    run = rt.thermal.simulate(machine("before"), logged(1, 1.0), initial=295.15)
+    left = logged(1, 1.0).outputs - run.outputs
+    assert left.std(axis=0) == pytest.approx([0.02, 0.002], rel=0.2)
+    assert left[0, 1] == 0.0  # the current before the record is not known: its own reading stands
+    alone = rt.Record(sample_time=H, inputs=currents(1), outputs=np.zeros((200, 0)), input_names=["m1"],
+                      output_names=[])
+    at_rest = rt.thermal.simulate(machine("before"), alone, initial=295.15)
+    assert np.allclose(at_rest.outputs[1:], run.outputs[1:], atol=1e-9)
+
+
+def test_slopes_of_a_voltage_read_before_are_differences() -> None:
+    record, names = logged(1, 1.0), [*FIT, "links.hot-room.conductance", "sensors.V1.gain"]
+    made = machine("before")
+    found = rt.thermal.trajectory(made, record, sensitivities=names).sensitivity
+    for i, name in enumerate(names):
+        step = 1e-4 * made.parameter(name)
+        more, less = (rt.thermal.trajectory(made.with_parameters({name: made.parameter(name) + sign * step}), record,
+                                            tolerance=1e-8).readings for sign in (1.0, -1.0))
+        assert np.allclose(found[..., i], (more - less) / (2.0 * step), atol=2e-3 * np.abs(found[..., i]).max() + 1e-6)
+
+
+def test_only_voltages_are_read_before() -> None:
+    with pytest.raises(rt.InputError, match="read does not belong to a temperature"):
+        rt.thermal.parse_system(FILE.replace('lump = "cold"\nnoise', 'lump = "cold"\nread = "before"\nnoise'))
+
+
+@pytest.mark.parametrize(("share", "read", "said"), [
+    (1.0, "after", 'm1\' one row later.* say read = "before" in .sensors.V1.'),
+    (0.0, "before", 'm1\' in the same row.* leave out read = "before"')])
+def test_a_voltage_of_another_row_is_refused_by_name(share: float, read: str, said: str) -> None:
+    for asked in (rt.diagnose, rt.calibrate):
+        with pytest.raises(rt.InputError, match=f"(?s)the voltage 'V1' follows a step of the current '{said}"):
+            asked(machine(read), logged(1, share))
+
+
+def replaced(record: rt.Record, inputs: np.ndarray) -> rt.Record:
+    return rt.Record(sample_time=H, inputs=inputs, outputs=record.outputs, input_names=["m1"],
+                     output_names=["T_cold", "V1"])
+
+
+@pytest.mark.parametrize(("share", "read"), [(0.0, "after"), (0.6, "after"), (1.0, "before")])
+def test_what_does_not_tell_is_not_refused(share: float, read: str) -> None:
+    """Short logs, a current that moves slowly or never, or a voltage that is read while the current changes."""
+    record = logged(1, share)
+    slow = replaced(record, np.linspace(0.0, 1.5, 200))
+    for one in (record[:3], record[:12], record, slow, replaced(record, np.full(200, 1.5))):
+        assert rt.fitting.as_data(machine(read), one, "data")[0].sensors == ("T_cold", "V1")
+
+
+def test_a_measured_current_has_noise() -> None:
+    """Steps count, and not what the meter of the current adds to every row."""
+    noise = 0.002 * np.random.default_rng(9).standard_normal((200, 1))
+    late, between = logged(1, 1.0), logged(1, 0.5)
+    with pytest.raises(rt.InputError, match="one row later"):
+        rt.fitting.as_data(machine(), replaced(late, late.inputs + noise), "data")
+    found = rt.diagnose(machine(), replaced(between, between.inputs + noise), noise={"V1": 0.005})
+    assert re.search(r"V1 was read while the current of m1 changed, in (1\d|20) rows", found.outcome.text)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.1])
+def test_readings_while_the_current_changes_are_left_out(share: float) -> None:
+    """Of a right model nothing is missing; of one without the slope of the resistance that is."""
+    train, held_out = logged(1, share), logged(2, share)
+    right = rt.diagnose(machine(), train, validation=held_out)
+    assert right.verdict == "consistent"
+    assert "V1 was read while the current of m1 changed, in 20 rows: left out." in right.outcome.text
+    lacking = rt.diagnose(machine(**{"modules.m1.resistance.slope": 0.0}), train, validation=held_out)
+    assert lacking.verdict == "named" and [one.label for one in lacking.effects] == ["resistance_slope(m1)"]
+    slope, std, _ = lacking.effects[0].values["slope"]
+    assert abs(slope - TRUE["dR"]) < 4 * std
+
+
+def test_where_voltages_are_read_after_nothing_is_left_out() -> None:
+    found = rt.calibrate(machine(**{"modules.m1.resistance.slope": 0.0}), logged(1, 0.0))
+    assert "was read while" not in str(found)
+
+
+def test_a_calibration_counts_no_voltage_between_two_currents() -> None:
+    start = machine(**{"modules.m1.resistance.value": 1.7, "modules.m1.seebeck.value": 0.055})
+    found = rt.calibrate(start, logged(1, 0.5), validation=logged(2, 0.5))
+    assert "V1 was read while the current of m1 changed, in 20 rows: left out." in str(found)
+    for name, key in (("seebeck.value", "S"), ("resistance.value", "R"), ("conductance.value", "K")):
+        at = list(found.parameters).index(f"modules.m1.{name}")
+        assert abs(found.parameters[f"modules.m1.{name}"] - TRUE[key]) < 4.0 * found.covariance[at, at]**0.5
+    assert found.train[0].rmse["V1"] == pytest.approx(0.002, rel=0.2)
+    assert found.validation[0].rmse["V1"] == pytest.approx(0.002, rel=0.2)
+
+
+def test_the_rig_reads_after() -> None:
+    assert system().sensors["V1"].read == "after"
