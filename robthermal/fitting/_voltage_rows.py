@@ -20,6 +20,7 @@ STEP = 0.02  # of the range of a current: smaller changes are no steps
 _STEPS = 4  # rows with a step of the current, at least
 _NOT_THERE = 0.2  # of the step's voltage: what a module cannot leave out at once, nor show late
 _SURE = 4.0  # standard deviations
+_OWN = 0.1  # of the squares of a difference, that does not follow from the other one and from the current
 
 
 def refuse_voltage_of_another_row(system: System, record: Record, where: str) -> None:
@@ -45,7 +46,8 @@ def refuse_voltage_of_another_row(system: System, record: Record, where: str) ->
                 f"the voltage {name!r} follows a step of the current {sensor.module!r} one row later, in the record "
                 f"{record.name!r}", where=f"argument {where}", expected="the voltage at the current of its row",
                 remedy=f'If the program reads before it sets the current, say read = "before" in [sensors.{name}]. If '
-                       "the current itself acts a row later than it stands, shift it: input_shift = 1 in [record].")
+                       "the current itself acts a row later than it stands, shift it: input_shift = 1 in [record]. If "
+                       f"its supply is late, give [modules.{sensor.module}.drive] a delay or a time_constant.")
         if sensor.read == "before" and at_once > _NOT_THERE:
             raise InputError(
                 f"the voltage {name!r} follows a step of the current {sensor.module!r} in the same row, in the record "
@@ -60,19 +62,32 @@ def _is_late(system: System, sensor: Sensor) -> bool:
 
 
 def _at_once(V: Floats, current: Floats) -> float:
-    """Share of the voltage of a step that is there in its row, as far as it is sure; nan where no steps tell."""
-    steps, moved = np.diff(current), np.diff(V)
-    X = np.column_stack([steps[1:], steps[:-1], np.ones(len(steps) - 1)]) if len(steps) > 1 else np.zeros((0, 3))
-    told = np.abs(X[:, :2]).max(axis=1, initial=0.0) > STEP * np.ptp(current)
-    if np.count_nonzero(told) < _STEPS or np.linalg.matrix_rank(X[told]) < 3:
+    """Share of the voltage of a step that is there in its row, as far as it is sure; nan where no steps tell.
+
+    What the current pumps meanwhile goes with the current itself. Of a slow current the differences follow from one
+    another and from it, and nothing is told.
+    """
+    steps, moved = np.diff(current), np.diff(V)[1:]
+    if len(steps) < 2:
         return math.nan
-    X, y = X[told], moved[1:][told]
-    (a, b, c), *_ = np.linalg.lstsq(X, y, rcond=None)
-    r = y - X @ (a, b, c)
-    if not a + b or len(y) < 4:
+    X = np.column_stack([steps[1:], steps[:-1], current[1:-1], np.ones(len(moved))])
+    told = np.abs(X[:, :2]).max(axis=1) > STEP * np.ptp(current)
+    X, y = X[told], moved[told]
+    if np.count_nonzero(told) < _STEPS + X.shape[1] or not _apart(X):
         return math.nan
-    covariance = np.linalg.inv(X.T @ X)[:2, :2] * float(r @ r) / (len(y) - 3)
-    share = a / (a + b)
-    slope = np.array([b, -a]) / (a + b) ** 2
+    found, *_ = np.linalg.lstsq(X, y, rcond=None)
+    (a, b), r = found[:2], y - X @ found
+    covariance = np.linalg.inv(X.T @ X)[:2, :2] * float(r @ r) / (len(y) - len(found))
+    slope = np.array([b, -a]) / (a + b) ** 2 if a + b else np.full(2, math.inf)
     unsure = _SURE * math.sqrt(float(slope @ covariance @ slope))
-    return math.nan if unsure > 0.5 * _NOT_THERE else float(share)
+    return float(a / (a + b)) if unsure < 0.5 * _NOT_THERE else math.nan
+
+
+def _apart(X: Floats) -> bool:
+    """Whether neither of the first two columns follows from the others, which are not all zero."""
+    for i in range(2):
+        others = np.delete(X, i, axis=1)
+        left = X[:, i] - others @ np.linalg.lstsq(others, X[:, i], rcond=None)[0]
+        if not left @ left > _OWN * (X[:, i] @ X[:, i]):
+            return False
+    return np.linalg.matrix_rank(X) == X.shape[1]

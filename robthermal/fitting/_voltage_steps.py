@@ -1,7 +1,8 @@
 """Voltages that were read while the current of their module changed: they belong to neither of two currents.
 
 After a step the current is held, and what a model has wrong goes on smoothly from row to row; the reading of the row
-of the step stands apart where the voltmeter averages over it, or the channels of a logger are read one by one.
+of the step stands apart where the voltmeter averages over it, or the channels of a logger are read one by one. A part of
+the module that follows within a row, and is not in the model, does the same; the model cannot use that reading either.
 """
 
 from __future__ import annotations
@@ -63,9 +64,9 @@ def between_currents(system: System, one: Data, r: Array, noise: Array) -> Mask:
     steps = steps_of_current(system, one)
     held = steps[:-2] & ~steps[1:-1] & ~steps[2:]
     first, second = r[:-2] - r[1:-1], r[1:-1] - r[2:]
-    bends = np.abs(first - second)
+    bends, own = np.abs(first - second), np.abs(np.diff(one.readings - r, 2, axis=0))
     usual = np.maximum(np.sqrt(6.0) * noise, _NORMAL * np.median(bends, axis=0)) if len(bends) else noise
-    apart = bends > _FAR * usual + _FASTER * np.abs(second)
+    apart = bends > _FAR * usual + _FASTER * np.abs(second) + own
     found = np.concatenate([held & apart, np.zeros((min(2, len(r)), r.shape[1]), bool)])
     mostly = found.sum(axis=0) > _MOSTLY * np.maximum(held.sum(axis=0), 1)
     return np.where(mostly, steps, found)  # the others are of small steps, or soon followed by another one
@@ -109,5 +110,5 @@ def read_while_changing(system: System, data: Sequence[Data]) -> list[str]:
         if one.missing is not None:
             for name, n in zip(one.sensors, (one.missing & steps_of_current(system, one)).sum(axis=0), strict=True):
                 rows[name] += int(n)
-    return [f"{name} was read while the current of {system.sensors[name].module} changed, in {n} "
-            f"row{'s' * (n > 1)}: left out." for name, n in rows.items() if n]
+    return [f"{name} stands apart in {n} row{'s' * (n > 1)} in which the current of {system.sensors[name].module} "
+            "changes, as if read meanwhile: left out." for name, n in rows.items() if n]
