@@ -1,8 +1,8 @@
 """Voltages that were read while the current of their module changed: they belong to neither of two currents.
 
 After a step the current is held, and what a model has wrong goes on smoothly from row to row; the reading of the row
-of the step stands apart where the voltmeter averages over it, or the channels of a logger are read one by one. A part of
-the module that follows within a row, and is not in the model, does the same; the model cannot use that reading either.
+of the step stands apart where the voltmeter averages over it, or the channels of a logger are read one by one. A part
+of the module that follows within a row, and is not in the model, does the same; the model cannot use that reading.
 """
 
 from __future__ import annotations
