@@ -23,19 +23,23 @@ from ..fitting import (
     Weigh,
     as_data,
     chosen_ranges,
+    counted,
     declared_noise,
     estimated_noise,
     free_run,
     initial_of,
     measured_of,
     measured_response,
+    refuse_misread,
     refuse_same,
     refuse_short,
+    rmse,
     scaled,
     scipy_loss,
     smallest_noise,
     without_steps,
 )
+from ..signals import Record
 from ..thermal import System
 from ._directions import in_words, named, weights
 from ._estimates import outcome_of
@@ -158,6 +162,14 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     if filtered:
         refuse_unknown_noise(levels)
     solution = _from_rest(problem, lambda one: _solve(one, levels, loss, max_iterations, filtered))
+    if training and not responses:
+        def fitted(others: list[Record]) -> float:
+            data = as_data(system, others, "data")
+            starts = [initial_of(system, one, initial) for one in data]
+            again = JointProblem(Problem(system, data, ranges, starts), ())
+            return _rms(_from_rest(again, lambda one: _solve(one, levels, loss, max_iterations, filtered)))
+
+        refuse_misread(system, training, _rms(solution), levels, "data", fitted)
     return _result(solution, held_out, compared, initial, loss)
 
 
@@ -270,6 +282,13 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         outcome=CalibrationCode.CONVERGED.outcome(), remarks=tuple(remarks_of(joint, v)),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
+
+
+def _rms(solution: Solution) -> float:
+    """Of the free-run residual of all records, thermometers [K]; voltages where there are none [V]."""
+    records = solution.problem.records
+    return rmse(r[:, counted(records.system, one.sensors, solution.noise)]
+                for one, r in zip(records.data, records.residuals(solution.v), strict=True))
 
 
 def _by_sensor(one: Data, values: Floats) -> dict[str, Floats]:

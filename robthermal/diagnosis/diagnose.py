@@ -9,7 +9,7 @@ from functools import partial
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
-from ..fitting import Choice, measured_of
+from ..fitting import Choice, measured_of, refuse_misread
 from ..thermal import System
 from ._alone import predicting_best
 from ._augment import augmented
@@ -155,7 +155,11 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("refitting the nominal system")
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
-    refuse_constant(nominal.system, [path.one for path in nominal.records])
+    data = [path.one for path in nominal.records]
+    refuse_constant(nominal.system, data)
+    if len(data) == len(nominal.structure.data):
+        refuse_misread(system, data, nominal.rms, floor.noise, "records", lambda others: refit(
+            system, others, floor, parameters=parameters, session_gain=session_gain).rms)
     judged = _judged(nominal, names, checked, progress)
     if too_warm(nominal) and _asks_for_a_warm_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")

@@ -4,38 +4,11 @@ import re
 
 import numpy as np
 import pytest
-from voltage_rig import FILE, TRUE, log, system, voltage
+from voltage_rig import FILE, FIT, TRUE, H, currents, log, logged, machine, system
 
 import robthermal as rt
 
-H = 4.0
-FIT = {"modules.m1.seebeck.value": {"lower": 0.03, "upper": 0.08},
-       "modules.m1.resistance.value": {"lower": 1.0, "upper": 4.0},
-       "modules.m1.conductance.value": {"lower": 0.1, "upper": 1.5}}
-
-
 SAID = "V1 stands apart in 20 rows in which the current of m1 changes, as if read meanwhile: left out."
-
-
-def currents(seed: int) -> np.ndarray:
-    return np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.8, 20), 10)
-
-
-def machine(read: str = "after", **numbers: float) -> rt.System:
-    """The rig, whose file knows its slopes, with a program that reads after or before it sets the current."""
-    made = rt.thermal.parse_system(FILE.replace('quantity = "voltage"', f'quantity = "voltage"\nread = "{read}"'))
-    return rt.System(**{**dict(made.with_parameters(numbers)), "fit": FIT})
-
-
-def logged(seed: int, share: float, p: dict[str, float] = TRUE) -> rt.Record:
-    """A log in which `share` of the voltage is still that at the current of the row before, at rest at the start."""
-    current = currents(seed)
-    readings, faces = log(current, H, p)
-    before = np.concatenate([[0.0], current[:-1]])
-    V = (1.0 - share) * readings[:, 1] + share * voltage(faces[:, 0], faces[:, 1], before, p)
-    noise = np.random.default_rng(100 + seed).standard_normal((len(current), 2)) * [0.02, 0.002]
-    return rt.Record(sample_time=H, inputs=current, outputs=np.column_stack([readings[:, 0], V]) + noise,
-                     input_names=["m1"], output_names=["T_cold", "V1"])
 
 
 def test_a_voltage_read_before_is_that_of_the_rig() -> None:

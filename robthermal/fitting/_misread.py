@@ -1,0 +1,152 @@
+"""Records with an input of the wrong sign, or with two columns exchanged: caught by name.
+
+Whatever is fitted to such a record is wrong, and effects that are not there may come nearest. The model of the system
+file, unfitted, leaves less of the record read otherwise, and fitted far less. Of a record that is read right it leaves
+less than of any other reading, so that nothing more is fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from .._arrays import Floats
+from ..errors import Diverged, InputError
+from ..signals import Record
+from ..thermal import System
+from ._data import Data
+from ._problem import Problem
+from ._ranges import NONE
+from ._start import initial_of
+
+_LESS = 0.2  # of the mean square that the fit leaves: what only a wrong sign or a wrong column explains
+_FITTED = 3  # of the readings that are better than the record as it is
+_NOISE = 9.0  # times the mean square of the noise: records that leave less are not asked
+_MOST = 60  # ways to read a record that are tried
+_PART = 2000  # samples of every record that they are tried on
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A record read otherwise: what would be wrong with it, what to do, and how the record becomes the other one."""
+
+    wrong: str
+    remedy: str
+    read: Callable[[Record], Record]
+
+
+def refuse_misread(system: System, data: Sequence[Data], left: float, noise: Mapping[str, float], where: str,
+                   fitted: Callable[[list[Record]], float]) -> None:
+    """Refuse records that the model explains far better with a sign turned or with two columns exchanged.
+
+    Parameters
+    ----------
+    system : System
+        As the file describes it, before any fit.
+    data : sequence of Data
+        Records that were fitted.
+    left : float
+        Rms of the free-run residual of the fit, all thermometers [K].
+    noise : mapping
+        Standard deviation of the sensors [K or V]; 0 where it is unknown.
+    where : str
+        Argument that the records were given as.
+    fitted : callable
+        Fits the system to other records in the same way, and returns what `left` is of them [K].
+
+    Raises
+    ------
+    InputError
+        With the inputs or sensors by name, and what to do.
+    """
+    warm = [name for name in system.thermometers if any(name in one.sensors for one in data)]
+    if not warm or left**2 <= _NOISE * float(np.mean([noise.get(name, 0.0) ** 2 for name in warm])):
+        return
+    readings = list(_readings(system, data, warm))[:_MOST]
+    as_it_is = _mean_square(system, data, lambda record: record)
+    squares = [_mean_square(system, data, one.read) for one in readings]
+    better = sorted((square, i) for i, square in enumerate(squares) if square < as_it_is)[:_FITTED]
+    rms = {i: _or_infinite(fitted, [readings[i].read(one.record) for one in data]) for _, i in better}
+    least = min(rms.values(), default=np.inf)
+    if least**2 >= _LESS * left**2:
+        return
+    found = [readings[i] for i in rms if rms[i] ** 2 <= 2.0 * least**2]
+    raise InputError(
+        f"{' or '.join(one.wrong for one in found)}: so read, the fit leaves {least:.2g} K of the records instead of "
+        f"{left:.2g} K", where=f"argument {where}", expected="columns and signs as in the system",
+        remedy=" Or: ".join(one.remedy for one in found))
+
+
+def _or_infinite(fitted: Callable[[list[Record]], float], records: list[Record]) -> float:
+    try:
+        return fitted(records)
+    except (Diverged, InputError):
+        return float("inf")
+
+
+def _readings(system: System, data: Sequence[Data], warm: Sequence[str]) -> Iterator[_Reading]:
+    """Every input with the other sign, every two heaters, modules or thermometers exchanged."""
+    driven = [name for name in (*system.inputs, *system.modules) if all(name in one.record.input_names for one in data)]
+    for name in driven:
+        if name in system.inputs:
+            yield _Reading(f"the heat of {name!r} seems to have the other sign", "Give it scale = -1 in [columns].",
+                           _turned(name, ()))
+            continue
+        volts = [sensor for sensor, own in system.sensors.items() if own.module == name]
+        read = [sensor for sensor in volts if any(sensor in one.sensors for one in data)]
+        yield _Reading(f"the current of {name!r}{' and its voltage seem' if read else ' seems'} to have the other sign",
+                       f"Give {' and '.join([name, *read])} scale = -1 in [columns], or exchange hot and cold in "
+                       f"[modules.{name}].", _turned(name, volts))
+    for group, kind in ((list(system.inputs), "heaters"), (list(system.modules), "modules"), (warm, "thermometers")):
+        known = [name for name in group if name in driven or name in warm]
+        for one, other in combinations(known, 2):
+            yield _Reading(f"the columns of the {kind} {one!r} and {other!r} seem to be exchanged",
+                           f"Exchange {one} and {other} in [columns].", _exchanged(one, other))
+
+
+def _turned(name: str, outputs: Sequence[str]) -> Callable[[Record], Record]:
+    def read(record: Record) -> Record:
+        signs = np.array([-1.0 if one == name else 1.0 for one in record.input_names])
+        out = np.array([-1.0 if one in outputs else 1.0 for one in record.output_names])
+        return _with_inputs(record, record.inputs * signs).with_outputs(record.outputs * out)
+
+    return read
+
+
+def _exchanged(one: str, other: str) -> Callable[[Record], Record]:
+    def read(record: Record) -> Record:
+        for names, values, changed in ((record.input_names, record.inputs, _with_inputs),
+                                       (record.output_names, record.outputs, Record.with_outputs)):
+            if one in names and other in names:
+                order = list(range(len(names)))
+                a, b = names.index(one), names.index(other)
+                order[a], order[b] = b, a
+                return changed(record, np.array(values, float)[:, order])
+        return record
+
+    return read
+
+
+def _with_inputs(record: Record, inputs: Floats) -> Record:
+    return record.changed(inputs=inputs, ripple=record.ripple)
+
+
+def _mean_square(system: System, data: Sequence[Data], read: Callable[[Record], Record]) -> float:
+    """Mean square of what the unfitted model leaves of all thermometers [K²]; infinite where it runs away."""
+    squares = []
+    for one in data:
+        record = read(one.record[:_PART])
+        columns = [record.output_names.index(name) for name in one.sensors]
+        missing = None if one.missing is None else one.missing[:_PART]
+        other = replace(one, record=record, readings=np.array(record.outputs, float)[:, columns], missing=missing)
+        try:
+            start = initial_of(system, other, "measured")
+            problem = Problem(system, [other], NONE, [start])
+            r = problem.residuals(problem.v0)[0]
+        except (Diverged, InputError):
+            return np.inf
+        squares.append(np.ravel(r[:, [i for i, name in enumerate(one.sensors) if name in system.thermometers]]) ** 2)
+    return float(np.mean(np.concatenate(squares)))

@@ -1,0 +1,132 @@
+"""Logs with a sign turned or two columns exchanged, of a board in plain numpy: refused by name, and no others."""
+
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from voltage_rig import logged, machine
+
+import robthermal as rt
+from robthermal.fitting import refuse_misread
+
+FILE = """
+[system]
+name = "board"
+temperature_unit = "degC"
+[ambients.room]
+temperature = 22.0
+[lumps.a]
+capacity = 9.0
+[lumps.b]
+capacity = 16.0
+[lumps.c]
+capacity = 30.0
+[[links]]
+between = ["a", "room"]
+conductance = 0.06
+[[links]]
+between = ["b", "room"]
+conductance = 0.03
+[[links]]
+between = ["c", "room"]
+conductance = 0.1
+[[links]]
+between = ["a", "c"]
+conductance = 0.12
+[[links]]
+between = ["b", "c"]
+conductance = 0.2
+[inputs.qa]
+lump = "a"
+[inputs.qb]
+lump = "b"
+[sensors.Ta]
+lump = "a"
+noise = 0.05
+[sensors.Tb]
+lump = "b"
+noise = 0.05
+[fit]
+"links.a-room.conductance" = { lower = 0.01, upper = 0.5 }
+"links.b-room.conductance" = { lower = 0.01, upper = 0.5 }
+"links.c-room.conductance" = { lower = 0.01, upper = 0.5 }
+"lumps.a.capacity" = { lower = 2.0, upper = 50.0 }
+"lumps.b.capacity" = { lower = 2.0, upper = 50.0 }
+"""
+BOARD = rt.thermal.parse_system(FILE)
+
+
+def board(seed: int, between: float = 0.0) -> rt.Record:
+    """Euler steps of a quarter of a second; conductances 20 % off the file, and a path from a to b [W/K]."""
+    rng = np.random.default_rng(seed)
+    q = np.column_stack([np.repeat(rng.uniform(0.0, 4.0, 20), 15), np.repeat(rng.uniform(0.0, 6.0, 30), 10)])
+    T, out = np.full(3, 295.15), []
+    for row in q:
+        out.append(T[:2].copy())
+        for _ in range(16):
+            path, left = between * (T[0] - T[1]), T - 295.15
+            heat = [row[0] - 0.075 * left[0] - 0.12 * (T[0] - T[2]) - path,
+                    row[1] - 0.024 * left[1] - 0.2 * (T[1] - T[2]) + path,
+                    0.12 * (T[0] - T[2]) + 0.2 * (T[1] - T[2]) - 0.12 * left[2]]
+            T = T + 0.25 * np.array(heat) / [8.0, 18.0, 30.0]
+    readings = np.array(out) + 0.05 * rng.standard_normal((len(q), 2))
+    return rt.Record(sample_time=4.0, inputs=q, outputs=readings, input_names=["qa", "qb"], output_names=["Ta", "Tb"])
+
+
+def read(record: rt.Record, inputs: np.ndarray, outputs: np.ndarray | None = None) -> rt.Record:
+    return record.changed(inputs=inputs, outputs=record.outputs if outputs is None else outputs)
+
+
+@pytest.mark.parametrize("asked", [rt.calibrate, rt.diagnose])
+@pytest.mark.parametrize(("misread", "said"), [
+    (lambda one: read(one, one.inputs * [-1.0, 1.0]), "the heat of 'qa' seems to have the other sign"),
+    (lambda one: read(one, one.inputs[:, ::-1]), "the columns of the heaters 'qa' and 'qb' seem to be exchanged"),
+    (lambda one: read(one, one.inputs, one.outputs[:, ::-1]), "the thermometers 'Ta' and 'Tb' seem to be exchanged")])
+def test_a_wrong_column_is_refused_by_name(asked: Callable[..., object], misread: Callable[[rt.Record], rt.Record],
+                                           said: str) -> None:
+    with pytest.raises(rt.InputError) as caught:
+        asked(BOARD, [misread(board(1)), misread(board(2))])
+    message = str(caught.value)
+    assert said in message and re.search(r"so read, the fit leaves 0\.0[45]\d* K of the records instead of [1-9]", message)
+    assert "Expected columns and signs as in the system" in message and "in [columns]" in message
+
+
+@pytest.mark.parametrize("asked", [rt.calibrate, rt.diagnose])
+@pytest.mark.parametrize(("current", "voltage", "said"), [
+    (-1.0, 1.0, "the voltage 'V1' falls where the current 'm1' rises"),
+    (1.0, -1.0, "the voltage 'V1' falls where the current 'm1' rises"),
+    (-1.0, -1.0, "the current of 'm1' and its voltage seem to have the other sign")])
+def test_a_current_or_voltage_of_the_other_sign(asked: Callable[..., object], current: float, voltage: float,
+                                                said: str) -> None:
+    """A current of the other sign had been called a current that saturates (`input_saturation`)."""
+    record = logged(1, 0.0)
+    with pytest.raises(rt.InputError, match=said) as caught:
+        asked(machine(), read(record, current * record.inputs, record.outputs * [1.0, voltage]))
+    assert "scale = -1" in str(caught.value)
+
+
+def test_without_its_voltage_too() -> None:
+    record = logged(1, 0.0)
+    alone = record.changed(inputs=-record.inputs, outputs=record.outputs[:, :1], output_names=["T_cold"], units={})
+    with pytest.raises(rt.InputError, match="the current of 'm1' seems to have the other sign.*exchange hot and cold"):
+        rt.calibrate(machine(), alone)
+    turned = machine()
+    module = rt.thermal.Module(**{**turned.modules["m1"].model_dump(exclude_unset=True), "hot": "cold", "cold": "hot"})
+    exchanged = rt.System(**{**dict(turned), "modules": {"m1": module}})
+    fit = rt.calibrate(exchanged, alone, parameters=["modules.m1.conductance.value"])  # as the message says
+    assert fit.parameters["modules.m1.conductance.value"] == pytest.approx(0.45, rel=0.01)
+
+
+@pytest.mark.parametrize("between", [0.0, 0.3])
+def test_nothing_more_is_fitted_to_a_right_log(between: float) -> None:
+    """Neither where the file is right, nor where a path is missing that leaves eighteen times the noise."""
+    records = [board(1, between), board(2, between)]
+    found = rt.diagnose(BOARD, records[0], validation=records[1], effects=["missing_link", "input_lag"])
+    assert found.verdict == ("named" if between else "consistent")
+    assert found.gap["train"].before > 0.8 or not between
+
+    def fitted(_: list[rt.Record]) -> float:
+        raise AssertionError("a reading was fitted")
+
+    refuse_misread(BOARD, rt.fitting.as_data(BOARD, records, "data"), 3.5, {"Ta": 0.05, "Tb": 0.05}, "data", fitted)
