@@ -30,7 +30,7 @@ from ..fitting import (
     initial_of,
     measured_of,
     measured_response,
-    refuse_misread,
+    misread,
     refuse_same,
     refuse_short,
     rmse,
@@ -162,6 +162,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     if filtered:
         refuse_unknown_noise(levels)
     solution = _from_rest(problem, lambda one: _solve(one, levels, loss, max_iterations, filtered))
+    said = ""
     if training and not responses:
         def fitted(others: list[Record]) -> float:
             data = as_data(system, others, "data")
@@ -169,8 +170,8 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
             again = JointProblem(Problem(system, data, ranges, starts), ())
             return _rms(_from_rest(again, lambda one: _solve(one, levels, loss, max_iterations, filtered)))
 
-        refuse_misread(system, training, _rms(solution), levels, "data", fitted)
-    return _result(solution, held_out, compared, initial, loss)
+        said = misread(system, training, _rms(solution), levels, fitted)
+    return _result(solution, held_out, compared, initial, loss, said)
 
 
 @dataclass(frozen=True)
@@ -244,8 +245,8 @@ def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict
             for name in unknown}
 
 
-def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredResponse], initial: Start, loss: Loss
-            ) -> Fit:
+def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredResponse], initial: Start, loss: Loss,
+            said: str) -> Fit:
     joint, v = solution.problem, solution.v
     problem, ranges = joint.records, joint.ranges
     values = problem.parameters(v)
@@ -279,7 +280,7 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         responses=tuple(comparison_of(system, part.one) for part in joint.responses),
         validation_responses=tuple(comparison_of(system, one) for one in compared),
         iterations=solution.iterations,
-        outcome=CalibrationCode.CONVERGED.outcome(), remarks=tuple(remarks_of(joint, v)),
+        outcome=CalibrationCode.CONVERGED.outcome(), remarks=(*filter(None, [said]), *remarks_of(joint, v)),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 

@@ -9,7 +9,7 @@ from functools import partial
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError
-from ..fitting import Choice, measured_of, refuse_misread
+from ..fitting import Choice, measured_of
 from ..thermal import System
 from ._alone import predicting_best
 from ._augment import augmented
@@ -43,6 +43,7 @@ from ._refine import refine as refined
 from ._searching import searched
 from ._visible_words import visible_in_words
 from ._with_names import ranged
+from ._wrong_columns import asked_of_columns
 from .change import NAME, relative
 from .data import Measured, as_measured, noise_floor, refuse_constant, refuse_long
 from .diagnosis import Diagnosis
@@ -155,11 +156,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     progress("refitting the nominal system")
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
-    data = [path.one for path in nominal.records]
-    refuse_constant(nominal.system, data)
-    if len(data) == len(nominal.structure.data):
-        refuse_misread(system, data, nominal.rms, floor.noise, "records", lambda others: refit(
-            system, others, floor, parameters=parameters, session_gain=session_gain).rms)
+    refuse_constant(nominal.system, [path.one for path in nominal.records])
     judged = _judged(nominal, names, checked, progress)
     if too_warm(nominal) and _asks_for_a_warm_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")
@@ -167,6 +164,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     held = only_heated if judged.state.nominal.structure.only_heated else replace
     judged = asked_of_log(judged, lambda others: held(refit(system, others, floor, parameters=parameters,
                                                             session_gain=session_gain, near=nominal)), checked)
+    judged = asked_of_columns(judged, system, floor.noise, lambda others: refit(
+        system, others, floor, parameters=parameters, session_gain=session_gain))
     progress("locating the misfit and planning the next experiment")
     found, fitted_to, held_out = concluded(judged), records, validation
     every, responses = measured_of(records, "records")

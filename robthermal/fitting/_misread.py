@@ -1,8 +1,9 @@
-"""Records with an input of the wrong sign, or with two columns exchanged: caught by name.
+"""Records with an input of the wrong sign, or with two columns exchanged: said by name.
 
 Whatever is fitted to such a record is wrong, and effects that are not there may come nearest. The model of the system
 file, unfitted, leaves less of the record read otherwise, and fitted far less. Of a record that is read right it leaves
-less than of any other reading, so that nothing more is fitted.
+less than of any other reading, as a rule, so that nothing more is fitted. A missing effect between two thermometers
+that are nearly as warm may look like that too: what is found is no refusal.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ class _Reading:
     read: Callable[[Record], Record]
 
 
-def refuse_misread(system: System, data: Sequence[Data], left: float, noise: Mapping[str, float], where: str,
-                   fitted: Callable[[list[Record]], float]) -> None:
-    """Refuse records that the model explains far better with a sign turned or with two columns exchanged.
+def misread(system: System, data: Sequence[Data], left: float, noise: Mapping[str, float],
+            fitted: Callable[[list[Record]], float]) -> str:
+    """What the records seem to have wrong, and what to do: a sign turned, two columns exchanged; empty if neither.
 
     Parameters
     ----------
@@ -49,22 +50,15 @@ def refuse_misread(system: System, data: Sequence[Data], left: float, noise: Map
     data : sequence of Data
         Records that were fitted.
     left : float
-        Rms of the free-run residual of the fit, all thermometers [K].
+        Rms of the free-run residual of the fit, or of the best answer, all thermometers [K].
     noise : mapping
         Standard deviation of the sensors [K or V]; 0 where it is unknown.
-    where : str
-        Argument that the records were given as.
     fitted : callable
         Fits the system to other records in the same way, and returns what `left` is of them [K].
-
-    Raises
-    ------
-    InputError
-        With the inputs or sensors by name, and what to do.
     """
     warm = [name for name in system.thermometers if any(name in one.sensors for one in data)]
     if not warm or left**2 <= _NOISE * float(np.mean([noise.get(name, 0.0) ** 2 for name in warm])):
-        return
+        return ""
     readings = list(_readings(system, data, warm))[:_MOST]
     as_it_is = _mean_square(system, data, lambda record: record)
     squares = [_mean_square(system, data, one.read) for one in readings]
@@ -72,12 +66,12 @@ def refuse_misread(system: System, data: Sequence[Data], left: float, noise: Map
     rms = {i: _or_infinite(fitted, [readings[i].read(one.record) for one in data]) for _, i in better}
     least = min(rms.values(), default=np.inf)
     if least**2 >= _LESS * left**2:
-        return
+        return ""
     found = [readings[i] for i in rms if rms[i] ** 2 <= 2.0 * least**2]
-    raise InputError(
-        f"{' or '.join(one.wrong for one in found)}: so read, the fit leaves {least:.2g} K of the records instead of "
-        f"{left:.2g} K", where=f"argument {where}", expected="columns and signs as in the system",
-        remedy=" Or: ".join(one.remedy for one in found))
+    wrong = " or ".join(one.wrong for one in found)
+    return (f"{wrong[0].upper()}{wrong[1:]}: so read, the fit leaves {least:.2g} K of the records instead of "
+            f"{left:.2g} K. Look at the wiring and at the program; if it is so: "
+            f"{' Or '.join(dict.fromkeys(one.remedy for one in found))}")
 
 
 def _or_infinite(fitted: Callable[[list[Record]], float], records: list[Record]) -> float:
@@ -92,19 +86,19 @@ def _readings(system: System, data: Sequence[Data], warm: Sequence[str]) -> Iter
     driven = [name for name in (*system.inputs, *system.modules) if all(name in one.record.input_names for one in data)]
     for name in driven:
         if name in system.inputs:
-            yield _Reading(f"the heat of {name!r} seems to have the other sign", "Give it scale = -1 in [columns].",
+            yield _Reading(f"the heat of {name!r} seems to have the other sign", "give it scale = -1 in [columns].",
                            _turned(name, ()))
             continue
         volts = [sensor for sensor, own in system.sensors.items() if own.module == name]
         read = [sensor for sensor in volts if any(sensor in one.sensors for one in data)]
         yield _Reading(f"the current of {name!r}{' and its voltage seem' if read else ' seems'} to have the other sign",
-                       f"Give {' and '.join([name, *read])} scale = -1 in [columns], or exchange hot and cold in "
+                       f"give {' and '.join([name, *read])} scale = -1 in [columns], or exchange hot and cold in "
                        f"[modules.{name}].", _turned(name, volts))
     for group, kind in ((list(system.inputs), "heaters"), (list(system.modules), "modules"), (warm, "thermometers")):
         known = [name for name in group if name in driven or name in warm]
         for one, other in combinations(known, 2):
             yield _Reading(f"the columns of the {kind} {one!r} and {other!r} seem to be exchanged",
-                           f"Exchange {one} and {other} in [columns].", _exchanged(one, other))
+                           f"exchange {one} and {other} in [columns].", _exchanged(one, other))
 
 
 def _turned(name: str, outputs: Sequence[str]) -> Callable[[Record], Record]:
