@@ -284,8 +284,9 @@ def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
     """All that is to be said of an answer."""
     rooms = [] if found.verdict == "unexplained" else ambients_in_words(found.ambients, found.nominal.system)
     left_over = map(str, filter(None, (found.remainder, found.resolving)))
-    return " ".join(filter(None, [found.outcome.text, found.nearest, *found.nominal.floor.remarks, *rooms, *left_over,
-                                  *found.fit.contradictions, *caveats]))
+    others = [one for one in caveats if one != found.means]  # what is wrong with the log comes first
+    return " ".join(filter(None, [found.outcome.text, found.means, found.nearest, *found.nominal.floor.remarks, *rooms,
+                                  *left_over, *found.fit.contradictions, *others]))
 
 
 def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:

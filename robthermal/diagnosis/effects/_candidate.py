@@ -38,6 +38,11 @@ class Candidate:
         return self.effect.name, self.where
 
     @property
+    def unknowns(self) -> tuple[str, Where, tuple[str, ...]]:
+        """What makes their numbers the same ones: an effect may have several forms, each with its own."""
+        return *self.key, tuple(quantity.name for quantity in self.effect.free)
+
+    @property
     def label(self) -> str:
         """For tables: ``sensor_lag(T6)``."""
         return f"{self.effect.name}({', '.join(self.where)})"

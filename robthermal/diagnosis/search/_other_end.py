@@ -66,10 +66,10 @@ def refitted_from(fit: Refit, candidate: Candidate, before: Refit, values: Mappi
     values : mapping
         Quantities of the candidate to start from.
     """
-    known = {one.key: value for own in (before, fit)  # the later fit need not have all effects of the earlier one
+    known = {one.unknowns: value for own in (before, fit)  # the later fit need not have all effects of the earlier one
              for one, value in zip(own.structure.effects, own.structure.quantities(own.v), strict=True)}
     structure = before.structure.with_effect(candidate)
-    at = [*(known[one.key] for one in before.structure.effects), {**candidate.shape, **values}]
+    at = [*(known[one.unknowns] for one in before.structure.effects), {**candidate.shape, **values}]
     return extended(before, structure, structure.carried(fit.structure, fit.v, at))
 
 

@@ -119,7 +119,7 @@ def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None)
     try:
         structure = nominal.structure.with_effects(others)
         starts = [structure.carried(fit.structure, fit.v, values[:place] + values[place + 1:])]
-        if before is not None and [c.key for c in before.structure.effects] == [c.key for c in others]:
+        if before is not None and [c.unknowns for c in before.structure.effects] == [c.unknowns for c in others]:
             starts.append(structure.carried(before.structure, before.v, before.structure.quantities(before.v)))
         problem = Whitened(structure, fit.whiteners)
         v = starts[0] if len(starts) == 1 else min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))
