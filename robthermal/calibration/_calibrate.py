@@ -170,7 +170,8 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
             again = JointProblem(Problem(system, data, ranges, starts), ())
             return _rms(_from_rest(again, lambda one: _solve(one, levels, loss, max_iterations, filtered)))
 
-        said = misread(system, training, _rms(solution), levels, fitted)
+        left = _rms(solution)
+        said = misread(system, training, left, left, levels, fitted)
     return _result(solution, held_out, compared, initial, loss, said)
 
 

@@ -37,7 +37,8 @@ def asked_of_columns(judged: Judged, system: System, noise: Mapping[str, float],
     nominal, found = judged.state.nominal, judged.plain or judged.state.fit
     if judged.verdict == "consistent" or not nominal.records or responses_of(nominal.structure.data):
         return judged
-    said = misread(system, [path.one for path in nominal.records], found.rms, noise, lambda one: refitted(one).rms)
+    said = misread(system, [path.one for path in nominal.records], nominal.rms, found.rms, noise,
+                   lambda one: refitted(one).rms)
     if not said:
         return judged
     text = f"{said} Then diagnose again."

@@ -23,7 +23,8 @@ from ._problem import Problem
 from ._ranges import NONE
 from ._start import initial_of
 
-_LESS = 0.2  # of the mean square that the fit leaves: what only a wrong sign or a wrong column explains
+_LESS = 0.3  # of the mean square that the answer leaves: what only a wrong sign or a wrong column explains
+_FAR_LESS = 0.05  # of the mean square that the fit without effects leaves, where these do not reach it either
 _FITTED = 3  # of the readings that are better than the record as it is
 _NOISE = 9.0  # times the mean square of the noise: records that leave less are not asked
 _MOST = 60  # ways to read a record that are tried
@@ -39,7 +40,7 @@ class _Reading:
     read: Callable[[Record], Record]
 
 
-def misread(system: System, data: Sequence[Data], left: float, noise: Mapping[str, float],
+def misread(system: System, data: Sequence[Data], before: float, left: float, noise: Mapping[str, float],
             fitted: Callable[[list[Record]], float]) -> str:
     """What the records seem to have wrong, and what to do: a sign turned, two columns exchanged; empty if neither.
 
@@ -49,8 +50,8 @@ def misread(system: System, data: Sequence[Data], left: float, noise: Mapping[st
         As the file describes it, before any fit.
     data : sequence of Data
         Records that were fitted.
-    left : float
-        Rms of the free-run residual of the fit, or of the best answer, all thermometers [K].
+    before, left : float
+        Rms of the free-run residual, all thermometers [K]: of the fit, and of the best answer with effects, if any.
     noise : mapping
         Standard deviation of the sensors [K or V]; 0 where it is unknown.
     fitted : callable
@@ -65,12 +66,13 @@ def misread(system: System, data: Sequence[Data], left: float, noise: Mapping[st
     better = sorted((square, i) for i, square in enumerate(squares) if square < as_it_is)[:_FITTED]
     rms = {i: _or_infinite(fitted, [readings[i].read(one.record) for one in data]) for _, i in better}
     least = min(rms.values(), default=np.inf)
-    if least**2 >= _LESS * left**2:
+    if least >= left or least**2 >= max(_LESS * left**2, _FAR_LESS * before**2):
         return ""
     found = [readings[i] for i in rms if rms[i] ** 2 <= 2.0 * least**2]
     wrong = " or ".join(one.wrong for one in found)
+    answer = f" ({left:.2g} K with effects)" if left < before else ""
     return (f"{wrong[0].upper()}{wrong[1:]}: so read, the fit leaves {least:.2g} K of the records instead of "
-            f"{left:.2g} K. Look at the wiring and at the program; if it is so: "
+            f"{before:.2g} K{answer}. Look at the wiring and at the program; if it is so: "
             f"{' Or '.join(dict.fromkeys(one.remedy for one in found))}")
 
 

@@ -145,4 +145,4 @@ def test_nothing_more_is_fitted_to_a_right_log(between: float) -> None:
         raise AssertionError("a reading was fitted")
 
     data = rt.fitting.as_data(BOARD, records, "data")
-    assert misread(BOARD, data, 3.5, {"Ta": 0.05, "Tb": 0.05}, fitted) == ""
+    assert misread(BOARD, data, 3.5, 3.5, {"Ta": 0.05, "Tb": 0.05}, fitted) == ""
