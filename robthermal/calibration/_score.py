@@ -31,7 +31,7 @@ class Score:
 
 def score_of(one: Data, residual: Floats) -> Score:
     """Score of residuals (n, n_sensors) [K or V]."""
-    by_sensor = {name: residual[:, i] for i, name in enumerate(one.sensors)}
+    by_sensor = {name: one.of_sensor(residual, i) for i, name in enumerate(one.sensors)}
     percent = {name: _percent(one.readings[:, i], residual[:, i]) for i, name in enumerate(one.sensors)}
     return Score(one.label, rmse_by_sensor([by_sensor]), percent)
 

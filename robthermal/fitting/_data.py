@@ -51,6 +51,18 @@ class Data:
             return values
         return np.where(self.missing.reshape(*self.missing.shape, *[1] * (values.ndim - 2)), 0.0, values)
 
+    def of_sensor(self, values: Floats, place: int) -> Floats:
+        """Values (m,) of one sensor, of the readings that count.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, n_sensors)
+            Of every reading of the record.
+        place : int
+            Place of the sensor in `sensors`.
+        """
+        return values[:, place] if self.missing is None else values[~self.missing[:, place], place]
+
     @property
     def label(self) -> str:
         """Name for tables."""

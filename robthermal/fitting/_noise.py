@@ -97,7 +97,8 @@ def floor(data: list[Data], name: str, smallest: float) -> float:
 
 def estimated_noise(data: list[Data], residuals: list[Floats], name: str, loss: Loss, smallest: float) -> float:
     """Noise of a sensor from its residuals [K or V]: root mean square, or its robust equivalent under a robust loss."""
-    own = [r[:, one.sensors.index(name)] for one, r in zip(data, residuals, strict=True) if name in one.sensors]
+    own = [one.of_sensor(r, one.sensors.index(name)) for one, r in zip(data, residuals, strict=True)
+           if name in one.sensors]
     e = np.concatenate(own)
     scale = math.sqrt(float(np.mean(e**2))) if loss == "linear" else 1.4826 * float(np.median(np.abs(e)))
     return max(scale, floor(data, name, smallest))

@@ -89,6 +89,18 @@ def test_where_voltages_are_read_after_nothing_is_left_out() -> None:
     assert "stands apart" not in str(found)
 
 
+def test_what_is_left_out_is_in_no_mean() -> None:
+    """Readings that count for nothing have no residual: counted as zeros they had made the noise 5 % too small."""
+    made = machine()
+    silent = {name: {**sensor.model_dump(exclude_unset=True), "noise": 0.0} for name, sensor in made.sensors.items()}
+    fit = rt.calibrate(rt.System(**{**dict(made), "sensors": silent}), logged(1, 0.5))
+    left = fit.residuals[0]["V1"]
+    assert np.count_nonzero(left == 0.0) == 20
+    of_the_others = np.sqrt(np.mean(left[left != 0.0] ** 2))
+    assert fit.train[0].rmse["V1"] == pytest.approx(of_the_others)
+    assert fit.noise["V1"] == pytest.approx(of_the_others, rel=1e-3)
+
+
 @pytest.mark.parametrize("h", [20.0, 60.0, 300.0])
 def test_a_module_that_follows_within_a_row_is_no_late_voltmeter(h: float) -> None:
     """Rows as long as the module takes, and a model that is wrong by half."""
