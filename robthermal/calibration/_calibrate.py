@@ -88,8 +88,9 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
         the unit of the parameter, temperatures in kelvin. A tuple of names as key ties them to one value,
         called "a = b" in the result. Default: the whole fit table.
     validation : Record, FrequencyResponse, or list of them, optional
-        Data the fit does not see. Free runs on records are scored, with initial temperatures from their first tenth; to
-        responses the misfit is given.
+        Data the fit does not see. Free runs on records are scored, with initial temperatures from their first tenth, or
+        from all of a record where a tenth leaves them open (a body without a thermometer); to responses the misfit is
+        given.
     initial : {"free", "measured", "system"}
         Initial lump temperatures: unknown, with a prior of max(5 K, spread of the first readings) around the nearest
         sensor's first reading; fixed to that reading; or fixed to the file's values, where it has them.

@@ -57,7 +57,8 @@ def _refuse_milliampere(name: str, column: Array, limits: tuple[float, float], w
             f"{bound:g} A: this looks like mA",
             where=where,
             expected="ampere",
-            remedy="Divide the column by 1000, or correct current_limits.",
+            remedy='Divide the column by 1000: [columns] with unit = "mA", or with a scale, whose scale · cell is in A '
+            "whatever the unit; or correct current_limits.",
         )
 
 

@@ -72,7 +72,7 @@ class HoldOut:
     Parameters
     ----------
     gap : Gap
-        Free runs; initial temperatures from the first tenth.
+        Free runs; initial temperatures from the first tenth, or all of the record where that leaves them open.
     variance_before, variance_after : float
         Whitened variance with the trained parameters; 1 if nothing is missing.
     p_value : float

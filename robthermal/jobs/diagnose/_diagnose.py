@@ -196,7 +196,7 @@ def _responses(found: Diagnosis) -> Iterator[ResponseResiduals]:
 
 
 def _validation(found: Diagnosis) -> Iterator[Residuals]:
-    """The free runs of the hold-out test: initial temperatures from the first tenth, the session's own gains."""
+    """The free runs of the hold-out test: initial temperatures and the session's gains of the record's own."""
     for one in () if found.hold_out is None else found.hold_out.residuals:
         yield from _by_unit(found, "validation", one.name, one.time, one.before, one.after)
 

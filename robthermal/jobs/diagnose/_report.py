@@ -212,8 +212,9 @@ def _gap_section(result: Diagnosed) -> Section:
               "after": rmse([one.after[name]]), "noise alone": float("nan"), "unit": one.unit}
              for one in result.residuals for name in one.before]
     text = ("Before: the nominal system, its parameters refitted. After: with the effects. Both models run free; on "
-            "the validation records only the initial temperatures were estimated, from the first tenth (and, where "
-            "records have gains of their own or lack an ambient, those, from the whole record).")
+            "the validation records only the initial temperatures were estimated, from the first tenth, or from the "
+            "whole record where that leaves them open (and, where records have gains of their own or lack an ambient, "
+            "those, from the whole record).")
     if not (found.effects or found.provisional):
         text = text.replace("After: with the effects. Both models run free",
                             "After: the same, for no effect was added. It runs free")

@@ -28,7 +28,7 @@ class Comparison:
     """One record beside the nominal and the calibrated model, both run freely as the calibration runs them.
 
     The calibrated model starts from the initial temperatures that the calibration found (training) or estimated on the
-    first tenth (validation); the nominal one from those estimated on the first tenth.
+    first tenth (validation; on all of the record where that leaves them open); the nominal one from such estimates.
 
     Parameters
     ----------

@@ -23,8 +23,9 @@ def comparison_section(comparisons: tuple[Comparison, ...], fit: Fit | None, ord
     table = pd.DataFrame(rows)
     text = ("Both models run free: they see only the currents, heaters and ambients. On training records the "
             "calibrated model starts from the initial temperatures of its fit; elsewhere they are estimated on the "
-            "first tenth of the record. The table gives the root mean square of the residual, measured − model, of "
-            "every sensor; for the calibrated model these are the numbers of the calibration itself.")
+            "first tenth of the record, or on all of it where that leaves them open. The table gives the root mean "
+            "square of the residual, measured − model, of every sensor; for the calibrated model these are the numbers "
+            "of the calibration itself.")
     if fit is not None:
         text += f"\n\n{fit.outcome.text}"
     figures = tuple(figure for c in comparisons if c is not shown for figure in _comparison_figures(c, order))

@@ -33,8 +33,10 @@ _NAMES = (
     "seconds",
     "millis",
     "milliseconds",
+    "micros",
+    "microseconds",
 )  # with a blank for every "/", "_", "-" and "&"
-_MILLISECONDS = ("millis", "milliseconds")  # headers that are their unit, as microcontrollers call their clock
+_COUNTERS = {"millis": "ms", "milliseconds": "ms", "micros": "us", "microseconds": "us"}  # their own unit
 _PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
 
 
@@ -130,8 +132,8 @@ def time_reader(source: Source, places: tuple[int, ...], options: ImportOptions)
         return date_reader(table, places, most, options)
     header = table.headers[places[0]]
     unit = table.units[places[0]] if table.units and table.units[places[0]].strip("-") else split_header(header)[1]
-    if unit is None and _plain(header) in _MILLISECONDS:
-        unit = "ms"
+    if unit is None:
+        unit = _COUNTERS.get(_plain(header))
     cells: Any = table.columns[places[0]]
     if cells.dtype.kind == "O" and unit is not None and unit_of(unit) is None:
         unit = None  # "Time [dd.mm.yyyy]" says how the text looks, which the text itself says
@@ -175,6 +177,6 @@ def _rises(cells: Any) -> bool:
 def _in_seconds(header: str) -> bool:
     unit = split_header(header)[1]
     bare = re.sub(r"[\W_]+", "", split_header(header)[0]).lower()
-    if unit is None and bare in _MILLISECONDS:
+    if unit is None and bare in _COUNTERS:
         return True
     return _timed(header) or (unit is None and bare in ("time", "t", "seconds", "elapsed", "elapsedtime", "zeit"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -306,11 +307,15 @@ def _no_header(
             for k in content[1 : _ROWS + 1]:
                 row = cells_of(lines[k], d)
                 if len(row) != len(names):
+                    named = [name for name in names if name]
+                    of_rows = len(named) == len(row)
                     return InputError(
                         f"the row has {len(row)} cells and the header has {len(names)}: {short(lines[k])}",
                         where=f"{where}, line {k + 1}",
                         expected="as many cells as the header",
-                        remedy="Repair or remove the line.",
+                        remedy=f"Write header = {json.dumps(named, ensure_ascii=False)}."
+                        if of_rows
+                        else "Repair or remove the line.",
                     )
     if options.delimiter is None and (blank := _blanks_between(lines, content, options)):
         return InputError(

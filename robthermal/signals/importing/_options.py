@@ -69,7 +69,7 @@ class ImportOptions(_Table):
     time : str or tuple of str, optional
         Header of the time column, or of date and time of day.
     time_format : str, optional
-        "iso", "s", "ms", "min", "h", "epoch_s", "epoch_ms", "excel", "elapsed", or a pattern such as
+        "iso", "s", "ms", "us", "min", "h", "epoch_s", "epoch_ms", "excel", "elapsed", or a pattern such as
         "%d.%m.%Y %H:%M:%S".
     timezone : str, optional
         Zone of stamps without one, for example "Europe/Berlin".
@@ -101,6 +101,9 @@ class ImportOptions(_Table):
         Rows with one time stamp and different values.
     restarts : {"refuse", "split"}
         Time that jumps back.
+    wraps_at : float, optional
+        Value at which a time column of numbers starts again from zero, in the unit of that column: 4294967296 for
+        a counter of 32 bits, such as the microseconds or milliseconds of a microcontroller.
     averaged : {"before", "after", "readings"}, optional
         Every value is the mean over the step before its stamp, or after it; or readings alone are, over the step
         before, and inputs hold from the stamp on. Default: values at the stamp.
@@ -132,6 +135,7 @@ class ImportOptions(_Table):
     clock: Literal["stamps", "rows"] | None = None
     duplicates: Literal["refuse", "first", "last", "mean"] = "refuse"
     restarts: Literal["refuse", "split"] = "refuse"
+    wraps_at: Positive | None = None
     averaged: Averaged | None = None
     means_of: Annotated[int, Field(ge=2)] | None = None
     input_shift: int = 0

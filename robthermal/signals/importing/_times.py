@@ -16,10 +16,11 @@ from ._options import ImportOptions
 from ._table import Action, Array, Block, Table
 from ._tokens import short
 from ._units import unit_of
+from ._wraps import counted_on
 from ._zones import from_days, since_first
 
 DAY = 86400.0
-NUMERIC = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+NUMERIC = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 CLOCK = re.compile(r"\d{1,5}:\d{2}(:\d{2}([.,]\d+)?)?")
 DURATION = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([a-zA-Z]+)")
 _EPOCHS = {"epoch_s": (1e9, 2e9), "epoch_ms": (1e12, 2e12)}
@@ -176,6 +177,7 @@ class Numbers(CellReader):
 
     def _finished(self, values: Array) -> Clock:
         declared = self._options.time_format
+        values = counted_on(self.table, self.header, values, self._options)
         if declared in NUMERIC:
             return Clock(values * NUMERIC[declared], None, declared)
         if declared == "excel":
@@ -194,7 +196,7 @@ class Numbers(CellReader):
             raise InputError(
                 f"holds numbers and time_format is {declared!r}",
                 where=f"{self.table.where}, column {self.header!r}",
-                expected='a format of numbers: "s", "ms", "min", "h", "epoch_s", "epoch_ms" or "excel"',
+                expected='a format of numbers: "s", "ms", "us", "min", "h", "epoch_s", "epoch_ms" or "excel"',
             )
         return Clock(values * factor if factor != 1.0 else values, None, name or "s")
 
@@ -207,7 +209,7 @@ def _unit_of_time(table: Table, header: str, unit: str | None) -> tuple[float, s
         raise InputError(
             f"the time column {header!r} is in {short(unit)}",
             where=table.where,
-            expected="s, ms, min or h",
+            expected="s, ms, us, min or h",
             remedy='Declare what it is, for example time_format = "ms".',
         )
     return found.factor, found.name
@@ -246,7 +248,7 @@ class TimesOfDay(CellReader):
 class Durations(CellReader):
     """``12 sec``: a number and a unit of time in every cell."""
 
-    expected = "a number and s, ms, min or h"
+    expected = "a number and s, ms, us, min or h"
 
     def _parsed(self, cells: Any) -> Any:
         parts = texts_of(cells).str.extract(r"^([+-]?\d+(?:[.,]\d+)?)\s*([a-zA-Z]+)$")

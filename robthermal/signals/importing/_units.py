@@ -45,6 +45,7 @@ def _known() -> dict[str, Unit]:
     table = {
         "s": ("time", 1.0, "s sec secs second seconds sek"),
         "ms": ("time", 1e-3, "ms msec millisecond milliseconds"),
+        "us": ("time", 1e-6, "us µs μs usec microsecond microseconds"),
         "min": ("time", 60.0, "min mins minute minutes"),
         "h": ("time", 3600.0, "h hr hrs hour hours"),
         "A": ("current", 1.0, "A amp amps ampere"),
