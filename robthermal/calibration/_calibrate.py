@@ -30,6 +30,7 @@ from ..fitting import (
     initial_of,
     measured_of,
     measured_response,
+    mended,
     misread,
     refuse_same,
     refuse_short,
@@ -143,6 +144,10 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     check_options(system, initial, loss, max_iterations, method)
     records, responses = measured_of(data, "data")
     beside, responses_beside = measured_of(validation, "validation") if validation is not None else ([], [])
+    rows = mended(system, records, beside, lambda held: calibrate(
+        system, [*held, *responses], parameters=parameters, initial=initial, loss=loss, noise=noise,
+        max_iterations=max_iterations, method=method, operating_point=operating_point).system)
+    records, beside = rows.records, rows.validation
     refuse_idle_options(bool(records), bool(responses or responses_beside), operating_point, initial, loss, noise,
                         method)
     ranges = chosen_ranges(system, parameters)
@@ -163,7 +168,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     if filtered:
         refuse_unknown_noise(levels)
     solution = _from_rest(problem, lambda one: _solve(one, levels, loss, max_iterations, filtered))
-    said = ""
+    said = " ".join([*rows.said, *rows.doubted])
     if training and not responses:
         def fitted(others: list[Record]) -> float:
             data = as_data(system, others, "data")
@@ -172,7 +177,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
             return _rms(_from_rest(again, lambda one: _solve(one, levels, loss, max_iterations, filtered)))
 
         left = _rms(solution)
-        said = misread(system, training, left, left, levels, fitted)
+        said = " ".join(filter(None, [said, misread(system, training, left, left, levels, fitted)]))
     return _result(solution, held_out, compared, initial, loss, said)
 
 

@@ -128,7 +128,7 @@ def lasting(state: SearchState, finer: Refit, validation: Validation) -> SearchS
         if instead is not None:
             rounds, fit = instead
             continue
-        less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before)
+        less = finer if len(rounds) == 1 else without(fit, worst, finer, rounds[worst].before, from_both=True)
         if less is None:
             return replace(state, nominal=finer, rounds=(), fit=finer)
         rounds, fit = rounds[:worst] + rounds[worst + 1:], less

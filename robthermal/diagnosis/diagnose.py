@@ -36,6 +36,7 @@ from ._graded import graded, lasting_beyond_steps
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
 from ._late_commands import late_by_rows
+from ._misread_inputs import MisreadRows
 from ._nearest import nearest
 from ._other_log import asked_of_log
 from ._own_names import in_own_names
@@ -139,10 +140,15 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     names = None if effects is None else tuple(effects)
     refuse_long(records, "records")
     checked = Validation(validation, operating_point)
-    if validation is not None:
-        refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
+    _refuse_training_data(system, records, validation)
     again = partial(diagnose, parameters=parameters, effects=names, noise=noise, progress=progress)
     _refuse_mixed(reference, augment=augment, refine=refine, operating_point=operating_point)
+    rows = MisreadRows(system, records, validation, reference, partial(
+        again, operating_point=operating_point, session_gain=session_gain, augment=augment, refine=refine))
+    without_rows = rows.left_out(lambda held: refit(system, held, noise_floor(system, held, noise=noise),
+                                                    parameters=parameters, session_gain=session_gain).system)
+    if without_rows is not None:
+        return without_rows
     if reference is not None:
         refuse_long(reference, "reference")
         healthy, _ = measured_of(reference, "reference")
@@ -179,7 +185,8 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
             alone=lambda: again(system, first, validation=others, session_gain=session_gain))
         if len(found.nominal.records) == 1:
             fitted_to, held_out = first, others
-    if not refine:
+    found = rows.left_out_beside(found)
+    if not refine or rows.replaced:
         return found
     progress("splitting the lump in which the remainder sits")
     return replace(found, refinement=refined(
@@ -188,6 +195,13 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                                            session_gain=session_gain),
         again=lambda split, chosen: again(split, fitted_to, validation=held_out, parameters=chosen,
                                           operating_point=operating_point, session_gain=session_gain)))
+
+
+def _refuse_training_data(system: System, records: Measured | Sequence[Measured],
+                          validation: Measured | Sequence[Measured] | None) -> None:
+    """Refuse validation on the data of the fit."""
+    if validation is not None:
+        refuse_seen(as_measured(system, records, "records"), as_measured(system, validation, "validation"))
 
 
 def _refuse_mixed(reference: Measured | Sequence[Measured] | None, *, augment: bool, refine: bool,

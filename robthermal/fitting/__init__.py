@@ -14,6 +14,8 @@ from ._measured import measured_of as measured_of
 from ._measured_response import MeasuredResponse as MeasuredResponse
 from ._measured_response import measured_response as measured_response
 from ._misread import misread as misread
+from ._misread_rows import Mended as Mended
+from ._misread_rows import mended as mended
 from ._noise import LOSSES as LOSSES
 from ._noise import Loss as Loss
 from ._noise import declared_noise as declared_noise

@@ -40,10 +40,10 @@ def with_neighbors(round_: Accepted) -> Accepted:
     own = next((one for one in candidates(before.structure.base, [best.candidate.effect.name])
                 if one.key == best.candidate.key), best.candidate)
     try:
-        short = refit_short_list(before, score_candidates(before, [own, *near]))
+        refitted = _refitted(before, own, near)
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
-    alike = _nearly_best(before, short.entries, best.candidate)
+    alike = _nearly_best(before, refitted, best.candidate)
     listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
     return replace(round_, contenders=(*round_.contenders, *alike),
                    ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
@@ -95,13 +95,27 @@ def faces_of(system: System) -> set[str]:
     return {face for module in system.modules.values() for face in (module.hot, module.cold)}
 
 
+def _refitted(before: Refit, best: Candidate, near: Sequence[Candidate]) -> list[Entry]:
+    """The path and the same at neighboring lumps, each refitted to its optimum."""
+    entries = [*refit_short_list(before, score_candidates(before, [best, *near])).entries]
+    kept = {entry.candidate.key for entry in entries}
+    for one in near:  # the short list ends the fits of those that cannot become the best, and may be nearly as good
+        if one.key not in kept:
+            entries += refit_short_list(before, score_candidates(before, [one])).entries
+    return entries
+
+
+def _beside_a_face(system: System, one: Candidate, best: Candidate) -> bool:
+    """Whether a path has another lump where the best one has the face of a module."""
+    return bool(faces_of(system) & (set(best.where) - set(one.where)))
+
+
 def _nearly_best(before: Refit, entries: Sequence[Entry], best: Candidate) -> list[Entry]:
     """Others that reach most of the decrease that the best of them reaches; beside a face, what would be needed."""
     most = before.rss - min((entry.fit.rss for entry in entries), default=before.rss)
-    faces = faces_of(before.structure.base)
 
     def least(entry: Entry) -> float:
-        return NEEDED if faces & (set(best.where) - set(entry.candidate.where)) else ALIKE
+        return NEEDED if _beside_a_face(before.structure.base, entry.candidate, best) else ALIKE
 
     return [entry for entry in entries if entry.candidate.key != best.key
             and before.rss - entry.fit.rss > least(entry) * most]

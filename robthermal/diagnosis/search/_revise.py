@@ -100,7 +100,8 @@ def _with_the_accepted(entries: tuple[Entry, ...], accepted: Entry, place: int, 
     return tuple(sorted([own, *others], key=lambda entry: -entry.delta_bic))
 
 
-def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None) -> Refit | None:
+def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None, *, from_both: bool = False
+            ) -> Refit | None:
     """The fit without one of its effects; None where another acts on a part that this one adds, or nothing survives.
 
     Parameters
@@ -113,6 +114,8 @@ def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None)
         Fit without any effect.
     before : Refit, optional
         From which the effect was chosen; if it had the other effects, its unknowns are a start, too.
+    from_both : bool
+        Fit from either start and keep the better fit, where it is an answer; else from the start that leaves less.
     """
     effects, values = fit.structure.effects, fit.structure.quantities(fit.v)
     others = effects[:place] + effects[place + 1:]
@@ -122,7 +125,9 @@ def without(fit: Refit, place: int, nominal: Refit, before: Refit | None = None)
         if before is not None and [c.unknowns for c in before.structure.effects] == [c.unknowns for c in others]:
             starts.append(structure.carried(before.structure, before.v, before.structure.quantities(before.v)))
         problem = Whitened(structure, fit.whiteners)
-        v = starts[0] if len(starts) == 1 else min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))
-        return relinearized(extended(fit, structure, v, _EVALUATIONS))
+        if not from_both and len(starts) > 1:
+            starts = [min(starts, key=lambda v: float(np.sum(problem.residual(v) ** 2)))]
+        fits = [extended(fit, structure, v, _EVALUATIONS) for v in starts]
+        return relinearized(min(fits, key=lambda one: one.rss))
     except (Diverged, InputError):
         return None
