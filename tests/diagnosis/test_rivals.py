@@ -23,12 +23,13 @@ from robthermal.diagnosis.diagnose import doubts, place_undecided
 from robthermal.diagnosis.effects import Candidate, candidates
 from robthermal.diagnosis.effects._ambient_drift import ambient_drift
 from robthermal.diagnosis.evidence import Twin, score_candidates, validation_data
-from robthermal.diagnosis.fit import Refit, coarsened
+from robthermal.diagnosis.fit import Refit, coarsened, extended
 from robthermal.diagnosis.search import (
     Accepted,
     _neighbors,
     _other_end,
     _places,
+    _revise,
     begin,
     decide,
     one_place,
@@ -301,6 +302,27 @@ def test_what_is_left_after_a_drop_is_chosen_again():
     assert set(again.rounds[0].best.candidate.where) in ({"x1", "x5"}, {"x2", "x5"})
     assert again.fit is again.rounds[0].best.fit
     assert before.rss - again.fit.rss > 3.0 * (before.rss - wrong.fit.rss) > 0.0
+
+
+@pytest.mark.exhaustive
+def test_what_is_left_after_a_drop_is_fitted_from_both_starts(monkeypatch):
+    """The start that leaves less may end in another valley: told here of the second one, which leaves less at first."""
+    one = found(16)
+    base, lag = one.best.fit, other_effect(one).candidate
+    structure = base.structure.with_effect(lag)
+    quantities = [*base.structure.quantities(base.v), {"time_constant": 5.0}]
+    both = extended(base, structure, structure.carried(base.structure, base.v, quantities), 1)
+    ends = iter([0.5, 2.0])
+    tried: list[float] = []
+
+    def ended(fit, structure, v, evaluations):
+        tried.append(next(ends))
+        return replace(base, z=tried[-1] * base.z)
+
+    monkeypatch.setattr(_revise, "extended", ended)
+    monkeypatch.setattr(_revise, "relinearized", lambda fit: fit)
+    less = _revise.without(both, 1, one.before, base, from_both=True)
+    assert tried == [0.5, 2.0] and less.rss == pytest.approx(0.25 * base.rss)
 
 
 @pytest.mark.parametrize(("lasting", "best", "rivals"), [
