@@ -160,3 +160,15 @@ def test_a_row_of_units_with_a_few_other_words(tmp_path: Path) -> None:
     record = rt.read_record(_write(tmp_path / "run.csv", head, rows), inputs=["I"], outputs=["T1"])
     _as_written(record)
     assert record.imported is not None and record.imported.header_line == 3
+
+
+def test_a_date_with_the_time_of_day_beside_another_time_column_is_asked_about(tmp_path: Path) -> None:
+    """Wall clock, its milliseconds and seconds since 1970, as a camera logs them; was a traceback of `re`."""
+    stamps = _stamps("%Y-%m-%d %H:%M:%S")
+    epoch = [1_366_405_131.115 + k for k in range(N)]
+    rows = [f"{stamp},115,{at:.6f},{T[k]:.3f}, 0.5" for k, (stamp, at) in enumerate(zip(stamps, epoch, strict=True))]
+    path = _write(tmp_path / "log.csv", ["date,ms,time,T1,I"], rows)
+    with pytest.raises(InputError, match='Write time = "date", or time = "time"'):
+        rt.read_record(path, **NAMES)
+    _as_written(rt.read_record(path, **NAMES, time="date"))
+    _as_written(rt.read_record(path, **NAMES, time="time"))

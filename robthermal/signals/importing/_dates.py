@@ -71,6 +71,14 @@ def stamp_reader(
 def date_reader(table: Table, places: tuple[int, ...], most: int, options: ImportOptions) -> TimeReader:
     """Reader of a date column and a column with the time of day."""
     date, time = (table.columns[k] for k in places)
+    if not isinstance(date, pd.DatetimeIndex) and ":" in (own := _first(texts_of(date), None)):
+        headers = [table.headers[k] for k in places]
+        raise InputError(
+            f"{headers[0]!r} holds times of day already ({short(own, 30)}), and {headers[1]!r} may be the time too",
+            where=table.where,
+            expected="one time column",
+            remedy=f'Write time = "{headers[0]}", or time = "{headers[1]}".',
+        )
     joined = _joined(date, time)
     return Dates(table, places, most, options, _first(joined, options.time_format))
 

@@ -76,7 +76,7 @@ def _directive(part: str, numbers: list[str]) -> str:
 def _reads(text: str, pattern: str) -> bool:
     try:
         return datetime.strptime(text, pattern).year > 1970
-    except ValueError:
+    except (ValueError, re.error):  # re.error: a directive twice, of a text with two dates
         return False
 
 
