@@ -60,7 +60,7 @@ def test_a_path_that_alone_predicts_is_named_although_a_finer_network_fits_the_t
 
 @pytest.mark.exhaustive
 def test_a_place_whose_fit_the_short_list_ended_is_listed_too():
-    """The cold face does more at once; refitted, the spreader, the true place, removes 98 % of what the face removes."""
+    """The cold face does more at once; refitted, the true place, the spreader, removes 98 % of what the face does."""
     one = stack("hidden", "missing_ambient_link", 34)
     found = diagnosed(one, validation=one.unseen)
     (name,), (others,) = found.effects, found.alternatives
