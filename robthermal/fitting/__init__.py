@@ -40,6 +40,8 @@ from ._response_whitening import ResponseWhitener as ResponseWhitener
 from ._response_whitening import as_complex as as_complex
 from ._response_whitening import as_real as as_real
 from ._sampled_response import sampled_response as sampled_response
+from ._start import COLDEST as COLDEST
+from ._start import HOTTEST as HOTTEST
 from ._start import STARTS as STARTS
 from ._start import Initial as Initial
 from ._start import Start as Start

@@ -118,7 +118,7 @@ def _asked(model: System, record: Record, lone: Rows) -> dict[Answer, dict[str, 
     one = as_data(model, record, "records")[0]
     try:
         run = free_run(model, one, "free", {name: sensor.noise for name, sensor in model.sensors.items()})
-    except Diverged:
+    except (Diverged, InputError):  # the diagnosis proper will say so
         return found
     at = model.with_parameters(start_values(initial_of(model, one, "free"), run.initial_temperatures))
     weights = 1.0 / np.array([_level(at.sensors[name].noise, r) for name, r in run.by_sensor.items()])

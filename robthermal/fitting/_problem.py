@@ -13,7 +13,7 @@ from ..errors import Diverged
 from ..thermal import System, trajectory
 from ._data import Data
 from ._ranges import Ranges
-from ._start import REACH, Initial, start_values
+from ._start import COLDEST, HOTTEST, REACH, Initial, start_values
 
 Weigh = Callable[[Floats], Floats]  # (n, n_sensors, ...) in kelvin to weighted, linear
 
@@ -68,7 +68,7 @@ class Problem:
     @property
     def bounds(self) -> tuple[Floats, Floats]:
         """Bounds of the unknowns."""
-        within = [start.within(-np.inf, np.inf, REACH) for start in self.starts]
+        within = [start.within(COLDEST, HOTTEST, REACH) for start in self.starts]
         q = self.ranges.coordinates
         return (np.concatenate([q(self.ranges.lower), *(low for low, _ in within)]),
                 np.concatenate([q(self.ranges.upper), *(high for _, high in within)]))

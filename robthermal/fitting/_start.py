@@ -15,6 +15,7 @@ Start = Literal["free", "measured", "system"]
 STARTS = ("free", "measured", "system")
 SIGMA = 5.0  # K: how far a lump may be from its nearest sensor when nobody says anything
 WHOLE = 2.0  # half ranges: an input was anything within its range
+COLDEST, HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
 REACH = 10.0  # bounds of a free initial temperature, in SIGMA: 50 K, to keep trial steps physical
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import robthermal as rt
-from robthermal.fitting import as_data, free_run
+from robthermal.fitting import NONE, Problem, as_data, free_run, initial_of
 
 N, H, NOISE = 150, 2.0, 0.03
 S, R, K = 0.04, 1.6, 0.3  # V/K, Ω, W/K
@@ -64,3 +64,17 @@ def test_where_a_tenth_determines_the_start_the_rest_is_not_looked_at() -> None:
                        ).initial_temperatures for one in (record, record.with_outputs(later))]
     np.testing.assert_array_equal(starts[0], starts[1])
     assert starts[0][1] == pytest.approx(314.0, abs=0.1)
+
+
+def test_a_start_stays_where_a_network_means_anything() -> None:
+    """First readings that are far apart make a wide prior; its end was a temperature that a system refuses."""
+    record = rt.Record(sample_time=1.0, inputs=np.zeros((20, 1)), input_names=["q"], output_names=["Ta", "Tb"],
+                       outputs=np.column_stack([np.full(20, 300.0), np.full(20, 380.0)]))
+    system = rt.System(ambients={"room": {"temperature": 295.0}}, inputs={"q": {"lump": "a"}},
+                       lumps={name: {"capacity": 10.0} for name in "abc"},
+                       links=[{"between": (name, "room"), "conductance": 1.0} for name in "abc"],
+                       sensors={"Ta": {"lump": "a", "noise": 0.1}, "Tb": {"lump": "b", "noise": 0.1}})
+    one = as_data(system, record, "record")[0]
+    problem = Problem(system, [one], NONE, [initial_of(system, one, "free")])
+    coldest, hottest = (problem.temperatures(v)[0] for v in problem.bounds)
+    assert coldest.min() == pytest.approx(151.0) and 380.0 < hottest.max() <= 1500.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...fitting import Initial, Ranges, started
+from ...fitting import COLDEST, HOTTEST, Initial, Ranges, started
 from ...thermal import System
 from ..data import DataSet, records_of
 from ..effects import Candidate
@@ -25,7 +25,6 @@ from ._sessions import Sessions
 
 Array = NDArray[np.float64]
 _FARTHEST = 20.0  # standard deviations of an initial temperature
-_COLDEST, _HOTTEST = 151.0, 1500.0  # K: a system refuses what is below 150 K, and above this a network means nothing
 _STILL = 1e-6  # standard deviations from a bound
 _COARSEST = 2.5  # times what is usual: a place off by more than half a lump belongs to another lump
 
@@ -194,7 +193,7 @@ class Structure:
     @property
     def _starts_within(self) -> tuple[Array, Array]:
         """Bounds of the initial states, in standard deviations: no farther than a system accepts."""
-        bounds = [start.within(_COLDEST, _HOTTEST, _FARTHEST) for start in self.starts]
+        bounds = [start.within(COLDEST, HOTTEST, _FARTHEST) for start in self.starts]
         return np.concatenate([low for low, _ in bounds]), np.concatenate([high for _, high in bounds])
 
     @cached_property
