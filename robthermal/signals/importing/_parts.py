@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ._options import ImportOptions
 from ._rounded import nice
+from ._startup import without_startup
 from ._table import Action, Array, Table, spans
 
 Flags = NDArray[np.bool_]
@@ -162,7 +163,9 @@ def parts_of(
     for rows in pieces:
         segments += _segments(table, rows, stamps, good, threshold, median, driven, options)
     _say_missing(table, ends, lacking, driven, read)
-    long = _long_enough(table, segments, stamps, median, options)
+    long = without_startup(
+        table, _long_enough(table, segments, stamps, median, options), stamps, median, threshold, options
+    )
     h = _step(long, stamps, median)
     _check_jitter(table, long, stamps, h, threshold, options)
     return [_part(rows, stamps[rows], h) for rows in long]

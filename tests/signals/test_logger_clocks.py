@@ -1,4 +1,4 @@
-"""Time columns that are counters of microcontrollers and start again from zero."""
+"""Time columns that are counters of microcontrollers and start again from zero, and rows of a logger that starts."""
 
 from __future__ import annotations
 
@@ -101,3 +101,22 @@ def test_cells_before_the_names_of_a_header_are_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'Write header = \["Timestamp", "T1", "I"\]'):
         rt.read_record(path, **NAMES)
     _as_written(rt.read_record(path, **NAMES, header=["Timestamp", "T1", "I"]))
+
+
+def _times(first: list[float]) -> list[float]:
+    """Stamps one second apart after some that are not [s]."""
+    return [round(float(at), 3) for at in np.concatenate([first, first[-1] + np.arange(1, N - len(first) + 1)])]
+
+
+@pytest.mark.parametrize(("first", "left_out"), [([0.0, 0.195], 1), ([0.0, 0.852, 1.122, 2.007], 2)])
+def test_rows_of_a_logger_that_starts_are_left_out_and_said(tmp_path: Path, first: list[float], left_out: int) -> None:
+    """First steps of two measured logs; the whole file had been refused for them."""
+    record = rt.read_record(_log(tmp_path / "log.csv", _times(first)), **NAMES)
+    np.testing.assert_allclose(record.outputs[-20:, 0], T[-20:] + 273.15, atol=2e-3)
+    assert record.n_samples == N - left_out and "a logger that starts" in str(record.imported)
+
+
+def test_an_irregular_step_later_on_is_refused_as_before(tmp_path: Path) -> None:
+    times = [float(k) + (0.4 if k == 30 else 0.0) for k in range(N)]
+    with pytest.raises(InputError, match="the time steps deviate by up to 40 %"):
+        rt.read_record(_log(tmp_path / "log.csv", times), **NAMES)
