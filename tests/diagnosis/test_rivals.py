@@ -251,7 +251,7 @@ def test_where_the_model_at_a_place_runs_away_all_places_stay(monkeypatch):
 
 
 def test_beside_the_face_of_a_module_a_lump_is_listed_that_does_less(monkeypatch):
-    """The face is told here: the other lump does less than 0.9 and more than 0.3 of what the first one does."""
+    """The face is told here: the other lump does less than 0.9 beside a finer network, and more in the one as it is."""
     one = replace(found(16), contenders=())
     assert one.best.candidate.where[0] == "x1" and not with_neighbors(one).contenders
     monkeypatch.setattr(_neighbors, "faces_of", lambda system: {"x1"})

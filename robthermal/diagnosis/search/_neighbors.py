@@ -8,10 +8,10 @@ from dataclasses import replace
 from ...errors import Diverged, InputError
 from ...thermal import System
 from ..effects import Candidate, candidates
-from ..evidence import NEEDED, score_candidates
-from ..fit import Refit
+from ..evidence import score_candidates
+from ..fit import Refit, exact
 from ._decide import Accepted
-from ._short_list import Entry, refit_short_list
+from ._short_list import Entry, Key, refit_short_list
 
 ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 
@@ -20,9 +20,8 @@ def with_neighbors(round_: Accepted) -> Accepted:
     """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
 
     A path from the middle of a lump looks in a coarse network as if it came from between that lump and the next; the
-    sum of squares decides for one of them beyond every statistical doubt, and can be wrong. Legs of modules have no
-    inside even in a finer network, and a face takes over what they would do: of a path at a face, the lump beside it is
-    listed where it would be needed itself.
+    sum of squares decides for one of them beyond every statistical doubt, and can be wrong. A face of a module and the
+    lump beside it are compared in the network as it is.
 
     Parameters
     ----------
@@ -43,7 +42,7 @@ def with_neighbors(round_: Accepted) -> Accepted:
         refitted = _refitted(before, own, near)
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
-    alike = _nearly_best(before, refitted, best.candidate)
+    alike = _nearly_best(before, refitted, own)
     listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
     return replace(round_, contenders=(*round_.contenders, *alike),
                    ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
@@ -105,17 +104,28 @@ def _refitted(before: Refit, best: Candidate, near: Sequence[Candidate]) -> list
     return entries
 
 
-def _beside_a_face(system: System, one: Candidate, best: Candidate) -> bool:
-    """Whether a path has another lump where the best one has the face of a module."""
-    return bool(faces_of(system) & (set(best.where) - set(one.where)))
+def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate) -> list[Entry]:
+    """Others that reach most of the decrease that the best of them reaches.
+
+    Where a face of a module is exchanged, in the network as it is: beside a finer one a face takes over what the legs,
+    which have no inside there, would do. So a face itself has to reach it in both.
+    """
+    faces = faces_of(before.structure.base)
+    at_faces = [entry.candidate for entry in entries if faces & (set(entry.candidate.where) ^ set(own.where))]
+    plain = exact(before)
+    as_it_is = _decreases(plain, _refitted(plain, own, at_faces)) if at_faces and before.structure.coarse else {}
+    beside = _decreases(before, entries)
+    exchanged = {one.key for one in at_faces} if as_it_is else set()
+
+    def alike(entry: Entry) -> bool:
+        asked = [as_it_is] if entry.candidate.key in exchanged else []
+        if not asked or not faces & set(own.where) - set(entry.candidate.where):  # a face must do as much in both
+            asked = [*asked, beside]
+        return all(of.get(entry.candidate.key, 0.0) > ALIKE * max(of.values(), default=0.0) for of in asked)
+
+    return [entry for entry in entries if entry.candidate.key != own.key and alike(entry)]
 
 
-def _nearly_best(before: Refit, entries: Sequence[Entry], best: Candidate) -> list[Entry]:
-    """Others that reach most of the decrease that the best of them reaches; beside a face, what would be needed."""
-    most = before.rss - min((entry.fit.rss for entry in entries), default=before.rss)
-
-    def least(entry: Entry) -> float:
-        return NEEDED if _beside_a_face(before.structure.base, entry.candidate, best) else ALIKE
-
-    return [entry for entry in entries if entry.candidate.key != best.key
-            and before.rss - entry.fit.rss > least(entry) * most]
+def _decreases(before: Refit, entries: Sequence[Entry]) -> dict[Key, float]:
+    """By how much every place lessens the sum of squares."""
+    return {entry.candidate.key: before.rss - entry.fit.rss for entry in entries}
