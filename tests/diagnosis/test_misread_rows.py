@@ -96,6 +96,24 @@ def test_what_is_missing_is_named_beside_them(acted: bool) -> None:
     assert ("misread" in found.outcome.text) == (not acted)
 
 
+def test_rows_that_act_much_later_are_not_misread() -> None:
+    """A heater behind a long pipe, say: sixty samples late in a long record, and the delay is not in the model."""
+    n = 20_000
+    current = np.full(n, 2.0)
+    current[[1000, 2500]] = 0.4
+    late = np.concatenate([np.full(60, 2.0), current[:-60]])
+    bar = rt.System(ambients={"room": {"temperature": ROOM}}, lumps={"bar": {"capacity": 30.0}},
+                    links=[{"between": ("bar", "room"), "conductance": 0.5}], inputs={"q": {"lump": "bar"}},
+                    sensors={"T": {"lump": "bar", "noise": NOISE}},
+                    fit={"lumps.bar.capacity": {"lower": 10.0, "upper": 100.0}})
+    empty = rt.Record(sample_time=H, inputs=late, outputs=np.zeros((n, 0)), input_names=["q"], output_names=[])
+    readings = rt.thermal.simulate(bar, empty).outputs + NOISE * np.random.default_rng(7).standard_normal((n, 1))
+    fit = rt.calibrate(bar, rt.Record(sample_time=H, inputs=current, outputs=readings, input_names=["q"],
+                                      output_names=["T"]))
+    assert not any("the readings did not follow" in one for one in fit.remarks)
+    assert any("whether it acted the readings do not tell" in one for one in fit.remarks)
+
+
 def test_of_a_row_that_nobody_can_see_nothing_is_said() -> None:
     weak = _current()
     weak[101] = 1.4
