@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from controlled_board import LAGS, NOISE, PATH, ROOM, STEP, day, model, step_test
+from controlled_board import LAGS, NOISE, PATH, ROOM, STEP, Board, day, model, step_test
 
 import robthermal as rt
 from robthermal.diagnosis.search._implausible import implausible
@@ -64,3 +65,21 @@ def test_while_everything_only_settles_a_small_change_in_time_is_no_name() -> No
         why = implausible(step, fit, {"time": time, "relative": relative}, ())
         assert ("no input changes" in why) is refused
         assert not implausible(step, fit, {"time": time, "relative": -0.6}, ())  # a fan that fails
+
+
+@pytest.mark.parametrize("seed", [62, 63])
+def test_pulses_of_a_heater_that_the_model_does_not_follow_are_no_broken_sensor(seed: int) -> None:
+    """A sensor without a lag, pulses every third or fourth row, commands logged a row late: was refused."""
+    board = Board(gain=(0.0112, 0.0074), loss=(0.0128, 0.0155), path=0.00225, lags=(0.0, 33.9), room=292.6)
+    floor = rt.diagnosis.noise_floor(model(), rt.signals.shift_inputs(day(seed, board=board), 1))
+    assert floor.glitches == {} and floor.noise["T1"] == pytest.approx(NOISE)
+
+
+def test_a_broken_sensor_beside_a_steady_heater_is_refused() -> None:
+    """Spikes of 3 K at random in a tenth of the rows, while no heater steps."""
+    record = step_test(1)
+    rng = np.random.default_rng(5)
+    readings = np.array(record.outputs)
+    readings[rng.choice(np.arange(60, len(readings) - 5), len(readings) // 10, replace=False), 0] += 3.0
+    with pytest.raises(rt.InputError, match="isolated outliers"):
+        rt.diagnosis.noise_floor(model(), record.with_outputs(readings))

@@ -30,6 +30,8 @@ _STEEP = 2.5  # times the spread of the middle three: a bend of the residual
 _CURVED = 0.5  # times the largest second difference of the model nearby: where inputs switch, the model may be late
 _PASSES = 5
 MOST = 0.05
+_BESIDE, _HALF = 2, 0.5  # rows from a step of an input, over so much of its range
+_MOSTLY = 0.9  # of more outliers than that: they come of the input, which the model follows with the wrong size or late
 
 
 def counted(system: System, data: Sequence[Data]) -> dict[str, int]:
@@ -85,6 +87,8 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     for i in np.flatnonzero(missing.any(axis=0)):
         rows = np.flatnonzero(missing[:, i] & ~changing[:, i])
         kept = rows[in_rhythm(rows, own[rows, i] - r[rows, i])]
+        if rows.size > MOST * len(r) and np.mean(_beside_steps(one)[rows]) >= _MOSTLY:
+            kept = rows
         missing[kept, i], r[kept, i] = False, own[kept, i]
     if not missing.any():
         return one
@@ -93,6 +97,13 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     outputs = np.array(one.record.outputs, float)
     outputs[:, columns] = readings
     return replace(one, record=one.record.with_outputs(outputs), readings=readings, missing=missing)
+
+
+def _beside_steps(one: Data) -> Mask:
+    """Rows within two of a step of an input over half of its range."""
+    inputs = np.asarray(one.record.inputs, float)
+    steps = np.abs(np.diff(inputs, axis=0, prepend=inputs[:1])) > _HALF * np.ptp(inputs, axis=0)
+    return np.asarray(np.convolve(steps.any(axis=1), np.ones(2 * _BESIDE + 1), mode="same") > 0.5)
 
 
 def _bridge(r: Array, missing: Mask) -> None:
